@@ -88,7 +88,7 @@ def test_help_of_compute_shows_every_option():
     shown = pydoc.render_doc(scanfab.compute, renderer=pydoc.plaintext)
     for option in options_of(scanfab.Settings):
         assert option.name in inspect.signature(scanfab.compute).parameters
-        assert f"{option.name} : {option.takes}" in shown
+        assert option.help[:40] in shown
 
 
 def test_a_wrong_option_is_named_with_the_nearest_right_one(series):

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import math
 import textwrap
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
-from functools import wraps
+from functools import partial, wraps
+from itertools import pairwise
+from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from scanfab.base.errors import SettingsError
@@ -19,6 +22,10 @@ R = TypeVar("R")
 
 # in the order of the help
 GROUPS = ("reading", "sample", "window", "scan", "fabric", "output")
+# what the command line makes of a text, by the type of the field; of all other types a text
+KINDS: dict[str, type] = {"int": int, "float": float, "bool": bool, "Path": Path}
+# the options of dataclasses that have been asked for them
+_known: dict[type, tuple[Option, ...]] = {}
 
 
 def unusable(name: str, expected: str, found: object) -> SettingsError:
@@ -26,49 +33,42 @@ def unusable(name: str, expected: str, found: object) -> SettingsError:
     return SettingsError(f"{name}: expected {expected}, found {found!r}")
 
 
-def as_given(name: str, value: Any) -> Any:
-    """For values that are checked where they are used."""
-    return value
-
-
 @dataclass(frozen=True)
 class Option:
     """
     One option: an argument of the library, and an option of the command line.
 
-    Its texts name other options by their arguments, in backquotes; the command line spells them as
+    A field of a dataclass declares it by :func:`option`; its help is the docstring below the field.
+    The help names other options by their arguments, in backquotes; the command line spells them as
     it does: `rv_center` is ``--rv-center`` there.
     """
 
+    name: str
+    """Of the argument."""
+    kind: type
+    """What the command line makes of its text; bool is a switch."""
     help: str
-    """What it decides: of ``--help`` and of docstrings."""
-    group: str
+    """What it decides: in ``--help``, in docstrings and in a report."""
+    group: str = "output"
     """One of :data:`GROUPS`."""
     default: Any = None
     """As users write it."""
-    parse: Parse = as_given
-    """From its name and what users write to what is kept; what is kept, it takes as well."""
-    name: str = ""
-    """Of the argument; that of the field where one declares it."""
-    meaning: str = ""
-    """In a report, to those who read results; only what decides results has one."""
-    takes: str = "str"
-    """The types of the argument, in docstrings."""
-    kind: type = str
-    """What the command line makes of its text; bool is a switch."""
+    parse: Parse = lambda name, value: value
+    """Makes what is kept of an option's name and value; it takes what is kept as well."""
+    choices: Sequence[str] | Callable[[], Iterable[str]] = ()
+    """What a shell offers. Without a parser, no other words will do."""
     metavar: str | None = None
+    """The form of its value; by default the choices."""
     spelling: str = ""
     """On the command line, where it does not follow from the name."""
     several: bool = False
     """Whether the command line takes it more than once."""
-    words: int = 1
-    """How many words the command line takes."""
-    choices: Callable[[], Iterable[str]] = tuple
-    """What a shell offers; other words may do as well."""
     files: bool = False
     """Whether a shell offers files too."""
     first: bool = False
     """Whether it stands among the few that most need."""
+    decides: bool = True
+    """Whether it decides a result: then the report lists it, and scanfab.toml may hold it."""
 
     @property
     def flag(self) -> str:
@@ -89,28 +89,58 @@ def flag_of(name: str) -> str:
     return f"--{name.rstrip('_').replace('_', '-')}"
 
 
-def option(**declaration: Any) -> Any:
-    """A field of a dataclass that declares an option, of the field's name."""
-    # a shell is told of options that take a number and nothing else
-    number_only = {"int": int, "float": float}.get(declaration.get("takes", ""), str)
-    declared = Option(**{"kind": number_only, **declaration})
-    return field(default=declared.default, metadata={"option": declared})
+def option(parse: Parse | None = None, **declaration: Any) -> Any:
+    """A field of a dataclass that declares an option, by the attributes of :class:`Option`."""
+    choices = declaration.get("choices")
+    if parse is not None:
+        declaration["parse"] = parse
+    elif isinstance(choices, tuple):
+        declaration |= {"parse": one_of(*choices), "metavar": "|".join(choices)}
+    return field(default=declaration.get("default"), metadata=declaration)
+
+
+# options of each group of the help
+reading, sample, window, scan, fabric = (partial(option, group=group) for group in GROUPS[:5])
+# options that say how a command is run, and decide no result
+running = partial(option, decides=False)
 
 
 def changed(holder: type, name: str, **changes: Any) -> Any:
     """A field that declares an option of another dataclass once more, with some changes."""
-    declared = next(one for one in options_of(holder) if one.name == name)
-    declared = replace(declared, **changes)
-    return field(default=declared.default, metadata={"option": declared})
+    (declared,) = (one.metadata for one in fields(holder) if one.name == name)
+    return option(**{**declared, **changes})
 
 
 def options_of(holder: type) -> tuple[Option, ...]:
     """The options that the fields of a dataclass declare."""
-    return tuple(replace(one.metadata["option"], name=one.name) for one in fields(holder))
+    if holder not in _known:
+        texts = dict(pair for one in reversed(holder.__mro__) for pair in _docstrings(one))
+        kinds = {one.name: str(one.type).removesuffix(" | None") for one in fields(holder)}
+        _known[holder] = tuple(
+            Option(one.name, KINDS.get(kinds[one.name], str), texts[one.name], **one.metadata)
+            for one in fields(holder)
+        )
+    return _known[holder]
+
+
+def _docstrings(holder: type) -> Iterable[tuple[str, str]]:
+    """The fields of a class, with the docstrings below them, which only its source has."""
+    module = inspect.getmodule(holder)
+    # to find the lines of one class would take longer than all of the module
+    tree = ast.parse("" if module is None or holder is object else inspect.getsource(module))
+    classes = (one for one in tree.body if isinstance(one, ast.ClassDef))
+    bodies = [one.body for one in classes if one.name == holder.__name__]
+    for place, below in (pair for body in bodies for pair in pairwise(body)):
+        match place, below:
+            case (
+                ast.AnnAssign(target=ast.Name(id=name)),
+                ast.Expr(value=ast.Constant(value=str(text))),
+            ):
+                yield name, " ".join(text.split())
 
 
 def refuse_unknown(what: str, given: Iterable[str], known: Sequence[str]) -> None:
-    """TypeError for a name that is none, with the nearest that is."""
+    """TypeError for a name that is no option; it names the nearest that is one."""
     for name in given:
         if name not in known:
             near = get_close_matches(name, known, n=1)
@@ -120,40 +150,44 @@ def refuse_unknown(what: str, given: Iterable[str], known: Sequence[str]) -> Non
 
 def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """
-    A decorator for functions with options in their signature.
+    A decorator for functions with options in their signature, where editors look for them.
 
-    It refuses names that are none of them, with the nearest that is one, and puts what the options
-    mean, in the order of the signature, in place of ``{options}`` into the docstring.
+    The function refuses names that are no options, and in its docstring the help of the options, in
+    the order of the signature and with its types, stands in place of ``{options}``.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
-        known = list(inspect.signature(function).parameters)
+        parameters = inspect.signature(function).parameters
+        declared = {one.name: one for one in options}
 
         @wraps(function)
         def call(*args: P.args, **kwargs: P.kwargs) -> R:
-            refuse_unknown(function.__name__, kwargs, known)
+            refuse_unknown(function.__name__, kwargs, list(parameters))
             return function(*args, **kwargs)
 
+        documented = [
+            _documented(declared[one.name], one.annotation)
+            for one in parameters.values()
+            if one.name in declared
+        ]
         text = inspect.cleandoc(function.__doc__ or "")
-        places = {name: place for place, name in enumerate(known)}
-        ordered = sorted(options, key=lambda option: places.get(option.name, len(places)))
-        call.__doc__ = text.replace("{options}", "\n".join(map(_documented, ordered)))
+        call.__doc__ = text.replace("{options}", "\n".join(documented))
         return call
 
     return decorate
 
 
-def _documented(option: Option) -> str:
+def _documented(option: Option, takes: str) -> str:
     """An option as numpydoc has a parameter."""
     form = option.metavar or ""
     # a single word such as FILE says no more than the type does
     written = f" Written as ``{form}``." if set("|:,") & set(form) else ""
     text = textwrap.fill(option.help + written, 92, break_on_hyphens=False)
-    return f"{option.name} : {option.takes}, optional\n{textwrap.indent(text, '    ')}"
+    return f"{option.name} : {takes}, optional\n{textwrap.indent(text, '    ')}"
 
 
 def number(expected: str, holds: Callable[[float], bool]) -> Parse:
-    """Of options that take a number; what is none is not-a-number, for which nothing holds."""
+    """A parser of one number; any other value counts as not-a-number, for which nothing holds."""
 
     def parse(name: str, value: Any) -> float:
         try:
@@ -168,11 +202,11 @@ def number(expected: str, holds: Callable[[float], bool]) -> Parse:
 
 
 def whole(expected: str, holds: Callable[[int], bool]) -> Parse:
-    """Of options that take a whole number."""
+    """A parser of one whole number."""
 
     def parse(name: str, value: Any) -> int:
         found = number(expected, float.is_integer)(name, value)
-        # not by way of a float, which rounds large ones
+        # a float would round a large integer
         exact = value if isinstance(value, int) else int(found)
         if not holds(exact):
             raise unusable(name, expected, value)
@@ -181,8 +215,24 @@ def whole(expected: str, holds: Callable[[int], bool]) -> Parse:
     return parse
 
 
+def numbers(expected: str, holds: Callable[[tuple[float, ...]], bool]) -> Parse:
+    """A parser of several finite numbers, in a text between commas or blanks or in a sequence."""
+
+    def parse(name: str, value: Any) -> tuple[float, ...]:
+        words = value.replace(",", " ").split() if isinstance(value, str) else value
+        try:
+            found = tuple(map(float, words))
+        except (TypeError, ValueError):
+            found = (math.nan,)
+        if not all(map(math.isfinite, found)) or not holds(found):
+            raise unusable(name, expected, value)
+        return found
+
+    return parse
+
+
 def one_of(*words: str) -> Parse:
-    """Of options that take one word of a few."""
+    """A parser of one word of a few."""
 
     def parse(name: str, value: Any) -> str:
         if value not in words:
@@ -193,5 +243,5 @@ def one_of(*words: str) -> Parse:
 
 
 def optional(parse: Parse) -> Parse:
-    """The same of an option that need not be given."""
+    """The same parser for an option that need not be given."""
     return lambda name, value: None if value is None else parse(name, value)

@@ -2,60 +2,57 @@
 
 from __future__ import annotations
 
-import shlex
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import ParameterSource
 
 from scanfab.cli.options import (
     EXCERPT,
     READING,
     SAMPLE,
     WINDOW,
-    GroupedOption,
-    SourceType,
     check_plot,
     options,
+    usage_errors,
 )
-from scanfab.cli.settings_file import fill_from_file
-from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
-from scanfab.cli.tables import Column, print_columns, spelt
-from scanfab.cli.talk import talk_options, tell_inputs, working
+from scanfab.cli.sources import SourceCommand, checked, open_one, source_argument
+from scanfab.cli.talk import announce_compiling, talk_options, tell_inputs, working
 from scanfab.pipeline.options import as_options
 
 if TYPE_CHECKING:
     from scanfab.pipeline.calibration import StepRow
 
 
-# what compute has no use for, or what is recommended instead
-OWN = (
-    "source", "frame", "output", "plot", "variants", "spacing", "directions", "tolerance",
-    "max_chords", "fields", "digits",
-)  # fmt: skip
-TITLES = {
+# what is changed in each ladder
+CHANGED = {
     "spacing": "spacing / r_min",
     "directions": "directions",
     "cutoff": "cut-off / r_min",
     "rv": "RV / half extent",
     "recommended": "recommended",
 }
+TITLES = {
+    "variant": "variant",
+    "rule": "rule",
+    "rule_bias": "bias",
+    "segments": "segments",
+    "time": "time",
+    "alpha_vs_axial": "α_vs axial",
+    "alpha_vs_axial_se": "± scan",
+    "alpha_vs_axial_sample_se": "± sample",
+    "is_steady": "steady",
+}
+# columns that are left out where there is no room, the least telling first
+OPTIONAL = ("rule_bias", "segments", "rule", "time")
 
 
 @click.command(cls=SourceCommand)
-@click.argument("source", metavar="SOURCE", type=SourceType())
+@source_argument
 @options(*READING, *SAMPLE)
-@click.option(
-    "--frame",
-    cls=GroupedOption,
-    group="reading",
-    default=-1,
-    metavar="K",
-    help="Which frame, as in the fabric table (default: last).",
-)
+@options("frame", default=-1, help="Which frame, as in the fabric table (default: last).")
 @options("variants", default="cd")
 @options(*WINDOW, "edge", "cutoff")
 @options("spacing", help="Of the ladder of directions (default: 0.25rmin).")
@@ -68,109 +65,79 @@ TITLES = {
 @options("max_chords", help="Steps that would cut more chords from grains than this are left out.")
 @options("axis", "strain", "seed", "workers", "output", *EXCERPT, "plot")
 @talk_options
-@click.pass_context
 def calibrate(
-    ctx: click.Context,
-    /,
     source: str,
     output: Path | None,
     plot: Path | None,
     frame: int,
+    fields: str | None,
+    digits: int,
     **chosen: Any,
 ) -> int:
     """
     Show how the void fabric of one frame changes with spacing, directions, cut-off and RV.
 
-    Each step with its error from the scan, the sample's own, and the time; then from where on
-    nothing changes any more, and the settings that follow, as a command line. The spacings go down
-    to r_min/10, which the 2017 paper takes. --cutoff and --rv are those of the other ladders.
+    Each step stands with its error from the scan, the sample's own error, and the time; then from
+    where on nothing changes any more, and the settings that follow, as a command line. The spacings
+    go down to r_min/10, which the 2017 paper takes. --cutoff and --rv are those of the other
+    ladders.
 
     On a terminal a readable table; else the steps as CSV, and what they show on standard error.
     """
     from scanfab.base.column import columns_of_fields
-    from scanfab.cli.console import announce_compiling, is_readable, print_csv, reported_warnings
+    from scanfab.cli.console import is_readable, print_csv
     from scanfab.pipeline.calibration import StepRow
     from scanfab.pipeline.calibration import calibrate as calibrate_series
+    from scanfab.pipeline.record import asked_for
+    from scanfab.pipeline.repeat import repeat_command
     from scanfab.pipeline.settings import Settings
     from scanfab.table.writing import Excerpt, ResultFile
     from scanfab.viz.figures.page import make_figures, save_figures
 
     check_plot(plot, None)
     columns = columns_of_fields(StepRow)
-    with reported_warnings():
-        chosen, settings_file = fill_from_file(ctx, (source,), chosen)
-        with settings_file.named_errors():
-            reading = reading_arguments(chosen)
-            excerpt = Excerpt.make(columns, chosen.pop("fields"), int(chosen.pop("digits")))
-            settings = Settings(**chosen)
-            result = None if output is None else ResultFile(output, columns, excerpt)
-        announce_compiling()
-        series = open_series((source,), reading)
-        if len(series) > 1:
-            names = ", ".join(one.name for one in series)
-            raise click.UsageError(f"one series can be calibrated at a time, found {names}")
-        tell_inputs(series, settings.workers)
-        with working():
-            found = calibrate_series(series[0], frame=frame, **vars(settings))
-        rows = tuple(replace(row, note=as_options(row.note)) for row in found.rows)
-        found = replace(found, rows=rows)
-        command = _command_line(ctx, source, found.options)
-        if result is not None:
-            result.save(found.rows)
-        if plot is not None:
-            save_figures(plot, make_figures(found.rows, "calibration"))
-        tells_all = result is not None or is_readable()
-        if result is None and tells_all:
-            _print(found.rows)
-        elif result is None:
-            print_csv(found.rows, excerpt, columns)
-        # behind rows on standard output, what they show goes beside them
-        for sentence in (*found.findings, command):
-            click.echo(sentence, err=not tells_all)
+    reading, settings = checked(chosen, Settings)
+    with usage_errors():
+        excerpt = Excerpt.make(columns, fields, digits)
+        result = None if output is None else ResultFile(output, columns, excerpt)
+    announce_compiling()
+    series = open_one((source,), reading, "calibrated")
+    tell_inputs([series], settings.workers)
+    with working():
+        found = calibrate_series(series, frame=frame, **vars(settings))
+    rows = [replace(row, note=as_options(row.note)) for row in found.rows]
+    usual = Settings()
+    best: Any = {"max_chords": usual.max_chords, "tolerance": usual.tolerance, **found.options}
+    command = repeat_command(asked_for([source], reading, replace(settings, **best)))
+    if result is not None:
+        result.save(rows)
+    if plot is not None:
+        save_figures(plot, make_figures(rows, "calibration"))
+    tells_all = result is not None or is_readable()
+    if not tells_all:
+        print_csv(rows, excerpt, columns)
+    elif result is None:
+        _print(rows)
+    # behind rows on standard output, what they show goes beside them
+    for sentence in (*found.findings, command):
+        click.echo(sentence, err=not tells_all)
     return 0
 
 
-def _command_line(ctx: click.Context, source: str, recommended: dict[str, str]) -> str:
-    """The recommended compute, with what the user said of source and sample."""
-    words = ["scanfab", "compute", source]
-    for parameter in ctx.command.params:
-        name = str(parameter.name)
-        given = ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE
-        # --quiet and the like are no settings
-        if name in OWN or name not in ctx.params or not given:
-            continue
-        value = ctx.params[name]
-        for one in value if parameter.multiple else [value]:
-            numbers = name == "cell" and not Path(one).is_file()
-            spelt = one.split() if numbers else one if isinstance(one, tuple) else [one]
-            words += [parameter.opts[0], *map(str, spelt)]
-    words += ["--variants", ctx.params["variants"]]
-    for name, value in recommended.items():
-        words += [f"--{name}", value]
-    return shlex.join(words)
-
-
-def _print(rows: tuple[StepRow, ...]) -> None:
+def _print(rows: list[StepRow]) -> None:
     """One table for each ladder."""
-    for ladder, steps in groupby(rows, key=lambda row: row.ladder):
-        print_columns(_columns(ladder, list(steps)))
-        click.echo()
+    from scanfab.cli.console import print_rows
 
-
-def _columns(ladder: str, steps: list[StepRow]) -> list[Column]:
-    """What was changed, and what came of it; the rest where there is room."""
     steady = {None: "", 0: "no", 1: "yes"}
-    return [
-        Column(TITLES[ladder], [f"{row.value:g}" for row in steps]),
-        Column("variant", [row.variant for row in steps]),
-        Column("rule", [row.rule for row in steps], 2),
-        Column(
-            "bias", [spelt(row.rule_bias if row.rule_bias > 1e-12 else 0, 2) for row in steps], 4
-        ),
-        Column("segments", [spelt(row.segments) for row in steps], 3),
-        Column("time", [f"{row.seconds:.2g} s" for row in steps], 1),
-        Column("α_vs axial", [spelt(row.alpha_vs_axial) for row in steps]),
-        Column("± scan", [spelt(row.alpha_vs_axial_se) for row in steps]),
-        Column("± sample", [spelt(row.alpha_vs_axial_sample_se) for row in steps]),
-        Column("steady", [steady[row.steady] + (" (!)" if row.note else "") for row in steps]),
-    ]
+    for ladder, steps in groupby(rows, key=lambda row: row.ladder):
+        shown = [
+            {
+                **asdict(row),
+                "rule_bias": row.rule_bias if row.rule_bias > 1e-12 else 0,
+                "time": f"{row.seconds:.2g} s",
+                "is_steady": steady[row.steady] + (" (!)" if row.note else ""),
+            }
+            for row in steps
+        ]
+        print_rows(shown, {"value": CHANGED[ladder], **TITLES}, OPTIONAL)
+        click.echo()

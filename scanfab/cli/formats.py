@@ -6,40 +6,35 @@ from typing import Any
 
 import click
 
+from scanfab.cli.console import Command
 
-@click.command()
+
+@click.command(cls=Command)
 def formats() -> None:
     """List every reader and writer, its extensions, and the package it comes from."""
-    from scanfab.cli.console import reported_warnings
+    from scanfab.cli.console import print_rows
     from scanfab.io.reader import installed_readers
     from scanfab.io.writer import installed_writers
     from scanfab.table.formats import known_formats
     from scanfab.viz.figures.style import PLOT_FORMATS
 
-    with reported_warnings():
-        lines = [
-            (kind, name, " ".join(one.plugin.extensions), one.package, _described(one.plugin))
-            for kind, offers in (("reader", installed_readers()), ("writer", installed_writers()))
-            for name, one in offers.items()
-        ]
-        written = known_formats()
-    lines += [
-        ("table", suffix.lstrip("."), suffix, type(one).__module__.split(".")[0], one.description)
-        for suffix, one in written.items()
+    lines = [
+        (kind, name, " ".join(one.plugin.extensions), one.package, _described(one.plugin))
+        for kind, offers in (("reader", installed_readers()), ("writer", installed_writers()))
+        for name, one in offers.items()
     ]
-    lines += [
-        ("figure", suffix.lstrip("."), suffix, "scanfab", description)
-        for suffix, description in PLOT_FORMATS.items()
-    ]
+    for suffix, one in known_formats().items():
+        package = type(one).__module__.split(".")[0]
+        lines.append(("table", suffix.lstrip("."), suffix, package, one.description))
+    for suffix, description in PLOT_FORMATS.items():
+        lines.append(("figure", suffix.lstrip("."), suffix, "scanfab", description))
     lines += [
         ("folder", "paraview", ".vtp .pvd", "scanfab", "what compute --vtk writes"),
         ("page", "html", ".html", "scanfab", "what report writes"),
     ]
     titles = ("kind", "name", "extensions", "package", "description")
-    widths = [max(len(line[k]) for line in [titles, *lines]) for k in range(4)]
-    for line in [titles, *lines]:
-        padded = [word.ljust(width) for word, width in zip(line, widths, strict=False)]
-        click.echo("  ".join([*padded, line[4]]))
+    rows = [dict(zip(titles, line, strict=True)) for line in lines]
+    print_rows(rows, {title: title for title in titles})
 
 
 def _described(plugin: Any) -> str:

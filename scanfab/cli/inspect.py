@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.options import READING, SAMPLE, WINDOW, options, sources_argument
-from scanfab.cli.settings_file import fill_from_file
-from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
-from scanfab.cli.tables import spelt
-from scanfab.cli.talk import talk_options, tell_inputs, working
+from scanfab.cli.options import READING, SAMPLE, WINDOW, options
+from scanfab.cli.sources import SourceCommand, checked, open_series, sources_argument
+from scanfab.cli.talk import announce_compiling, talk_options, tell_inputs, working
 from scanfab.pipeline.options import as_options
 
 if TYPE_CHECKING:
@@ -24,39 +22,32 @@ if TYPE_CHECKING:
 @options(*READING, "frames", *SAMPLE, *WINDOW)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line and frame.")
 @talk_options
-@click.pass_context
-def inspect(ctx: click.Context, /, sources: tuple[str, ...], as_json: bool, **chosen: Any) -> int:
+def inspect(sources: tuple[str, ...], as_json: bool, **chosen: Any) -> int:
     """
     Show what the reader sees in each frame: grains, radii, contacts, rattlers, cell, columns,
     extents, and where the RV would be.
 
     Nothing is computed; contacts are found by geometry where no file lists them.
     """
-    from scanfab.cli.console import announce_compiling, reported_warnings
     from scanfab.pipeline.inspection import inspect_series
     from scanfab.pipeline.settings import Settings
 
-    with reported_warnings():
-        chosen, settings_file = fill_from_file(ctx, sources, chosen)
-        with settings_file.named_errors():
-            reading = reading_arguments(chosen)
-            settings = Settings(**chosen)
-        announce_compiling()
-        every = open_series(sources, reading)
-        tell_inputs(every, settings.workers)
+    reading, settings = checked(chosen, Settings)
+    announce_compiling()
+    every = open_series(sources, reading)
+    tell_inputs(every, settings.workers)
 
-        def frames() -> int:
-            return sum(len(range(one.frames_expected())[settings.frames]) for one in every)
+    def frames() -> int:
+        return sum(len(range(one.frames_expected())[settings.frames]) for one in every)
 
-        with working(frames, prints=True) as advance:
-            for found in (one for series in every for one in inspect_series(series, settings)):
-                told = [as_options(text) for text in found.warnings]
-                report = replace(found, warnings=told)
-                if as_json:
-                    click.echo(json.dumps(asdict(report), ensure_ascii=False))
-                else:
-                    _print(report)
-                advance()
+    with working(frames, prints=True) as advance:
+        for found in (one for series in every for one in inspect_series(series, settings)):
+            report = replace(found, warnings=[as_options(text) for text in found.warnings])
+            if as_json:
+                click.echo(json.dumps(asdict(report), ensure_ascii=False))
+            else:
+                _print(report)
+            advance()
     return 0
 
 
@@ -66,13 +57,13 @@ def _print(report: FrameReport) -> None:
     title = f"{fields.pop('source')}, frame {fields.pop('frame')}"
     told = fields.pop("warnings")
     click.echo(click.style(title, bold=True))
-    for name, value in fields.items():
+    for name, value in [*fields.items(), *(("warning", text) for text in told)]:
         click.echo(f"  {name:<13} {_spell(value)}")
-    for warning in told:
-        click.echo(f"  {'warning':<13} {warning}")
 
 
 def _spell(value: Any) -> str:
+    from scanfab.cli.console import spelt
+
     if isinstance(value, list):
         return ", ".join(_spell(item) for item in value)
     return spelt(value, 6)

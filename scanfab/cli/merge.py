@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
+from scanfab.cli.console import Command
 from scanfab.cli.options import options, usage_errors
 from scanfab.cli.talk import talk_options
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument(
     "parts", metavar="PART...", nargs=-1, required=True, type=click.Path(path_type=Path)
 )
@@ -28,22 +29,21 @@ def merge(parts: tuple[Path, ...], output: Path | None, frames: str | None) -> i
     Job I of 8:  scanfab compute dumps/ --frames I::8 -o part_I.csv
     Then:        scanfab merge part_*.csv -o fabric.csv
     """
-    from scanfab.cli.console import is_readable, print_csv, print_table, reported_warnings
+    from scanfab.cli.console import is_readable, print_csv, print_table
     from scanfab.io.options import parse_frames
     from scanfab.pipeline.merge import check_output, merged
 
-    with reported_warnings():
-        with usage_errors():
-            chosen = parse_frames(frames)
-            if output is not None:
-                check_output(output, parts)
-        found = merged(parts, chosen)
+    with usage_errors():
+        chosen = parse_frames(frames)
         if output is not None:
-            found.save(output)
-        elif is_readable():
-            print_table(found.rows, found.excerpt)
-        else:
-            print_csv(found.rows, found.excerpt, found.settings.columns)
+            check_output(output, parts)
+    found = merged(parts, chosen)
+    if output is not None:
+        found.save(output)
+    elif is_readable():
+        print_table(found.rows, found.excerpt)
+    else:
+        print_csv(found.rows, found.excerpt, found.settings.columns)
     # a choice of columns may say nothing of the void fabric
     if not found.rows or "alpha_vs" not in found.columns:
         return 0

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import click
 
-from scanfab.cli.options import OF_SEVERAL, options, usage_errors
-from scanfab.cli.talk import talk_options, working
+from scanfab.cli.console import Command
+from scanfab.cli.options import OF_SEVERAL, check_labels, options, usage_errors
+from scanfab.cli.talk import announce_compiling, talk_options, working
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument(
     "tables",
     metavar="TABLE...",
@@ -18,14 +21,7 @@ from scanfab.cli.talk import talk_options, working
     required=True,
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
 )
-@click.option(
-    "-o",
-    "output",
-    type=click.Path(dir_okay=False, path_type=Path),
-    required=True,
-    metavar="FILE.html",
-    help="The report.",
-)
+@options("output", required=True, metavar="FILE.html", help="The report.")
 @click.option("--title", metavar="TEXT", help="Title (default: the sources' names).")
 @click.option(
     "--author", metavar="TEXT", help="Author (default: your full name, if this computer knows it)."
@@ -33,53 +29,37 @@ from scanfab.cli.talk import talk_options, working
 @options("cutoff", **OF_SEVERAL)
 @options("labels")
 @talk_options
-def report(
-    tables: tuple[Path, ...],
-    output: Path,
-    title: str | None,
-    author: str | None,
-    cutoff: float | None,
-    labels: tuple[str, ...],
-) -> int:
+def report(tables: tuple[Path, ...], output: Path, author: str | None, **chosen: Any) -> int:
     """
     Write a report on fabric tables: one HTML file that opens without a network.
 
     TABLE is what scanfab compute wrote with -o. Settings, versions and the source of the 3D view
     come from TABLE.manifest.json beside it; without it, the report says that they are not known.
     """
-    from scanfab.cli.console import announce_compiling, reported_warnings
     from scanfab.viz.report.page import check_page_file
     from scanfab.viz.report.report import make_report
 
-    if labels and len(labels) != len(tables):
-        raise click.UsageError(f"--label: expected one a table: {len(tables)}, found {len(labels)}")
+    check_labels(chosen["labels"], tables)
     with usage_errors():
         check_page_file(output)
-    with reported_warnings():
-        announce_compiling()
-        with working():
-            made = make_report(
-                tables,
-                title=title,
-                author=_full_name() if author is None else author,
-                cutoff=cutoff,
-                labels=labels,
-            )
-        made.save(output)
+    announce_compiling()
+    with working():
+        made = make_report(tables, author=_full_name() if author is None else author, **chosen)
+    made.save(output)
     if not made.has_void_fabric:
         click.echo("scanfab: warning: no row of the tables has a void fabric", err=True)
     return 0 if made.has_void_fabric else 1
 
 
 def _full_name() -> str:
-    """The user's full name; none where the system knows only the name of the account."""
+    """The user's full name; empty where the system knows only the name of the account."""
     import os
 
-    try:
+    # another system, or a container without such a user
+    with suppress(ImportError, KeyError):
         import pwd
 
         user = pwd.getpwuid(os.getuid())
-    except (ImportError, KeyError):  # another system, or a container without such a user
-        return ""
-    name = user.pw_gecos.split(",")[0].strip()
-    return "" if name == user.pw_name else name
+        name = user.pw_gecos.split(",")[0].strip()
+        return "" if name == user.pw_name else name
+    return ""

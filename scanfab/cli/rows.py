@@ -1,75 +1,65 @@
-"""Rows of frames written as they come: what the commands that compute have in common."""
+"""A table computed, written as its rows come, and drawn: what compute and map have in common."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, ExitStack, nullcontext
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.options import usage_errors
-from scanfab.cli.settings_file import fill_from_file
-from scanfab.cli.signals import ending_in_order
-from scanfab.cli.sources import follow_one, open_series, reading_arguments
-from scanfab.cli.talk import tell_inputs, working
+from scanfab.cli.options import check_plot, usage_errors
+from scanfab.cli.settings_file import as_listed
+from scanfab.cli.signals import ending_in_order, telling
+from scanfab.cli.sources import checked, open_series
+from scanfab.cli.talk import announce_compiling, tell_inputs, working
+from scanfab.pipeline.options import Output
+from scanfab.pipeline.settings import Settings
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
-    from scanfab.io.follow import FollowedSeries
     from scanfab.io.series import Series
     from scanfab.pipeline.job import Job
-    from scanfab.pipeline.settings import Settings
-    from scanfab.pipeline.told import Told
-    from scanfab.table.writing import Excerpt, ResultFile
+    from scanfab.table.writing import Excerpt
 
 
-def finished_job(
+def write_table(
     ctx: click.Context,
     sources: tuple[str, ...],
     chosen: dict[str, Any],
     kind: type[Settings],
-    told: Told,
-    *,
-    output: Path | None,
-    resume: bool,
-    manifest: Path | None,
-    vtk: Path | None,
-    check: Callable[[list[Series], dict[str, Any]], None] = lambda series, chosen: None,
-    drawn: Sequence[str] = (),
-    draw: Callable[[Job], object] = lambda job: None,
-) -> Job:
+    *figures: str,
+) -> int:
     """
-    A job whose rows are written, with its manifests and ParaView files.
+    Compute a table as the options of a command ask, write it, and draw it; returns the exit code.
 
-    ``chosen`` are the options of reading, and of settings of that kind; ``check`` refuses what does
-    not go together, and ``drawn`` are the columns that figures need, if some are to be drawn. A
-    series that is followed is drawn again whenever there is nothing else to do.
+    ``kind`` are the settings of the table, and ``figures`` the kinds of data that may be drawn.
     """
-    from scanfab.cli.console import announce_compiling
     from scanfab.pipeline.job import Job
+    from scanfab.table.writing import Excerpt, ResultFile
     from scanfab.viz.paraview import vtk_folders
 
-    if resume and output is None:
-        raise click.UsageError("--resume goes with -o FILE")
-    way = _way(chosen)
-    if way.is_cluster and vtk is not None:
-        raise click.UsageError("--vtk is written where frames are computed: not with --scheduler")
-    chosen, settings_file = fill_from_file(ctx, sources, chosen)
-    check([], chosen)
-    with settings_file.named_errors():
-        reading = reading_arguments(chosen)
-        settings, excerpt, result = _asked(chosen, kind, output)
-    series, followed = way.opened(sources, reading)
-    check(series, chosen)
+    asked = Output(**{name: chosen.pop(name) for name in vars(Output()) if name in chosen})
+    _check_together(asked, chosen, figures)
+    reading, settings = checked(chosen, kind)
+    with usage_errors():
+        excerpt = Excerpt.make(settings.columns, asked.fields, asked.digits)
+        path = asked.output
+        result = None if path is None else ResultFile(path, settings.columns, excerpt)
+    series = _opened(asked, sources, reading)
+    drawing = _Drawing(asked, figures)
+    if drawing.kind == "frames" and len(series) > 1:
+        raise click.UsageError(f"--figure {asked.figure} draws one series: name one source")
     tell_inputs(series, settings.workers)
     with ExitStack() as stack:
         with usage_errors():
-            executor = stack.enter_context(way.executor())
-        announce_compiling()
-        with usage_errors():
+            executor = None
+            if asked.scheduler or asked.scheduler_file:
+                from scanfab.pipeline.cluster import dask_executor
+
+                cluster = dask_executor(asked.scheduler, scheduler_file=asked.scheduler_file)
+                executor = stack.enter_context(cluster)
+            announce_compiling()
+            vtk, resume = asked.vtk, asked.resume
+            folders = () if vtk is None else vtk_folders(vtk, len(series), settings, resume)
             job = Job(
                 series,
                 settings,
@@ -77,99 +67,105 @@ def finished_job(
                 sources=sources,
                 reading=reading,
                 resume=resume,
-                manifest_path=manifest,
-                more=settings_file.asked(),
-                observers=() if vtk is None else vtk_folders(vtk, len(series), settings, resume),
-                told=told,
+                manifest_path=asked.manifest,
+                more={"settings_file": listed} if (listed := as_listed(ctx)) else {},
+                observers=folders,
+                told=ctx.obj,
                 executor=executor,
             )
-        if followed is not None:
+            stack.enter_context(job.begun(drawing.needed))
+        if _follows(asked):
+            followed: Any = series[0]
             stack.enter_context(ending_in_order(followed.end))
-            followed.idle = _Redraw(job, draw)
-        with usage_errors():
-            stack.enter_context(job.begun(drawn))
+            followed.idle = lambda: drawing.redraw(job)
         _write_or_say(job, excerpt)
-    return job
+    drawing.draw(job)
+    return 0 if job.is_good else 1
 
 
-def _asked(
-    chosen: dict[str, Any], kind: type[Settings], output: Path | None
-) -> tuple[Settings, Excerpt, ResultFile | None]:
-    """What the options that are not those of reading ask for, and the file that it goes to."""
-    from scanfab.table.writing import Excerpt, ResultFile
-
-    fields, digits = chosen.pop("fields"), int(chosen.pop("digits"))
-    settings = kind(**chosen)
-    excerpt = Excerpt.make(settings.columns, fields, digits)
-    result = None if output is None else ResultFile(output, settings.columns, excerpt)
-    return settings, excerpt, result
-
-
-class _Way(NamedTuple):
-    """How frames come, and where they are computed."""
-
-    follows: bool
-    seconds: float | None
-    scheduler: str | None
-    scheduler_file: Path | None
-
-    @property
-    def is_cluster(self) -> bool:
-        return bool(self.scheduler or self.scheduler_file)
-
-    def opened(
-        self, sources: tuple[str, ...], reading: dict[str, Any]
-    ) -> tuple[list[Series], FollowedSeries | None]:
-        """The series, and the one that is followed, which may hold no frames yet."""
-        if not self.follows:
-            return open_series(sources, reading), None
-        followed = follow_one(sources, reading, self.seconds)
-        return [followed], followed
-
-    def executor(self) -> AbstractContextManager[Executor | None]:
-        """That of a cluster, while it is connected; None for this machine."""
-        from scanfab.pipeline.cluster import dask_executor
-
-        if not self.is_cluster:
-            return nullcontext()
-        return dask_executor(self.scheduler, scheduler_file=self.scheduler_file)
+def _check_together(asked: Output, chosen: dict[str, Any], figures: tuple[str, ...]) -> None:
+    check_plot(asked.plot, asked.figure, *figures)
+    if asked.plot is not None and chosen.get("cutoffs"):
+        raise click.UsageError("--plot is of one cut-off: leave out --cutoffs")
+    if asked.resume and asked.output is None:
+        raise click.UsageError("--resume goes with -o FILE")
+    if asked.vtk is not None and (asked.scheduler or asked.scheduler_file):
+        raise click.UsageError("--vtk is written where frames are computed: not with --scheduler")
+    if asked.follow_for is not None and not asked.follow_for >= 0:
+        raise click.UsageError(f"--follow-for: expected 0 or more, found {asked.follow_for:g}")
 
 
-def _way(chosen: dict[str, Any]) -> _Way:
-    """Taken out of the options."""
-    follows, seconds = chosen.pop("follow"), chosen.pop("follow_for")
-    scheduler, file = chosen.pop("scheduler"), chosen.pop("scheduler_file")
-    return _Way(follows or seconds is not None, seconds, scheduler, file)
+def _follows(asked: Output) -> bool:
+    return asked.follow or asked.follow_for is not None
 
 
-class _Redraw:
-    """Draws what there is, if that is more than before."""
+def _opened(asked: Output, sources: tuple[str, ...], reading: dict[str, Any]) -> list[Series]:
+    """The series; one that is followed may hold no frames yet."""
+    if not _follows(asked):
+        return open_series(sources, reading)
+    from scanfab.io.follow import follow_series
 
-    def __init__(self, job: Job, draw: Callable[[Job], object]) -> None:
-        self.job, self.draw = job, draw
-        self.done = 0
+    if len(sources) > 1 or "-" in sources:
+        raise click.UsageError("--follow takes one folder, or one file that grows")
+    return [follow_series(sources[0], seconds=asked.follow_for, **reading)]
 
-    def __call__(self) -> None:
-        if self.job.found_void_fabric and self.job.done > self.done:
-            self.done = self.job.done
-            self.draw(self.job)
+
+class _Drawing:
+    """The figures of a table, if they are asked for, and the columns that they need."""
+
+    def __init__(self, asked: Output, kinds: tuple[str, ...]) -> None:
+        from scanfab.table.plots import figures_of
+        from scanfab.viz.figures.page import find_figure
+
+        self.plot, self.figure, self.kind = asked.plot, asked.figure, kinds[0]
+        figures = [] if self.plot is None else list(figures_of(self.kind).values())
+        if self.figure is not None:
+            figures = [find_figure(self.figure, *kinds)[0]]
+            self.kind = figures[0].kind
+        self.needed = tuple(dict.fromkeys(name for one in figures for name in one.columns))
+        self._drawn = 0
+
+    def draw(self, job: Job) -> None:
+        """Draw the rows that there are."""
+        from scanfab.table.compare import compare_tables
+        from scanfab.table.table import Table
+        from scanfab.viz.figures.page import make_figures, save_figures
+        from scanfab.viz.scanned_frames import ScannedFrames
+
+        if self.plot is None:
+            return
+        if not job.found_void_fabric:
+            click.echo(f"scanfab: {self.plot} is not drawn: no row has a void fabric", err=True)
+            return
+        rows = job.every_row
+        data: Any = Table(rows, job.settings.columns)
+        if self.kind == "frames":
+            data = ScannedFrames(job.series[0], job.settings, rows)
+        comparison = compare_tables(rows) if self.kind == "table" else None
+        figures = make_figures(data, self.kind, self.figure, comparison=comparison)
+        save_figures(self.plot, figures)
+
+    def redraw(self, job: Job) -> None:
+        """Draw a series that is followed if there are new frames; a new scan waits for the end."""
+        if self.kind != "frames" and job.found_void_fabric and job.done > self._drawn:
+            self._drawn = job.done
+            self.draw(job)
 
 
 def _write_or_say(job: Job, excerpt: Excerpt) -> None:
     """Write the rows; where that is interrupted or fails, say how far it is and how to go on."""
     from scanfab.base.errors import ScanfabError
     from scanfab.cli.console import is_readable
-    from scanfab.cli.signals import telling
 
     # asked for now, as a signal comes at any moment
-    printed = not is_readable()
+    as_table = job.result is None and is_readable()
 
     def standing() -> str:
-        return _standing(job, printed)
+        return _standing(job, printed=not as_table)
 
     try:
         with telling(standing):
-            _write(job, excerpt)
+            _write(job, excerpt, as_table)
     except (ScanfabError, OSError):
         if job.result is not None and (job.is_over or 0 < job.done < job.frames()):
             click.echo(f"scanfab: stopped {standing()}", err=True)
@@ -195,18 +191,18 @@ def _standing(job: Job, printed: bool) -> str:
     return f"{done}; {again} goes on"
 
 
-def _write(job: Job, excerpt: Excerpt) -> None:
+def _write(job: Job, excerpt: Excerpt, as_table: bool) -> None:
     """Write the rows as they come; on a terminal, all of them as a table."""
-    from scanfab.cli.console import is_readable, print_csv, print_table
+    from scanfab.cli.console import print_csv, print_table
 
     with working(job.frames, job.done) as advance:
         if job.result is not None:
             job.write(advance)
             return
-        if is_table := is_readable():
+        if as_table:
             rows = list(job.rows(advance))
         else:
             print_csv(job.rows(advance), excerpt, job.settings.columns)
-    if is_table:
+    if as_table:
         print_table(rows, excerpt)
     job.save_manifests()

@@ -3,86 +3,43 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 from click.core import ParameterSource
 
+from scanfab.base.option import Option
+from scanfab.pipeline.options import OPTIONS
+
 SECTION = "compute"
+KEY = "scanfab.settings_file"
 
 
-@dataclass(frozen=True)
-class SettingsFile:
-    """A settings file, and which of its options a command has taken from it."""
+class SettingsFile(NamedTuple):
+    """A settings file, kept in the context of a command."""
 
-    path: Path | None = None
-    """None: there is no file."""
-    options: dict[str, Any] = field(default_factory=dict)
+    path: Path
+    options: dict[str, Any]
     """As they stand in the file."""
-    used: tuple[str, ...] = ()
-    """The others are named on the command line, or are none of this command's."""
 
-    @contextmanager
-    def named_errors(self) -> Iterator[None]:
-        """Let errors of options that come from the file name it; all are wrong usage."""
-        from scanfab.cli.options import usage_errors
-
-        try:
-            with usage_errors():
-                yield
-        except click.UsageError as error:
-            option = error.message.partition(":")[0].removeprefix("--").replace(" ", "-")
-            if self.path is None or option not in self.used:
-                raise
-            # the file has the option without the dashes
-            text = error.message.removeprefix("--")
-            raise click.UsageError(f"{self.path}: {text}") from None
-
-    def asked(self) -> dict[str, Any]:
-        """As a manifest lists it; nothing without a file."""
-        if self.path is None:
-            return {}
-        others = [name for name in self.options if name not in self.used]
-        listed = {"path": str(self.path), "used": list(self.used), "not_used": others}
-        return {"settings_file": listed}
+    def used(self, ctx: click.Context) -> list[str]:
+        """Options that the command has from the file; its line names the others, or it has none."""
+        sources = {
+            one.opts[0].removeprefix("--"): ctx.get_parameter_source(str(one.name))
+            for one in ctx.command.params
+        }
+        return [key for key in self.options if sources.get(key) is ParameterSource.DEFAULT_MAP]
 
 
-def fill_from_file(
-    ctx: click.Context, sources: tuple[str, ...], options: dict[str, Any]
-) -> tuple[dict[str, Any], SettingsFile]:
+def take_settings_file(ctx: click.Context, sources: Iterable[str]) -> None:
     """
-    The options of a command, those that its line does not name from the settings file.
+    Make the options of the settings file beside the sources defaults of the command.
 
-    A note says which; a file that cannot be right is a usage error in every command.
+    A file that cannot be right is a usage error in every command, as are two files.
     """
-    from scanfab.base.errors import note
-
-    path = _path_beside(sources)
-    if path is None:
-        return options, SettingsFile()
-    given = read_settings_file(path)
-    filled, used = dict(options), []
-    parameters = _by_option(ctx.command)
-    for key, value in given.items():
-        parameter = parameters.get(key)
-        if parameter is None or parameter.name not in options:
-            continue
-        name = str(parameter.name)
-        if ctx.get_parameter_source(name) is ParameterSource.DEFAULT:
-            filled[name] = _from_toml(ctx, path, parameter, value)
-            used.append(key)
-    if used:
-        note(f"options from {path}: {', '.join(used)}")
-    return filled, SettingsFile(path, given, tuple(used))
-
-
-def _path_beside(sources: tuple[str, ...]) -> Path | None:
-    """The settings file beside the dumps; a usage error if the sources have different ones."""
     from scanfab.io.families import SETTINGS_FILE
 
     folders = {Path(s) if Path(s).is_dir() else Path(s).parent for s in sources if s != "-"}
@@ -93,109 +50,89 @@ def _path_beside(sources: tuple[str, ...]) -> Path | None:
             f"the sources have several settings files: {', '.join(map(str, found))}; "
             f"compute them one by one"
         )
-    return found[0] if found else None
+    for path in found:
+        given = _read(path)
+        known = {
+            one.flag.removeprefix("--"): one
+            for one in OPTIONS.values()
+            if one.decides or one.name == "workers"
+        }
+        ctx.default_map = {
+            known[key].name: _value(path, known[key], value)
+            for key, value in given.items()
+            if _is_known(path, key, known)
+        }
+        ctx.meta[KEY] = SettingsFile(path, given)
 
 
-def read_settings_file(path: Path) -> dict[str, Any]:
-    """The options in the one section that there may be, all of them known to compute."""
+def tell_used(ctx: click.Context) -> None:
+    """Say by a note which options the file has given."""
+    from scanfab.base.errors import note
+
+    if used := as_listed(ctx).get("used"):
+        note(f"options from {ctx.meta[KEY].path}: {', '.join(used)}")
+
+
+def as_listed(ctx: click.Context) -> dict[str, Any]:
+    """The file as a manifest lists it; empty without a file."""
+    if KEY not in ctx.meta:
+        return {}
+    path, options = ctx.meta[KEY]
+    used = ctx.meta[KEY].used(ctx)
+    others = [key for key in options if key not in used]
+    return {"path": str(path), "used": used, "not_used": others}
+
+
+def in_file(message: str) -> str:
+    """A message about an option, with the settings file in front if the option comes from it."""
+    ctx = click.get_current_context(silent=True)
+    file: SettingsFile | None = None if ctx is None else ctx.meta.get(KEY)
+    key = message.partition(":")[0].removeprefix("--")
+    if ctx is None or file is None or key not in file.used(ctx):
+        return message
+    return f"{file.path}: {message.removeprefix('--')}"
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """The options in the one section that there may be."""
     import tomllib
 
     try:
-        text = path.read_text("utf-8")
-        content = tomllib.loads(text)
+        content = tomllib.loads(path.read_text("utf-8"))
     except UnicodeDecodeError as error:
         raise click.UsageError(f"{path}: {error}") from None
     except tomllib.TOMLDecodeError as error:
-        raise click.UsageError(f"{path}{_explained(text, error)}") from None
-    for name, value in content.items():
-        if name == SECTION and isinstance(value, dict):
-            continue
-        if name == SECTION:
-            raise click.UsageError(f"{path}: expected a section [{SECTION}]")
-        what = f"section [{name}]" if isinstance(value, dict) else f"key {name!r}"
+        line = re.search(r"at line (\d+)", str(error))
+        where = f"{path}, line {line[1]}" if line else f"{path}"
         raise click.UsageError(
-            f"{path}: the {what} has no meaning: options stand in the section [{SECTION}]"
-        )
-    options: dict[str, Any] = content.get(SECTION, {})
-    known, of_the_line = _options_of_compute()
-    for key in options:
-        if key in of_the_line:
+            f'{where}: {error}: text stands in quotes, as in boundary = "type=2"'
+        ) from None
+    for name, value in content.items():
+        if name != SECTION or not isinstance(value, dict):
             raise click.UsageError(
-                f"{path}: {key!r} cannot be set in {path.name}, which says how samples are "
-                f"computed: what is read, where results go and what is told stand on the command "
-                f"line: {of_the_line[key]}"
+                f"{path}: {name!r} has no meaning: options stand in the section [{SECTION}]"
             )
-        if key not in known:
-            near = get_close_matches(key, known, n=1)
-            hint = f": did you mean {near[0]!r}?" if near else ""
-            raise click.UsageError(f"{path}: compute has no option {key!r}{hint}")
+    options: dict[str, Any] = content.get(SECTION, {})
     return options
 
 
-def _options_of_compute() -> tuple[list[str], dict[str, str]]:
-    """The options that a settings file may hold, and the others as a command line has them."""
-    from scanfab.cli.compute import OF_THE_LINE, compute
-
-    others = {
-        key: parameter.opts[0]
-        for parameter in compute.params
-        if parameter.name in OF_THE_LINE
-        for key in (str(parameter.name), parameter.opts[0].lstrip("-"))
-    }
-    return [key for key in _by_option(compute) if key not in others], others
+def _is_known(path: Path, key: str, known: Iterable[str]) -> bool:
+    if key in known:
+        return True
+    near = get_close_matches(key, known, n=1)
+    hint = f"did you mean {near[0]!r}?" if near else "it may say how samples are computed"
+    raise click.UsageError(f"{path}: {key!r} cannot be set in a settings file: {hint}")
 
 
-def _by_option(command: click.Command) -> dict[str, click.Parameter]:
-    return {
-        name.removeprefix("--"): parameter
-        for parameter in command.params
-        for name in parameter.opts
-        if name.startswith("--")
-    }
-
-
-def _key(parameter: click.Parameter) -> str:
-    """As the file has it."""
-    return parameter.opts[0].removeprefix("--")
-
-
-def _explained(text: str, error: ValueError) -> str:
-    """What is wrong with a file that is no TOML: most often text without quotes."""
-    found = re.search(r"\(at line (\d+), column \d+\)", str(error))
-    if found is None:
-        return f": {error}"
-    line = text.splitlines()[int(found[1]) - 1]
-    bare = re.fullmatch(r"\s*([\w-]+)\s*=\s*([^\s\"'\[{#][^\"'#]*?)\s*(#.*)?", line)
-    if bare is None:
-        return f", line {found[1]}: {line.strip()}: {error}"
-    return f', line {found[1]}: text needs quotes: {bare[1]} = "{bare[2]}"'
-
-
-def _in_toml(value: Any) -> str:
-    """What kind of value it is, as the file spells it where that is short."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, dict):
-        return "a table"
-    return "a list in a list" if isinstance(value, list) else f"a date or time, {value}"
-
-
-def _from_toml(ctx: click.Context, path: Path, parameter: click.Parameter, value: Any) -> Any:
+def _value(path: Path, option: Option, value: Any) -> Any:
     """A value of the settings file as the command line would give it."""
-    for one in value if isinstance(value, list) else [value]:
+    several = value if isinstance(value, list) else [value]
+    for one in several:
         # a truth value would count as the number 1
         if isinstance(one, bool) or not isinstance(one, str | int | float):
             raise click.UsageError(
-                f"{path}: {_key(parameter)}: expected numbers or text in quotes, one or a list of "
-                f"them, found {_in_toml(one)}"
+                f"{path}: {option.flag.removeprefix('--')}: expected numbers or text in quotes, "
+                f"one or a list of them, found {one!r}"
             )
-    if isinstance(value, list) and not parameter.multiple and parameter.nargs == 1:
-        value = " ".join(map(str, value))  # the numbers of a cell
-    elif parameter.multiple and not isinstance(value, list):
-        value = [value]
-    elif not isinstance(value, list):
-        value = str(value)
-    try:
-        return parameter.type_cast_value(ctx, value)
-    except click.BadParameter as error:
-        raise click.UsageError(f"{path}: {_key(parameter)}: {error.format_message()}") from None
+    words = [str(one) for one in several]
+    return words if option.several else ",".join(words)

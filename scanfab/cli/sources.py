@@ -1,27 +1,32 @@
-"""The sources of a command line, and how to read them."""
+"""Commands with sources: from their line to checked options, and to series of frames."""
 
 from __future__ import annotations
 
 import re
 import sys
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from itertools import takewhile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from scanfab.cli.console import Command
 from scanfab.cli.options import usage_errors, write_groups
-from scanfab.io.options import take_reading
+from scanfab.cli.settings_file import in_file, take_settings_file, tell_used
 
 if TYPE_CHECKING:
-    from scanfab.io.follow import FollowedSeries
     from scanfab.io.series import Series
+    from scanfab.pipeline.settings import Settings
 
+S = TypeVar("S", bound="Settings")
 
 # numbers that may stand apart behind an option, as users write them
 COUNTS = {"--cell": (3, 6), "--rv-center": (3,), "--rv-size": (2, 3)}
+NUMBER = re.compile(r"[-+]?[\d.]+([eE][-+]?\d+)?")
 
 
-class SourceCommand(click.Command):
+class SourceCommand(Command):
     """A command with sources: help in groups, and options whose numbers may stand apart."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -33,35 +38,64 @@ class SourceCommand(click.Command):
         joined: list[str] = []
         rest = list(args)
         while rest:
-            word = rest.pop(0)
-            joined.append(word)
-            numbers = _leading_numbers(rest, COUNTS[word]) if word in COUNTS else 0
-            if numbers:
-                joined.append(" ".join(rest[:numbers]))
-                del rest[:numbers]
-        return super().parse_args(ctx, joined)
+            joined.append(rest.pop(0))
+            counts = COUNTS.get(joined[-1], ())
+            found = len(list(takewhile(NUMBER.fullmatch, rest))) if counts else 0
+            if taken := max((count for count in counts if count <= found), default=found):
+                joined.append(" ".join(rest[:taken]))
+                del rest[:taken]
+        try:
+            return super().parse_args(ctx, joined)
+        except click.BadParameter as error:
+            flag = "" if error.param is None else error.param.opts[0]
+            if (told := in_file(f"{flag}: {error.message}")).startswith(flag):
+                raise
+            raise click.UsageError(told) from None
 
 
-def reading_arguments(options: dict[str, Any]) -> dict[str, Any]:
-    """Take the reading options out of a command's, as arguments of ``read_series``."""
+def _expanded(ctx: click.Context, parameter: click.Parameter, given: Any) -> Any:
+    """The sources, a glob as a shell would have expanded it; what does not exist is refused."""
+    from scanfab.base.errors import ReadError
+
+    try:
+        found = expanded_sources(ctx, (given,) if isinstance(given, str) else given)
+    except ReadError as error:
+        raise click.UsageError(str(error)) from None
+    for path in found:
+        if path != "-" and not Path(path).exists():
+            raise click.UsageError(f"{path}: there is no such file, folder or glob")
+    return given if isinstance(given, str) else found
+
+
+def expanded_sources(ctx: click.Context, sources: tuple[str, ...]) -> tuple[str, ...]:
+    """Sources with their globs expanded; the settings file beside them becomes the defaults."""
+    from scanfab.io.families import expanded
+
+    found = [path for one in sources for path in ([one] if one == "-" else expanded(one))]
+    take_settings_file(ctx, map(str, found))
+    return tuple(map(str, found))
+
+
+a_source = click.Path(allow_dash=True)
+source_argument = click.argument("source", metavar="SOURCE", type=a_source, callback=_expanded)
+sources_argument = click.argument(
+    "sources", metavar="SOURCE...", nargs=-1, required=True, type=a_source, callback=_expanded
+)
+
+
+def checked(chosen: dict[str, Any], kind: type[S]) -> tuple[dict[str, Any], S]:
+    """The options of a command as those of reading and as settings; wrong ones are wrong usage."""
     with usage_errors():
-        taken = take_reading(options)
-    if taken["format"] is not None:
-        _check_format(taken["format"])
-    return taken
+        reading = reading_of(chosen)
+        return reading, kind(**chosen)
 
 
-def follow_one(
-    sources: tuple[str, ...], reading: dict[str, Any], seconds: float | None
-) -> FollowedSeries:
-    """The series of a command line that is still being written."""
-    from scanfab.io.follow import follow_series
+def reading_of(chosen: dict[str, Any]) -> dict[str, Any]:
+    """Take the options of reading out of those of a command."""
+    from scanfab.io.options import take_reading
 
-    if len(sources) > 1 or "-" in sources:
-        raise click.UsageError("--follow takes one folder, or one file that grows")
-    if seconds is not None and not seconds >= 0:
-        raise click.UsageError(f"--follow-for: expected 0 or more, found {seconds:g}")
-    return follow_series(sources[0], seconds=seconds, **reading)
+    tell_used(click.get_current_context())
+    return take_reading(chosen)
 
 
 def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Series]:
@@ -84,16 +118,10 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
     return [replace(read_series(copy, **reading), name="-")]
 
 
-def _leading_numbers(words: list[str], counts: tuple[int, ...]) -> int:
-    """The largest of the counts that so many numbers follow; of fewer all that follow."""
-    count = 0
-    while count < len(words) and re.fullmatch(r"[-+]?[\d.]+([eE][-+]?\d+)?", words[count]):
-        count += 1
-    return max((one for one in counts if one <= count), default=count)
-
-
-def _check_format(name: str) -> None:
-    from scanfab.io.reader import reader_named
-
-    with usage_errors("--format: "):
-        reader_named(name)
+def open_one(sources: tuple[str, ...], reading: dict[str, Any], done: str) -> Series:
+    """The one series of a command that takes no more."""
+    found = open_series(sources, reading)
+    if len(found) > 1:
+        names = ", ".join(one.name for one in found)
+        raise click.UsageError(f"one series can be {done} at a time, found {names}")
+    return found[0]

@@ -8,7 +8,6 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -22,56 +21,37 @@ if TYPE_CHECKING:
 # where standard error is no terminal there is a line of progress after so many seconds
 EVERY = 60.0
 KEY = "scanfab.talk"
-
-Count = Callable[[], int | None]
-
-
-class Level(IntEnum):
-    """What is said beside the result: errors and warnings always."""
-
-    QUIET = 0
-    USUAL = 1
-    """Notes and progress too."""
-    VERBOSE = 2
-    """What was opened with which reader, and how long each step took."""
+QUIET, USUAL, VERBOSE = "quiet", "", "verbose"
 
 
-def level() -> Level:
-    """What the command that runs now was asked for."""
+def level() -> str:
+    """What the command that runs now was asked to say beside its result."""
     context = click.get_current_context(silent=True)
-    return Level.USUAL if context is None else context.meta.get(KEY, Level.USUAL)
+    return USUAL if context is None else context.meta.get(KEY, USUAL)
 
 
 def _choose(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
-    if not value:
-        return
-    if KEY in ctx.meta:
+    if value and KEY in ctx.meta:
         raise click.UsageError("--quiet and --verbose exclude one another")
-    ctx.meta[KEY] = Level[str(parameter.name).upper()]
+    if value:
+        ctx.meta[KEY] = parameter.name
 
 
 def talk_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options --quiet and --verbose."""
-    quiet = click.option(
-        "--quiet",
-        is_flag=True,
-        expose_value=False,
-        callback=_choose,
-        help="No progress and no notes; warnings and errors stay.",
-    )
-    verbose = click.option(
-        "--verbose",
-        is_flag=True,
-        expose_value=False,
-        callback=_choose,
-        help="Say which readers, files and versions are used, and how long each step takes.",
-    )
-    return quiet(verbose(command))
+    helps = {
+        "--verbose": "Say which readers, files and versions are used, and how long steps take.",
+        "--quiet": "No progress and no notes; warnings and errors stay.",
+    }
+    for flag, text in helps.items():
+        add = click.option(flag, is_flag=True, expose_value=False, callback=_choose, help=text)
+        command = add(command)
+    return command
 
 
 def tell_inputs(every: Iterable[Series], workers: int) -> None:
     """With --verbose: versions, and what is read by which reader."""
-    if level() is not Level.VERBOSE:
+    if level() != VERBOSE:
         return
     import platform
     from importlib.metadata import version
@@ -81,41 +61,21 @@ def tell_inputs(every: Iterable[Series], workers: int) -> None:
     for one in every:
         for family in (one.grains, *one.contacts):
             reader = "no reader" if family.reader is None else family.reader.name
-            _say(
-                f"{one.name}: {family.kind} from {family.pattern} by {reader}, "
-                f"{len(family.files)} files"
-            )
+            files = f"{len(family.files)} files"
+            _say(f"{one.name}: {family.kind} from {family.pattern} by {reader}, {files}")
 
 
-class _Latest(logging.Handler):
-    """Keeps what the library has said last, and prints all of it if asked."""
+def announce_compiling() -> None:
+    """A line on standard error if something has to be compiled first."""
+    from scanfab.base.jit import kernel_folder, when_compiling
 
-    def __init__(self, show: Callable[[str], None] | None) -> None:
-        super().__init__(logging.INFO)
-        self.text = ""
-        self.show = show
-        self.heard: Callable[[], None] | None = None
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.text = record.getMessage()
-        if self.show is not None:
-            self.show(self.text)
-        if self.heard is not None:
-            self.heard()
-
-
-@contextmanager
-def _listening(show: Callable[[str], None] | None) -> Iterator[_Latest]:
-    """What the library tells while it works; it never prints by itself."""
-    logger, handler = logging.getLogger("scanfab"), _Latest(show)
-    before = logger.level
-    logger.addHandler(handler)
-    logger.setLevel(logging.INFO)
-    try:
-        yield handler
-    finally:
-        logger.removeHandler(handler)
-        logger.setLevel(before)
+    _, problem = kernel_folder()
+    kept = f"it cannot be kept: {problem}" if problem else "it is kept for later runs"
+    words = (
+        f"compiling what no earlier run has needed: seconds, or minutes on a busy machine; {kept}"
+    )
+    if level() != QUIET:
+        when_compiling(lambda: _say(words))
 
 
 def _say(text: str) -> None:
@@ -124,30 +84,47 @@ def _say(text: str) -> None:
     click.echo(f"scanfab: {without_temporary(text)}", err=True)
 
 
-class _Work:
-    """Work that is counted, and how far it is."""
+class Work(logging.Handler):
+    """Work that is counted, and what the library, which never prints by itself, says of it."""
 
-    def __init__(self, total: Count, done: int) -> None:
+    def __init__(self, total: Callable[[], int | None], done: int) -> None:
+        super().__init__(logging.INFO)
         self.total = total
         self.before = self.done = done
         self.begun = time.monotonic()
+        self.latest = ""
+        self.says = level() == VERBOSE
+        self.show: Callable[[], None] = lambda: None
+        """Called whenever there is something new."""
 
-    def state(self, latest: str) -> str:
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep a message of the library, and print it if that is asked for."""
+        self.latest = record.getMessage()
+        if self.says:
+            _say(self.latest)
+        self.show()
+
+    def advance(self) -> None:
+        """A frame is done."""
+        self.done += 1
+        self.show()
+
+    def state(self) -> str:
         """How many frames are done, how long the others will take, and what was said last."""
-        total = self.total()
+        total, now = self.total(), self.done - self.before
         if not total:
-            return latest
-        text, now = f"{self.done} of {total} frames", self.done - self.before
+            return self.latest
+        text = f"{self.done} of {total} frames"
         if now:
             rest = (time.monotonic() - self.begun) / now * max(total - self.done, 0)
             text += f", about {spelt_time(rest)}"
-        return f"{text}; {latest}" if latest else text
+        return f"{text}; {self.latest}" if self.latest else text
 
 
 @contextmanager
 def working(
-    total: Count = lambda: None, done: int = 0, prints: bool = False
-) -> Iterator[Callable[..., None]]:
+    total: Callable[[], int | None] = lambda: None, done: int = 0, prints: bool = False
+) -> Iterator[Callable[[], None]]:
     """
     Show progress while something works; what is yielded is called after each frame.
 
@@ -155,35 +132,35 @@ def working(
     --quiet. With --verbose each step is a line. What ``prints`` as it goes shows by itself how far
     it is on a terminal.
     """
-    work, chosen = _Work(total, done), level()
-    if chosen is Level.QUIET:
+    if level() == QUIET:
         yield lambda: None
         return
-    with _listening(_say if chosen is Level.VERBOSE else None) as heard:
-        on_terminal = chosen is Level.USUAL and sys.stderr.isatty()
-        on_terminal = on_terminal and not (prints and sys.stdout.isatty())
-        with _bar(work, heard) if on_terminal else _lines(work, heard) as show:
-
-            def advance() -> None:
-                work.done += 1
-                show()
-
-            yield advance
+    work, logger = Work(total, done), logging.getLogger("scanfab")
+    before = logger.level
+    logger.addHandler(work)
+    logger.setLevel(logging.INFO)
+    on_terminal = sys.stderr.isatty() and not (prints and sys.stdout.isatty())
+    try:
+        with _bar(work) if on_terminal and not work.says else _lines(work):
+            yield work.advance
+    finally:
+        logger.removeHandler(work)
+        logger.setLevel(before)
 
 
 @contextmanager
-def _lines(work: _Work, heard: _Latest) -> Iterator[Callable[[], None]]:
+def _lines(work: Work) -> Iterator[None]:
     """A line of progress each minute."""
     ended = threading.Event()
 
     def tell() -> None:
         while not ended.wait(EVERY):
-            _say(work.state(heard.text) or "at work")
+            _say(work.state() or "at work")
 
     teller = threading.Thread(target=tell, daemon=True)
     teller.start()
     try:
-        yield lambda: None
+        yield
     finally:
         ended.set()
         # nothing is said behind the end
@@ -191,24 +168,19 @@ def _lines(work: _Work, heard: _Latest) -> Iterator[Callable[[], None]]:
 
 
 @contextmanager
-def _bar(work: _Work, heard: _Latest) -> Iterator[Callable[[], None]]:
+def _bar(work: Work) -> Iterator[None]:
     """A line on the terminal that is gone in the end."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    columns = (
-        SpinnerColumn(),
-        BarColumn(20),
-        TimeElapsedColumn(),
-        TextColumn("{task.description}"),
-    )
+    text = TextColumn("{task.description}")
+    columns = (SpinnerColumn(), BarColumn(20), TimeElapsedColumn(), text)
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("", total=work.total())
+        task = progress.add_task("")
 
         def show() -> None:
-            state = work.state(heard.text)
-            progress.update(task, description=state, completed=work.done, total=work.total())
+            progress.update(task, description=work.state(), completed=work.done, total=work.total())
 
-        heard.heard = show
+        work.show = show
         show()
-        yield show
+        yield

@@ -7,17 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.options import (
-    READING,
-    SAMPLE,
-    WINDOW,
-    GroupedOption,
-    options,
-    sources_argument,
-)
-from scanfab.cli.settings_file import fill_from_file
-from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
-from scanfab.cli.talk import talk_options
+from scanfab.cli.options import READING, SAMPLE, WINDOW, options, usage_errors
+from scanfab.cli.sources import SourceCommand, checked, open_one, sources_argument
+from scanfab.cli.talk import announce_compiling, talk_options
 
 if TYPE_CHECKING:
     from scanfab.io.series import Series
@@ -30,31 +22,14 @@ LONGEST_SOURCE = 60
 
 @click.command(cls=SourceCommand)
 @sources_argument
-@options(*READING)
-@click.option(
-    "--frame",
-    cls=GroupedOption,
-    group="reading",
-    default=0,
-    show_default=True,
-    metavar="K",
-    help="Which frame; negative: from the end.",
-)
-@options(*SAMPLE, *WINDOW, "cutoff", "axis", "strain")
+@options(*READING, "frame", *SAMPLE, *WINDOW, "cutoff", "axis", "strain")
 @click.option(
     "--cut", is_flag=True, help="Leave out the grains in front, and show scan lines in the section."
 )
 @options("screenshot")
 @talk_options
-@click.pass_context
 def view(
-    ctx: click.Context,
-    /,
-    sources: tuple[str, ...],
-    frame: int,
-    cut: bool,
-    screenshot: Path | None,
-    **chosen: Any,
+    sources: tuple[str, ...], frame: int, cut: bool, screenshot: Path | None, **chosen: Any
 ) -> int:
     """
     Show a frame in 3D: grains, rattlers, and the representative volume (RV).
@@ -62,26 +37,18 @@ def view(
     SOURCE is as for scanfab compute; boundary particles are not drawn, and the loading axis is
     upright.
     """
-    from scanfab.base.errors import SettingsError
     from scanfab.base.files import check_folder
-    from scanfab.cli.console import announce_compiling, reported_warnings
     from scanfab.pipeline.settings import Settings
 
-    with reported_warnings():
-        chosen, settings_file = fill_from_file(ctx, sources, chosen)
-        with settings_file.named_errors():
-            reading = reading_arguments(chosen)
-            settings = Settings(variants="c", **chosen)
-            if screenshot is not None:
-                if screenshot.suffix.lower() != ".png":
-                    raise SettingsError(f"{screenshot}: screenshots are PNG files: name one .png")
-                check_folder(screenshot)
-        series = open_series(sources, reading)
-        if len(series) > 1:
-            names = ", ".join(one.name for one in series)
-            raise click.UsageError(f"one series can be viewed at a time, found {names}")
-        announce_compiling()
-        _show(series[0], settings, frame, cut, screenshot)
+    reading, settings = checked({**chosen, "variants": "c"}, Settings)
+    if screenshot is not None:
+        if screenshot.suffix.lower() != ".png":
+            raise click.UsageError(f"{screenshot}: screenshots are PNG files: name one .png")
+        with usage_errors():
+            check_folder(screenshot)
+    series = open_one(sources, reading, "viewed")
+    announce_compiling()
+    _show(series, settings, frame, cut, screenshot)
     return 0
 
 

@@ -22,8 +22,8 @@ from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import make_plan
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.tolerance import TOLERANCE_MISSED, Goal, missing_work
-from scanfab.pipeline.values import Length
-from scanfab.pipeline.window_settings import SHAPES, settings_in
+from scanfab.pipeline.values import SHAPES, Length
+from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.directions import direction_rule, rule_of, usual_rule
 from scanfab.table.plots import Plots
 from scanfab.table.row import Record

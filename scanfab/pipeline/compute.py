@@ -45,7 +45,7 @@ def compute(
     *,
     executor: Executor | None = None,
     variants: str = "abcd",
-    rv: float = 0.7,
+    rv: str | float | Sequence[float] = 0.7,
     rv_radius: float | None = None,
     rv_center: str | Sequence[float] | None = None,
     rv_shape: str | Path = "sphere",

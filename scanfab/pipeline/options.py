@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.errors import SettingsError
-from scanfab.base.option import Option, options_of
+from scanfab.base.option import option, options_of, reading, running
 from scanfab.io.files import without_temporary
 from scanfab.io.options import READING_OPTIONS
 from scanfab.pipeline.maps.settings import MapSettings
@@ -22,150 +24,87 @@ def _figures() -> list[str]:
     return [*figures_of("table"), *figures_of("frames")]
 
 
-OUTPUT_OPTIONS = (
-    Option(
-        name="output",
-        group="output",
-        help="Result file: .csv .tsv .json .jsonl .parquet; - is CSV on standard output (default: "
-        "the same, or a readable table on a terminal).",
-        kind=Path,
-        metavar="FILE",
-        spelling="-o",
-        first=True,
-    ),
-    Option(
-        name="fields",
-        group="output",
-        help="Which columns to write, in this order (default: all).",
-        meaning="columns of the table, where not all are written",
-        metavar="NAME,NAME,...",
-    ),
-    Option(
-        name="digits",
-        default=DEFAULT_DIGITS,
-        group="output",
-        help="Significant digits of written numbers; 17: as short as reads back the same.",
-        meaning="significant digits of the numbers of the table",
-        kind=int,
-        metavar="N",
-    ),
-    Option(
-        name="follow",
-        default=False,
-        group="reading",
-        help="Wait for the frames of a running simulation, each computed once its files are whole; "
-        "Ctrl-C or SIGTERM ends it in order, a second one interrupts.",
-        kind=bool,
-    ),
-    Option(
-        name="follow_for",
-        group="reading",
-        help="The same until so long after the last new frame.",
-        kind=float,
-        metavar="SECONDS",
-    ),
-    Option(
-        name="scheduler",
-        group="scan",
-        help="Send the frames to the workers of a Dask cluster in place of `workers`; they see the "
-        "same files by the same paths.",
-        metavar="tcp://HOST:PORT",
-    ),
-    Option(
-        name="scheduler_file",
-        group="scan",
-        help="The same by the file that dask scheduler, dask-mpi and dask-jobqueue write.",
-        kind=Path,
-        metavar="FILE",
-    ),
-    Option(
-        name="resume",
-        default=False,
-        group="output",
-        help="Go on with FILE.part of an interrupted run, or add what is missing to a complete "
-        "FILE.",
-        kind=bool,
-    ),
-    Option(
-        name="manifest",
-        group="output",
-        help="Settings, seed, versions, inputs with size and hash, as JSON (with `output=FILE` "
-        "also FILE.manifest.json without asking).",
-        kind=Path,
-        metavar="FILE",
-    ),
-    Option(
-        name="vtk",
-        group="output",
-        help="Write files for ParaView of each frame that is computed now.",
-        kind=Path,
-        metavar="DIR",
-    ),
-    Option(
-        name="plot",
-        group="output",
-        help="Draw to a file: .png .svg .pdf.",
-        kind=Path,
-        metavar="FILE",
-    ),
-    Option(
-        name="figure",
-        group="output",
-        help="Which figure: of the table evolution, normalised, correlation or columns:NAME,NAME "
-        "(default: all on one page); of the first and last frame rose (or rose:30,60,90 for these "
-        "polar angles), projection, histogram or cutoffs.",
-        metavar="NAME",
-        choices=_figures,
-    ),
-)  # fmt: skip
+@dataclass
+class Output:
+    """The options of ``compute`` and ``map`` that are neither of reading nor settings."""
 
-COMPARING_OPTIONS = (
-    Option(
-        name="strain_max",
-        group="fabric",
-        help="Leave frames beyond this strain out of the fits.",
-        kind=float,
-        metavar="X",
-    ),
-    Option(
-        name="labels",
-        group="reading",
-        help="Name of a table in place of its source, once a table, in their order.",
-        metavar="NAME",
-        spelling="--label",
-        several=True,
-    ),
-)
+    output: Path | None = running(spelling="-o", first=True)
+    """
+    Result file: .csv .tsv .json .jsonl .parquet; - is CSV on standard output (default: the same, or
+    a readable table on a terminal).
+    """
+    fields: str | None = option(metavar="NAME,NAME,...")
+    """Which columns to write, in this order (default: all)."""
+    digits: int = option(default=DEFAULT_DIGITS)
+    """Significant digits of written numbers; 17: as short as reads back the same."""
+    follow: bool = running(default=False, group="reading")
+    """
+    Wait for the frames of a running simulation, each computed once its files are whole; Ctrl-C or
+    SIGTERM ends it in order, a second one interrupts.
+    """
+    follow_for: float | None = running(group="reading", metavar="SECONDS")
+    """The same until so long after the last new frame."""
+    scheduler: str | None = running(group="scan", metavar="tcp://HOST:PORT")
+    """
+    Send the frames to the workers of a Dask cluster in place of `workers`; they see the same files
+    by the same paths.
+    """
+    scheduler_file: Path | None = running(group="scan")
+    """The same by the file that dask scheduler, dask-mpi and dask-jobqueue write."""
+    resume: bool = running(default=False)
+    """Go on with FILE.part of an interrupted run, or add what is missing to a complete FILE."""
+    manifest: Path | None = running()
+    """
+    Settings, seed, versions, inputs with size and hash, as JSON (with `output=FILE` also
+    FILE.manifest.json without asking).
+    """
+    vtk: Path | None = running(metavar="DIR")
+    """Write files for ParaView of each frame that is computed now."""
+    plot: Path | None = running()
+    """Draw to a file: .png .svg .pdf."""
+    figure: str | None = running(metavar="NAME", choices=_figures)
+    """
+    Which figure: of the table evolution, normalised, correlation or columns:NAME,NAME (default: all
+    on one page); of the first and last frame rose (or rose:30,60,90 for these polar angles),
+    projection, histogram or cutoffs.
+    """
 
-VIEWING_OPTIONS = (
-    Option(
-        name="screenshot",
-        group="output",
-        help="Write a picture instead of opening a window; needs no screen.",
-        kind=Path,
-        metavar="FILE.png",
-    ),
-)
 
-OPTIONS = {one.name: one for one in (*READING_OPTIONS, *options_of(Settings), *OUTPUT_OPTIONS)}
+def _writer_names() -> Iterable[str]:
+    from scanfab.io.writer import installed_writers
+
+    return installed_writers()
+
+
+@dataclass
+class Other:
+    """Options of commands that compute no table."""
+
+    frame: int = reading(default=0, decides=False, metavar="K")
+    """Which frame; negative: from the end."""
+    to: str | None = running(metavar="NAME", choices=_writer_names, first=True)
+    """Format to write (default: by the suffix of OUT); scanfab formats lists them."""
+
+    strain_max: float | None = running(group="fabric")
+    """Leave frames beyond this strain out of the fits."""
+    labels: str | None = running(spelling="--label", several=True, metavar="NAME")
+    """Name of a table in place of its source, once a table, in their order."""
+    screenshot: Path | None = running(metavar="FILE.png")
+    """Write a picture instead of opening a window; needs no screen."""
+
+
+OPTIONS = {one.name: one for one in (*READING_OPTIONS, *options_of(Settings), *options_of(Output))}
 """The options of compute by name."""
 
 MAP_OPTIONS = {
     one.name: one
-    for one in (*READING_OPTIONS, *options_of(MapSettings), *OUTPUT_OPTIONS)
+    for one in (*READING_OPTIONS, *options_of(MapSettings), *options_of(Output))
     if one.name not in ("cutoffs", "figure", "with_")
 }
 """Those of map."""
 
-MEANINGS = {name: one.meaning for name, one in OPTIONS.items() if one.meaning}
-"""What each option means that decides a result, in the words of the report."""
-
-DECLARED = {
-    **MAP_OPTIONS,
-    **OPTIONS,
-    **{one.name: one for one in (*COMPARING_OPTIONS, *VIEWING_OPTIONS)},
-}
-"""Those of ``map``, ``compare`` and ``view`` too."""
+DECLARED = {**MAP_OPTIONS, **OPTIONS, **{one.name: one for one in options_of(Other)}}
+"""Those of the other commands too."""
 NAMES = "|".join(DECLARED)
 
 
@@ -202,3 +141,7 @@ def _as_word(value: str) -> str:
         return value.strip("{}").replace('"', "").replace(": ", "=").replace(", ", ",")
     # what a shell takes as it is needs no quotes
     return re.sub(r'^"([\w.:/+-]*)"$', r"\1", value)
+
+
+MEANINGS = {name: as_options(one.help) for name, one in OPTIONS.items() if one.decides}
+"""What each option decides that decides a result, in the words of the report."""

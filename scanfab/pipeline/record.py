@@ -22,8 +22,7 @@ from scanfab.base.files import whole_file
 from scanfab.base.option import options_of
 from scanfab.io.series import Series
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.values import STRAIN_MODES, UsualAxis
-from scanfab.pipeline.window_settings import SHAPES
+from scanfab.pipeline.values import SHAPES, STRAIN_MODES, UsualAxis
 from scanfab.scan.directions import DirectionRule
 from scanfab.table.columns import row_of
 from scanfab.table.formats import read_rows
@@ -76,7 +75,7 @@ def default_settings() -> dict[str, Any]:
 
 
 def _chosen(settings: Settings) -> dict[str, Any]:
-    options = [one.name for one in options_of(type(settings)) if one.meaning]
+    options = [one.name for one in options_of(type(settings)) if one.decides]
     return {name: as_json(getattr(settings, name)) for name in options}
 
 

@@ -11,14 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from scanfab.base.errors import SettingsError
-from scanfab.base.option import number, one_of, unusable, whole
+from scanfab.base.option import number, numbers, one_of, unusable, whole
 from scanfab.base.spelling import shortest
-from scanfab.scan.edges import ENDS
 
 if TYPE_CHECKING:
     # their modules need numpy, for which the help of a command does not wait
     from scanfab.packing.boundary import BoundaryRule
-    from scanfab.pipeline.settings import Settings
     from scanfab.scan.directions import DirectionRule
 
 
@@ -27,6 +25,13 @@ STRAIN_MODES = ("auto", "cell", "boundary", "grains")
 MOST_CUTOFFS = 1000
 # of further columns, in their order in the table
 GROUP_NAMES = ("invariants", "state", "forces", "harmonics")
+# of windows, with the sizes that each takes
+SHAPES = {
+    "sphere": "",
+    "box": "A,B,C, full edges",
+    "cylinder": "R,H, radius and height",
+    "ellipsoid": "A,B,C, semi-axes",
+}
 
 
 class Axis(NamedTuple):
@@ -91,7 +96,7 @@ def as_written(value: Any) -> Any:
 
 def parse_length(name: str, text: str | float | Length) -> Length:
     """
-    A length as users write it: ``0.5``, ``1rmin``, ``0.2rmean``.
+    A length of 0 or more as users write it: ``0.5``, ``1rmin``, ``0.2rmean``.
 
     Examples
     --------
@@ -99,22 +104,25 @@ def parse_length(name: str, text: str | float | Length) -> Length:
     >>> parse_length("cutoff", "0.5rmin")
     Length(value=0.5, unit='rmin')
     """
-    if isinstance(text, Length):
-        return text
-    match = re.fullmatch(r"\s*([^a-df-z\s]+)\s*(rmin|rmean|rmax)?\s*", str(text))
-    try:
-        value = float(match[1]) if match else math.nan
-    except ValueError:
-        value = math.nan
-    if match is None or not math.isfinite(value):
-        raise SettingsError(
-            f"{name}: expected a length such as 0.0005 or 1rmin (rmin, rmean, rmax), "
-            f"found {str(text)!r}"
-        )
-    return Length(value, match[2] or "")  # type: ignore[arg-type]
+    found = re.fullmatch(r"\s*(.+?)\s*(rmin|rmean|rmax)?\s*", str(as_written(text)))
+    expected = "a length such as 0.0005 or 1rmin (rmin, rmean, rmax), not negative"
+    parse = number(expected, lambda value: 0 <= value < math.inf)
+    if found is None:
+        raise unusable(name, expected, text)
+    return Length(parse(name, found[1]), found[2] or "")  # type: ignore[arg-type]
 
 
-def parse_lengths(name: str, text: str | float | Iterable[str | float]) -> tuple[Length, ...]:
+def parse_spacing(name: str, value: Any) -> Length | None:
+    """A length above 0; None for ``auto``."""
+    if value is None or value == "auto":
+        return None
+    length = parse_length(name, value)
+    if length.value == 0:
+        raise unusable(name, "a length above 0, or auto", value)
+    return length
+
+
+def parse_lengths(name: str, text: Any) -> tuple[Length, ...]:
     """
     Lengths as ``FROM:TO:STEP``, both ends included, as ``L,L,...``, or one by one.
 
@@ -124,28 +132,26 @@ def parse_lengths(name: str, text: str | float | Iterable[str | float]) -> tuple
     >>> [length.value for length in parse_lengths("cutoffs", "0:1rmin:0.5rmin")]
     [0.0, 0.5, 1.0]
     """
-    if not isinstance(text, str):
-        parts = text if isinstance(text, Iterable) else [text]
-        return tuple(parse_length(name, part) for part in parts)
-    if ":" not in text:
-        return tuple(parse_length(name, part) for part in text.split(","))
-    lengths = [parse_length(name, part) for part in text.split(":")]
+    if text is None:
+        return ()
+    is_range = isinstance(text, str) and ":" in text
+    parts = text.split(":" if is_range else ",") if isinstance(text, str) else text
+    several = parts if isinstance(parts, Iterable) else [parts]
+    lengths = tuple(parse_length(name, part) for part in several)
+    if not is_range:
+        return lengths
     units = {length.unit for length in lengths if length.value != 0}
-    if len(lengths) != 3 or len(units) > 1 or lengths[2].value <= 0:
-        raise SettingsError(
-            f"{name}: expected FROM:TO:STEP of one unit such as 0:3rmin:0.1rmin, found {text!r}"
-        )
+    if len(lengths) != 3 or len(units) > 1 or lengths[2].value == 0:
+        raise unusable(name, "FROM:TO:STEP of one unit such as 0:3rmin:0.1rmin", text)
     first, last, step = (length.value for length in lengths)
     count = math.floor((last - first) / step + 1e-9) + 1
     if not 1 <= count <= MOST_CUTOFFS:
-        raise SettingsError(
-            f"{name}: expected 1 to {MOST_CUTOFFS} of them, found {count}: {text!r}"
-        )
+        raise unusable(name, f"1 to {MOST_CUTOFFS} lengths, and not {count}", text)
     # not by adding steps, whose rounding would show
     return tuple(Length(round(first + k * step, 12), *units) for k in range(count))
 
 
-def parse_axis(text: str | Vector | None, name: str = "axis") -> Axis:
+def parse_axis(name: str, text: str | Iterable[float] | None) -> Axis:
     """A unit vector from ``x``, ``y``, ``z`` or three numbers; the usual one if none is given."""
     if text is None:
         return UsualAxis(*AXES["z"])
@@ -153,14 +159,42 @@ def parse_axis(text: str | Vector | None, name: str = "axis") -> Axis:
         return text
     if isinstance(text, str) and text in AXES:
         return AXES[text]
-    try:
-        x, y, z = (float(part) for part in (text.split(",") if isinstance(text, str) else text))
-    except (TypeError, ValueError):
-        x = y = z = math.nan
-    length = math.hypot(x, y, z)
-    if not (math.isfinite(length) and length > 0):
-        raise unusable(name, "x, y, z or three numbers X,Y,Z", text)
-    return Axis(x / length, y / length, z / length)
+    parse = numbers("x, y, z or three numbers X,Y,Z", lambda v: len(v) == 3 and math.hypot(*v) > 0)
+    vector = parse(name, text)
+    return Axis(*(part / math.hypot(*vector) for part in vector))
+
+
+def parse_fractions(name: str, value: Any) -> float | tuple[float, ...]:
+    """
+    Sizes of RVs: one as a number; several, each once, in ascending order.
+
+    Examples
+    --------
+    >>> from scanfab.pipeline.values import parse_fractions
+    >>> parse_fractions("rv", "0.7"), parse_fractions("rv", "0.7,0.4")
+    (0.7, (0.4, 0.7))
+    """
+    parse = numbers(
+        "a fraction above 0, or several such as 0.4,0.5,0.6",
+        lambda sizes: len(sizes) > 0 and min(sizes) > 0,
+    )
+    found = sorted(parse(name, [value] if isinstance(value, int | float) else value))
+    if len(set(found)) < len(found):
+        raise unusable(name, "fractions that differ", value)
+    return found[0] if len(found) == 1 else tuple(found)
+
+
+def parse_shape(name: str, value: Any) -> str:
+    """The shape of a window: a word, or a file with its surface that exists."""
+    if str(value) in SHAPES:
+        return str(value)
+    from scanfab.io.surface import SUFFIXES
+
+    path = Path(value)
+    if path.suffix.lower() not in SUFFIXES or not path.is_file():
+        words = f"{', '.join(SHAPES)} or a closed convex surface that exists ({' '.join(SUFFIXES)})"
+        raise unusable(name, words, str(value))
+    return str(value)
 
 
 def parse_variants(name: str, letters: object) -> str:
@@ -180,40 +214,6 @@ def parse_groups(name: str, groups: Any) -> tuple[str, ...]:
     return tuple(group for group in GROUP_NAMES if group in words)
 
 
-def parse_vector(name: str, values: Any) -> Vector:
-    """Three finite numbers, in a text between commas or blanks."""
-    try:
-        x, y, z = map(float, words_of(values))
-    except (TypeError, ValueError):
-        x = y = z = math.nan
-    if not all(map(math.isfinite, (x, y, z))):
-        raise unusable(name, "three finite numbers", values)
-    return (x, y, z)
-
-
-def words_of(values: Any) -> Iterable[Any]:
-    """Parts of a text between commas or blanks; of other values those that there are."""
-    return values.replace(",", " ").split() if isinstance(values, str) else values
-
-
-def check_moment(chosen: Settings) -> None:
-    """Whether the rule at the window's surface knows the moment."""
-    if chosen.edge == ENDS and chosen.moment != 1:
-        raise SettingsError(
-            "moment: from what lies inside the window alone, as `edge=ends` takes it, the second "
-            "moment of the full lengths is not known: choose `edge=start`, or `moment=1`"
-        )
-
-
-def check_min_force(chosen: Settings) -> None:
-    """Whether the rule for rattlers looks at forces."""
-    if chosen.min_force and chosen.rattlers != "force":
-        raise SettingsError(
-            f'min_force: is that of the rule `rattlers="force"`, but `rattlers` is '
-            f"{chosen.rattlers}: choose that rule, or leave out `min_force`"
-        )
-
-
 def parse_boundary(name: str, rules: Any) -> tuple[BoundaryRule, ...]:
     """Rules from one expression or several."""
     from scanfab.packing.boundary import BoundaryRule
@@ -225,32 +225,6 @@ def parse_boundary(name: str, rules: Any) -> tuple[BoundaryRule, ...]:
         rule if isinstance(rule, BoundaryRule) else BoundaryRule.parse(str(rule))
         for rule in several
     )
-
-
-def parse_cutoff(name: str, value: Any) -> Length:
-    """A length of 0 or more."""
-    length = parse_length(name, value)
-    if length.value < 0:
-        raise unusable(name, "a length of 0 or more", value)
-    return length
-
-
-def parse_cutoffs(name: str, values: Any) -> tuple[Length, ...]:
-    """Lengths of 0 or more, as :func:`parse_lengths` takes them; none if not given."""
-    lengths = () if values is None else parse_lengths(name, values)
-    if any(length.value < 0 for length in lengths):
-        raise unusable(name, "lengths of 0 or more", values)
-    return lengths
-
-
-def parse_spacing(name: str, value: Any) -> Length | None:
-    """A length above 0; None for ``auto``."""
-    if value is None or value == "auto":
-        return None
-    length = parse_length(name, value)
-    if length.value <= 0:
-        raise unusable(name, "a length above 0, or auto", value)
-    return length
 
 
 def parse_directions(name: str, value: Any) -> DirectionRule | None:
@@ -266,14 +240,6 @@ def parse_directions(name: str, value: Any) -> DirectionRule | None:
             f"say nothing: take more of them"
         )
     return rule
-
-
-def parse_tolerance(name: str, value: Any) -> float:
-    """A number above 0 that a scan can be held to."""
-    found = number("a number above 0", lambda error: 0 < error < math.inf)(name, value)
-    if not 1e-15 <= found <= 1e15:
-        raise unusable(name, "a number from 1e-15 to 1e15", value)
-    return float(found)
 
 
 def rattler_rules() -> Iterable[str]:
@@ -299,7 +265,5 @@ def parse_strain(name: str, value: Any) -> str:
 
 def parse_workers(name: str, value: Any) -> int:
     """A number of threads: all cores if not given."""
-    every = os.cpu_count() or 1
-    return int(
-        whole("1 or more", lambda count: count >= 1)(name, every if value is None else value)
-    )
+    count = (os.cpu_count() or 1) if value is None else value
+    return int(whole("1 or more", lambda count: count >= 1)(name, count))

@@ -12,8 +12,13 @@ from scanfab.base.option import number, one_of, option, optional, options_of, ta
 
 @dataclass(frozen=True)
 class Weather:
-    wind_speed: float = option(help="How hard it blows.", group="sample", default=3.0)
-    rain: str = option(help="Of `wind_speed`.", group="scan", spelling="--wet", takes="int")
+    wind_speed: float = option(group="sample", default=3.0)
+    """How hard it blows."""
+    rain: int | None = option(group="scan", spelling="--wet", metavar="N|auto")
+    """
+    Of
+    `wind_speed`.
+    """
 
 
 def test_a_function_says_what_its_options_mean_and_refuses_others():
@@ -22,11 +27,13 @@ def test_a_function_says_what_its_options_mean_and_refuses_others():
         """{options}"""
         return wind_speed + rain
 
-    assert [one.flag for one in options_of(Weather)] == ["--wind-speed", "--wet"]
+    assert [(one.flag, one.kind) for one in options_of(Weather)] == [
+        ("--wind-speed", float), ("--wet", int)
+    ]  # fmt: skip
     assert forecast(rain=2) == 5
     assert forecast.__doc__ == (
-        "wind_speed : str, optional\n    How hard it blows.\n"
-        "rain : int, optional\n    Of `wind_speed`."
+        "wind_speed : float, optional\n    How hard it blows.\n"
+        "rain : int, optional\n    Of `wind_speed`. Written as ``N|auto``."
     )
     with pytest.raises(TypeError, match=r"^forecast has no option 'rian': did you mean 'rain'\?$"):
         forecast(rian=2)

@@ -65,15 +65,11 @@ class Wider(Settings):
     """Settings with one option more, declared as the others are."""
 
     stray_light: int = option(
+        whole("a number below 9", lambda number: number < 9),
         default=7,
-        parse=whole("a number below 9", lambda number: number < 9),
         group="fabric",
-        help="How much of it, as `rv`.",
-        meaning="light that strays",
-        takes="int",
-        kind=int,
-        metavar="N",
     )
+    """How much of it, as `rv`."""
 
 
 def test_a_made_up_option_takes_one_declaration(monkeypatch):
@@ -96,7 +92,7 @@ def test_a_made_up_option_takes_one_declaration(monkeypatch):
     assert asked_for([], {}, made)["stray_light"] == 5
 
     @takes_options(options_of(Wider))
-    def function() -> None:
+    def function(*, stray_light: int = 7) -> None:
         """{options}"""
 
     assert function.__doc__.endswith("stray_light : int, optional\n    How much of it, as `rv`.")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from scanfab.base.errors import SettingsError
-from scanfab.base.option import changed, option, optional, unusable, whole
+from scanfab.base.option import changed, numbers, optional, sample, whole
 from scanfab.pipeline.settings import Settings
 
 if TYPE_CHECKING:
@@ -15,15 +15,16 @@ if TYPE_CHECKING:
 
 
 BLOCK_OPTIONS = ("grid", "slices", "shells")
+block_count = whole("1 or more", lambda number: number >= 1)
 
 
 def parse_grid(name: str, value: Any) -> tuple[int, int, int]:
     """Three whole numbers of at least 1, in a text between commas or blanks."""
-    words = value.replace(",", " ").split() if isinstance(value, str) else value
-    try:
-        first, second, third = (whole("1 or more", lambda n: n >= 1)(name, one) for one in words)
-    except (TypeError, ValueError, SettingsError):
-        raise unusable(name, "three numbers of blocks, such as 4,4,8", value) from None
+    parse = numbers(
+        "three numbers of blocks, such as 4,4,8",
+        lambda grid: len(grid) == 3 and all(one >= 1 and one.is_integer() for one in grid),
+    )
+    first, second, third = map(int, parse(name, value))
     return first, second, third
 
 
@@ -52,35 +53,12 @@ class MapSettings(Settings):
     """
 
     variants: str = changed(Settings, "variants", default="a")
-    grid: tuple[int, int, int] | None = option(
-        parse=optional(parse_grid),
-        group="sample",
-        help="So many blocks along x, y and z (along the edges of a periodic cell).",
-        meaning="blocks along x, y and z",
-        takes="str or three ints",
-        metavar="NX,NY,NZ",
-        first=True,
-    )
-    slices: int | None = option(
-        parse=optional(whole("1 or more", lambda number: number >= 1)),
-        group="sample",
-        help="So many slices of equal thickness along `axis`.",
-        meaning="slices along the axis",
-        takes="int",
-        kind=int,
-        metavar="N",
-        first=True,
-    )
-    shells: int | None = option(
-        parse=optional(whole("1 or more", lambda number: number >= 1)),
-        group="sample",
-        help="So many shells of equal thickness about the centre.",
-        meaning="shells about the centre",
-        takes="int",
-        kind=int,
-        metavar="N",
-        first=True,
-    )
+    grid: tuple[int, int, int] | None = sample(optional(parse_grid), metavar="NX,NY,NZ", first=True)
+    """So many blocks along x, y and z (along the edges of a periodic cell)."""
+    slices: int | None = sample(optional(block_count), first=True)
+    """So many slices of equal thickness along `axis`."""
+    shells: int | None = sample(optional(block_count), first=True)
+    """So many shells of equal thickness about the centre."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)

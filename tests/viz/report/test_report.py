@@ -95,7 +95,7 @@ def test_the_sample_is_told_in_full(page):
         "scanfab compute sample_data/yade_triaxial --boundary mask=3 --tolerance 0.0005 "
         "--frames 0::3 -o fabric.csv" in text
     )
-    assert "boundary mask=3 particles that are boundary" in text
+    assert "boundary mask=3 Which particles are boundary" in text
     assert re.search(r"numpy \d+\.\d+", text)
     assert "triaxial-spheres-00000006.vtk.gz" in text
     assert (
