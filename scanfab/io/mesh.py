@@ -40,6 +40,10 @@ VERTEX, POLY_VERTEX, LINE, POLY_LINE = 1, 2, 3, 4
 DUPLICATE = 1
 # VTK itself writes a NaN into keys that describe arrays, and cannot read it
 HARMLESS = re.compile("InformationKey|Could not locate key")
+FORM = re.compile(
+    rb"\A# vtk DataFile.*?^\s*DATASET\s+(\w+)|<VTKFile[^>]*\btype=[\"'](\w+)|<(Xdmf)\b",
+    re.MULTILINE | re.DOTALL,
+)
 TEXT = re.compile(rb"# vtk DataFile[^\n]*\n[^\n]*\n\s*ASCII\s", re.IGNORECASE)
 NO_POINTS = re.compile(rb"# vtk.*^POINTS\s+0\s", re.MULTILINE | re.DOTALL)
 # what is appended to a legacy file: an array without values
@@ -73,12 +77,8 @@ def form_of(path: Path) -> str | None:
     if is_hdf(head):
         form = read_hdf_file(path, with_data=False).attributes.get("VTKHDF", {}).get("Type")
         return form if isinstance(form, str) else None
-    is_legacy = head.startswith(b"# vtk DataFile")
-    pattern = rb"^\s*DATASET\s+(\w+)" if is_legacy else rb"<VTKFile[^>]*\btype=[\"'](\w+)"
-    match = re.search(pattern, head, re.MULTILINE)
-    if match or is_legacy:
-        return match[1].decode() if match else None
-    return "Xdmf" if re.search(rb"<Xdmf\b", head) else None
+    match = FORM.search(head)
+    return match[match.lastindex or 0].decode() if match else None
 
 
 def holds_mesh(form: str | None) -> bool:
@@ -377,6 +377,9 @@ def _mesh_of(data: Any) -> Mesh:
         types = np.array(data.GetCellTypes()) if one_by_one is None else _numpy(one_by_one)
         has_faces = not np.all(np.isin(types, (VERTEX, POLY_VERTEX, LINE, POLY_LINE)))
     offsets, named = _cells(cells, count)
+    if len(types) == count and not has_faces and np.array_equal(named, np.arange(count)):
+        # one vertex for each point: YADE's VTKRecorder writes some arrays of the points there
+        arrays.update(cell_arrays)
     rows = np.flatnonzero(np.isin(types, (LINE, POLY_LINE)))
     if len(types) != len(offsets) - 1 or np.any(np.diff(offsets)[rows] < 2):
         raise damaged("types and points of the cells do not fit")

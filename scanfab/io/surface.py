@@ -9,7 +9,7 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.fence import fenced
-from scanfab.io.mesh import faces_in_worker, form_of
+from scanfab.io.mesh import faces_in_worker
 
 SUFFIXES = (".stl", ".vtp", ".ply", ".obj")
 
@@ -25,13 +25,8 @@ def read_surface(path: Path) -> tuple[FloatArray, IntArray]:
     ReadError
         If the file is damaged, or of another format.
     """
-    suffix = path.suffix.lower()
-    if suffix == ".vtp":
-        if form_of(path) != "PolyData":
-            raise ReadError(f"{path}: expected a surface (PolyData), found something else")
-        points, faces = fenced(faces_in_worker, path)
-    else:
-        points, faces = fenced(faces_by_meshio, path, suffix[1:])
+    is_vtp = path.suffix.lower() == ".vtp"
+    points, faces = fenced(faces_in_worker if is_vtp else faces_by_meshio, path)
     if points.shape != (len(points), 3) or not np.all(np.isfinite(points)):
         raise ReadError(f"{path}: expected points of three finite numbers")
     if any(one.size and not 0 <= one.min() <= one.max() < len(points) for one in faces):
@@ -40,15 +35,14 @@ def read_surface(path: Path) -> tuple[FloatArray, IntArray]:
     return points, np.concatenate([np.zeros((0, 3), np.int64), *fans])
 
 
-def faces_by_meshio(path: str, suffix: str) -> tuple[FloatArray, list[IntArray]]:
+def faces_by_meshio(path: str) -> tuple[FloatArray, list[IntArray]]:
     """The points of a surface, and its faces, an array for each number of corners."""
     import meshio
 
-    # in the worker, since meshio prints, and exits if it cannot read a file
-    with np.errstate(over="ignore"):
-        try:
-            mesh = meshio.read(Path(path), file_format=suffix)
-        except SystemExit:
-            raise ValueError(f"it is no sound surface in the format {suffix}") from None
+    try:
+        mesh = meshio.read(Path(path))
+    except SystemExit:
+        # it prints why, in the worker, and exits
+        raise ValueError(f"it is no sound surface ({Path(path).suffix})") from None
     faces = [np.asarray(one.data, np.int64) for one in mesh.cells if one.dim == 2 and len(one.data)]
     return np.asarray(mesh.points, np.float64), faces

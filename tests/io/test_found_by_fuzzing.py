@@ -35,7 +35,7 @@ FAR = [(1, 1e30, 0.5, 0.5, 0.1)]
 LONG = ["9" * 5000 + "x", "9" * 5000 + ".5.5", "1" * 5000 + "e"]
 NEAR_ZERO = "".join(f"{k}e300 0 0 1e-300\n" for k in range(12))
 TEXTS = [
-    *((f"##PERIODIC:: 1 1 {edge}\n0 0 0 1 -1\n", "expected three lengths")
+    *((f"##PERIODIC:: 1 1 {edge}\n0 0 0 1 -1\n", "must be finite numbers")
       for edge in ("1e200", "-1e200", "inf", "nan")),
     (dump_text(ROWS[:1]).replace("1 1 0.2 0.5 0.5 0.1", ""), "counts 1 rows, found 0"),
     *((dump_text([(1, value, 0.5, 0.5, 0.1)], "id xs ys zs radius"), "")

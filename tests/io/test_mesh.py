@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import itertools
-import time
 
 import numpy as np
 import pytest
@@ -99,13 +98,10 @@ def test_all_legacy_files_are_read(tmp_path, lines, binary, version):
     return np.testing.assert_array_equal(mesh.line_arrays["kn"], np.arange(500.0, 999))
 
 
-def test_a_longer_line_joins_its_ends(tmp_path):
+def test_lines_of_several_points_and_beside_other_cells_join_their_ends(tmp_path):
     mesh = pyvista.PolyData(np.eye(3), lines=np.array([3, 0, 2, 1, 2, 1, 2]))
     mesh.save(tmp_path / "a.vtp")
     assert read_mesh(tmp_path / "a.vtp").lines.tolist() == [[0, 1], [1, 2]]
-
-
-def test_lines_beside_cells_of_other_kinds(tmp_path):
     body = POINTS + "CELLS 3 9\n1 0\n2 0 1\n3 1 0 1\nCELL_TYPES 3\n1\n3\n5\n"
     mesh = read_mesh(legacy(tmp_path / "a.vtk", body, dataset="UNSTRUCTURED_GRID"))
     assert mesh.lines.tolist() == [[0, 1]]
@@ -147,11 +143,9 @@ def test_a_last_number_without_a_line_end_is_doubted(tmp_path):
     "body",
     [
         POINTS.replace("2", "9" * 5000, 1),
-        POINTS.replace("2", "-2", 1),
         POINTS + "LINES 1 1\n7\n",
         POINTS + "LINES 1 3\n2 0 x\n",
         POINTS + "LINES 1 3\n2 0 10000000000\n",
-        POINTS + "POINT_DATA 2\nFIELD FieldData 4294967296\nr 1 2 double\n1 1\n",
         POINTS + "POINT_DATA 2\nSCALARS radius double\nLOOKUP_TABLE default\n1\n",
         POINTS + "POINT_DATA 2\nFIELD FieldData 1\nradius 1 1 double\n1\n",
         POINTS + "POINT_DATA 2\n",
@@ -170,7 +164,6 @@ CELLS_51 = "CELLS 3 2\nOFFSETS vtktypeint64\n{}\nCONNECTIVITY vtktypeint64\n{}\n
     [
         ("3.0", CELLS_51.format("0 1 2", "0 1"), "1\n1"),
         ("5.1", CELLS_51.format("0 1 2", "0 one"), "1\n1"),
-        ("5.1", CELLS_51.format("0 1 1", "0 1"), "1\n1"),
         ("5.1", CELLS_51.format("0 3 2", "0 1"), "1\n1"),
         ("3.0", "CELLS 2 6\n3 0 1 1 1 0\n", "3 3"),
         ("3.0", "CELLS 2 3\n1 0 0\n", "3 3"),
@@ -181,19 +174,10 @@ def test_cells_of_legacy_grids_that_are_damaged_are_refused(tmp_path, version, c
     refuses(legacy(tmp_path / "a.vtk", body, version, "UNSTRUCTURED_GRID"))
 
 
-@pytest.mark.parametrize("dataset", ["HYPEROCTREE", "STRUCTURED_POINTS", "TABLE"])
+@pytest.mark.parametrize("dataset", ["STRUCTURED_POINTS", "TABLE"])
 def test_data_that_are_no_mesh_are_refused(tmp_path, dataset):
     refuses(legacy(tmp_path / "a.vtk", "", dataset=dataset), f"with points, found {dataset}")
-    for text in ("hello", "# vtk DataFile Version \n\nASCII\nX\n"):
-        refuses(write(tmp_path / "a.vtk", text), "expected a VTK file with points")
-
-
-@pytest.mark.parametrize("count", [10**8, 10**30, "many"])
-@pytest.mark.parametrize("name", ["Points", "Polys", "Verts"])
-def test_counts_of_xml_are_those_of_the_file(tmp_path, name, count):
-    counts = {"Points": 1, "Verts": 0, "Lines": 0, "Strips": 0, "Polys": 0, name: count}
-    piece = " ".join(f'NumberOf{key}="{value}"' for key, value in counts.items())
-    refuses(xml(tmp_path / "a.vtp", piece))
+    refuses(write(tmp_path / "a.vtk", "hello"), "expected a VTK file with points")
 
 
 def array(content="", **words):
@@ -214,9 +198,9 @@ def sizes(*numbers, type="<u4"):
         array("0 0 0 0", format="ascii"),
         array("0 0 zero", format="ascii"),
         array("0 0 0", format="ascii").replace("</DataArray>", ""),
+        array("0 0 0", format="ascii") + "<DataArray " * 100_000,
         array(NumberOfComponents="9999999"),
         array(type="Complex"),
-        array(),
         array("!!!!!!!!"),
         array(sizes(24)),
         array(format="appended"),
@@ -224,20 +208,12 @@ def sizes(*numbers, type="<u4"):
         array(format="anything"),
     ],
 )
-def test_arrays_of_xml_that_are_damaged_are_refused(tmp_path, points):
-    refuses(xml(tmp_path / "a.vtp", 'NumberOfPoints="1"', f"<Points>{points}</Points>"))
+@pytest.mark.parametrize("count", ["1", "many"])
+def test_arrays_of_xml_that_are_damaged_are_refused(tmp_path, points, count):
+    refuses(xml(tmp_path / "a.vtp", f'NumberOfPoints="{count}"', f"<Points>{points}</Points>"))
 
 
-@pytest.mark.parametrize(
-    "blocks",
-    [
-        (1, 2**31, 2**31, 16),
-        (2**32 - 1, 24, 0, 0),
-        (2, 24, 0, 0),
-        (1, 16, 0, 0),
-        (1, 24, 0, 2**32 - 1),
-    ],
-)
+@pytest.mark.parametrize("blocks", [(1, 2**31, 2**31, 16), (2**32 - 1, 24, 0, 0), (1, 24, 0, 99)])
 @pytest.mark.parametrize("compressor", ["ZLib", "LZ4", "LZMA", "RAR"])
 def test_packed_arrays_that_are_damaged_are_refused(tmp_path, blocks, compressor):
     points = f"<Points>{array(sizes(*blocks))}</Points>"
@@ -245,24 +221,13 @@ def test_packed_arrays_that_are_damaged_are_refused(tmp_path, blocks, compressor
     refuses(xml(tmp_path / "a.vtp", 'NumberOfPoints="1"', points, more))
 
 
-@pytest.mark.parametrize("offset", ["1", "-2", "99999999999", "9" * 30, "x"])
-@pytest.mark.parametrize("order", [1, -1])
-def test_offsets_of_xml_cells_that_are_damaged_are_refused(tmp_path, offset, order):
+@pytest.mark.parametrize("offset", ["1", "-2", "99999999999", "x"])
+def test_offsets_of_xml_cells_that_are_damaged_are_refused(tmp_path, offset):
     one = {"format": "ascii", "type": "Int64", "NumberOfComponents": "1"}
-    parts = [array("0 1 0 1", Name="connectivity", **one)]
-    parts.append(array(f"2 {offset}", Name="offsets", **one))
-    points = array("0 0 0 2 0 0", format="ascii")
-    content = f"<Points>{points}</Points><Lines>{''.join(parts[::order])}</Lines>"
+    cells = array("0 1 0 1", Name="connectivity", **one)
+    cells += array(f"2 {offset}", Name="offsets", **one)
+    content = f"<Points>{array('0 0 0 2 0 0', format='ascii')}</Points><Lines>{cells}</Lines>"
     refuses(xml(tmp_path / "a.vtp", 'NumberOfPoints="2" NumberOfLines="2"', content))
-
-
-@pytest.mark.parametrize("part", ["<DataArray ", "<DataArray format='ascii'>", "<Piece", "a=' "])
-def test_the_time_grows_as_the_file_does(tmp_path, part):
-    head = '<VTKFile type="PolyData"><PolyData><Piece NumberOfPoints="1"><Points>'
-    path = write(tmp_path / "a.vtp", f"{head}<DataArray {part * 100_000}</DataArray>")
-    began = time.monotonic()
-    refuses(path)
-    assert time.monotonic() - began < 10
 
 
 @pytest.mark.parametrize("wrong", [b"0.5 0.5 0.5", b"0.\x005", b"half"])

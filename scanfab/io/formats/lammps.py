@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,10 +16,8 @@ from scanfab.io.formats.binary_dump import BinaryDump, NetcdfDump
 from scanfab.io.formats.lammps_data import DataFile
 from scanfab.io.formats.shared import GrainsOnly
 from scanfab.io.formats.text_dump import TextDump
-from scanfab.io.formats.vtk import VtkReader
+from scanfab.io.formats.vtk import FormsReader, VtkReader
 from scanfab.io.reader import (
-    Carries,
-    FileKind,
     GrainTable,
     JoinedContacts,
     NotContactsError,
@@ -38,13 +35,13 @@ RESTART = re.compile(rb"LammpS RestartT|\0{4}.{2}\0\0[^\0]{0,100}LIGGGHTS", re.D
 FORMS: tuple[GrainsOnly, ...] = (TextDump(), DataFile(), NetcdfDump(), BinaryDump())
 
 
-class DumpReader(VtkReader):
-    """What the readers of LAMMPS' and LIGGGHTS' dumps have in common: a reader for each form."""
+class DumpReader(FormsReader):
+    """What the readers of LAMMPS' and LIGGGHTS' dumps have in common."""
 
-    generic = False
     lists_contacts = False
     lists_walls = False
     """Whether there are lists of contacts with walls, which are known by their values."""
+    forms = FORMS
 
     def recognises(self, path: Path) -> bool:
         """By what only one of both programs writes."""
@@ -57,24 +54,7 @@ class DumpReader(VtkReader):
                 f"{path}: a binary restart, which only the program that wrote it can read: let it "
                 f"read_restart, and write the grains with dump custom ... id type x y z radius"
             )
-        vtk: Any = super()
-        return next((form for form in FORMS if form.recognises(path)), vtk)
-
-    def kind(self, path: Path) -> FileKind:
-        """By the names of the columns; whatever a text dump counts but ATOMS are contacts."""
-        return self.form(path).kind(path)
-
-    def snapshots(self, path: Path) -> list[Snapshot]:
-        """By ``ITEM: TIMESTEP``; a data file is one."""
-        return self.form(path).snapshots(path)
-
-    def carries(self, path: Path) -> Carries:
-        """A data file has a box without boundary flags, a VTK file at most the box beside it."""
-        return self.form(path).carries(path)
-
-    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """Columns by their names; of a data file by the atom style."""
-        return self.form(snapshot.path).read_grains(snapshot, options)
+        return super().form(path)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,10 @@ from scanfab.io.binary_tables import IS_NPZ, npz_shapes, read_npz
 from scanfab.io.columns import grain_table
 from scanfab.io.companions import companion_kind, read_contacts
 from scanfab.io.files import first_bytes
+from scanfab.io.formats.shared import GrainsOnly
 from scanfab.io.reader import (
     BODIES,
     WALLS,
-    Carries,
     FileKind,
     GrainTable,
     JoinedContacts,
@@ -30,26 +31,23 @@ from scanfab.packing.packing import Packing
 MARK = "scanfab_packing"
 # stands before the names of the columns of the grains
 COLUMN = "columns/"
-# contacts name the rows of grains
-IDS = ("id1", "id2")
 
 
-class NpzFormat:
+class NpzFormat(GrainsOnly):
     """Reader and writer plugin for arrays named as a :class:`scanfab.Packing` names them."""
 
     name = "npz"
     description = "packings as arrays of NumPy; .contacts.csv, .frame.csv and .columns.csv"
-    extensions = (".npz",)
+    extensions: tuple[str, ...] = (".npz",)
     lists_contacts = True
 
     def recognises(self, path: Path) -> bool:
         """By the mark among the arrays, or the first line of a companion file."""
-        if first_bytes(path, 2) == IS_NPZ:
-            try:
-                return MARK in npz_shapes(path)
-            except ReadError:
-                return False
-        return companion_kind(path) is not None
+        if first_bytes(path, 2) != IS_NPZ:
+            return companion_kind(path) is not None
+        with suppress(ReadError):
+            return MARK in npz_shapes(path)
+        return False
 
     def kind(self, path: Path) -> FileKind:
         """Grains, or what belongs to grains in another file."""
@@ -68,10 +66,6 @@ class NpzFormat:
         except (TypeError, ValueError, OverflowError) as error:
             raise ReadError(f"{path}: step and time: expected a number each: {error}") from None
         return [Snapshot(path, step, time, stepless=step is None)]
-
-    def carries(self, path: Path) -> Carries:
-        """The cell is among the arrays, or there is none."""
-        return "cell"
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """The arrays, with the contacts that they list."""
@@ -104,8 +98,9 @@ class NpzFormat:
         arrays |= found.grains | found.frame
         arrays |= {f"{COLUMN}{name}": values for name, values in found.own.items()}
         if packing.contacts is not None:
-            arrays["pairs"] = packing.contacts.pairs
-            arrays |= {name: found.contacts[name] for name in found.contacts if name not in IDS}
+            # they name the rows of grains
+            named = {"pairs": packing.contacts.pairs, **found.contacts}
+            arrays |= {name: one for name, one in named.items() if name not in ("id1", "id2")}
         stream = io.BytesIO()
         np.savez_compressed(stream, **arrays)
         path.write_bytes(stream.getvalue())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,11 +14,11 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.contacts import join_ids, join_positions, proved_force
 from scanfab.io.files import bare_name, file_inside, plain
-from scanfab.io.formats.shared import cell_of, numbers
+from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
 from scanfab.io.formats.yade_save import cell_beside, cell_file, is_cell_file
 from scanfab.io.mesh import Mesh, elements, form_of, holds_mesh, listed, read_mesh
 from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.io.writers.vtp import is_packing, moment_of, packing_of, says_all
+from scanfab.io.writers.vtp import moment_of, packing_of, says_all
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList
 
@@ -76,19 +76,13 @@ class VtkReader:
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """Points and their arrays, with the box of LIGGGHTS or the cell of YADE beside them."""
-        path, parts = snapshot.path, snapshot.parts
-        if form_of(path) in BLOCKS and not parts:
+        path = snapshot.path
+        if form_of(path) in BLOCKS and not snapshot.parts:
             return self._read_blocks(path, options)
-        mesh = read_mesh(path, parts)
+        mesh = read_mesh(path, snapshot.parts)
         columns = {**mesh.point_arrays, "position": mesh.points}
-        if is_packing(mesh):
-            if parts:
-                raise ReadError(
-                    f"{path}: holds all of a frame, and cannot be joined with {parts[0].name} of "
-                    f"the same timestep: name one as the source"
-                )
-            cell, listed = packing_of(path, mesh)
-            return grain_table(path, columns, cell, options)._replace(contacts=listed)
+        if (packing := packing_of(path, mesh)) is not None:
+            return grain_table(path, columns, packing[0], options)._replace(contacts=packing[1])
         if len(mesh.points) == 0:
             columns["radius"] = np.zeros(0)
         cell = _read_box(path)
@@ -143,8 +137,10 @@ class VtkReader:
             )
         if contacts.force is None:
             return contacts
-        rows, force = np.asarray(contacts.pairs), np.asarray(contacts.force, np.float64)
-        return contacts._replace(force=proved_force(path, grains, rows, force))
+        force = np.asarray(contacts.force, np.float64)
+        return contacts._replace(
+            force=proved_force(path, grains, np.asarray(contacts.pairs), force)
+        )
 
     def carries(self, path: Path) -> Carries:
         """LIGGGHTS writes a box beside its files; VTK itself has no cell."""
@@ -179,15 +175,15 @@ class VtkReader:
         kinds: dict[tuple[str, str, str], FileKind] = {}
         frames: dict[str | None, dict[tuple[str, str], Path]] = {}
         for entry in elements(index).iter("DataSet"):
-            path, part = file_inside(index, entry.get("file", "")), entry.get("part", "0")
-            time, group = entry.get("timestep"), entry.get("group", "")
+            path = file_inside(index, entry.get("file", ""))
+            part = entry.get("group", ""), entry.get("part", "0")
             # files of one name hold the same; some are boxes and contacts
-            family = re.sub(r"\d+", "*", path.name), group, part
+            family = re.sub(r"\d+", "*", path.name), *part
             if kinds.get(family, "other") == "other":
                 kinds[family] = self.kind(path)
             if kinds[family] not in ("grains", "points"):
                 continue
-            other = frames.setdefault(time, {}).setdefault((group, part), path)
+            other = frames.setdefault(entry.get("timestep"), {}).setdefault(part, path)
             if other is not path:
                 raise ReadError(
                     f"{index}: {other.name} and {path.name} have the same timestep, part and group"
@@ -199,6 +195,41 @@ class VtkReader:
                 f"{names['grains']}: take them out of the list, or name the files as the source"
             )
         return [_frame(index, time, *parts.values()) for time, parts in frames.items()]
+
+
+class FormsReader(VtkReader):
+    """Base class of readers for a program that writes other forms beside VTK."""
+
+    generic = False
+    forms: tuple[GrainsOnly, ...] = ()
+    """A reader for each of them."""
+
+    def form(self, path: Path) -> GrainsOnly | VtkReader:
+        """The reader of the form that a file has, by its first bytes; VTK's for all others."""
+        vtk: Any = super()
+        return next((form for form in self.forms if form.recognises(path)), vtk)
+
+    def kind(self, path: Path) -> FileKind:
+        """As the form says."""
+        return self.form(path).kind(path)
+
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """As the form says."""
+        return self.form(path).snapshots(path)
+
+    def carries(self, path: Path) -> Carries:
+        """As the form says."""
+        return self.form(path).carries(path)
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """As the form says."""
+        return self.form(snapshot.path).read_grains(snapshot, options)
+
+    def read_contacts(
+        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
+    ) -> JoinedContacts:
+        """As the form says."""
+        return self.form(snapshot.path).read_contacts(snapshot, options, grains)
 
 
 def _frame(index: Path, word: str | None, first: Path, *others: Path) -> Snapshot:

@@ -13,9 +13,9 @@ from __future__ import annotations
 import glob
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,9 +24,9 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.columns import grain_table, whole_numbers
 from scanfab.io.contacts import join_ids, rows_of_ids
 from scanfab.io.files import Stamp, bare_name, first_bytes, plain, stamp_of
-from scanfab.io.formats.shared import cell_of
+from scanfab.io.formats.shared import GrainsOnly, cell_of
 from scanfab.io.mesh import read_mesh
-from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
+from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ListedWallForces
 
@@ -49,77 +49,74 @@ ROUNDING = 1e-4
 PERIODIC = (True, True, True)
 
 
-def is_save(path: Path) -> bool:
-    """Whether a file is a simulation saved as XML."""
-    return b"<boost_serialization" in first_bytes(path)
+class SavedScene(GrainsOnly):
+    """The reader of what ``O.save`` writes."""
+
+    name = "yade's O.save"
+
+    def recognises(self, path: Path) -> bool:
+        """Any saved simulation, also as YADE's binary."""
+        head = first_bytes(path)
+        return b"<boost_serialization" in head or b"serialization::archive" in head[:64]
+
+    def kind(self, path: Path) -> FileKind:
+        """Grains, in XML."""
+        if b"<boost_serialization" not in first_bytes(path):
+            raise ReadError(
+                f"{path}: YADE's binary format can be read by the same build of YADE only: load it "
+                f"there, and save it as XML: O.save('name.xml.bz2')"
+            )
+        return "grains"
+
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """One, with step and time."""
+        head = first_bytes(path)
+        step, time = STEP.search(head), TIME.search(head)
+        return [Snapshot(path, step and int(step[1]), time and float(time[1]))]
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """Spheres with their ids and masks, the cell, and the real interactions."""
+        return _read_save(snapshot.path, options)
 
 
-def is_binary_save(path: Path) -> bool:
-    """Whether a file is a simulation saved as YADE's binary, which only the same build reads."""
-    head = first_bytes(path, 64)
-    return b"serialization::archive" in head and b"<" not in head
-
-
-def snapshot_of_save(path: Path) -> Snapshot:
-    """The one frame, with step and time."""
-    head = first_bytes(path)
-    step, time = STEP.search(head), TIME.search(head)
-    return Snapshot(path, step and int(step[1]), time and float(time[1]))
-
-
-def read_save(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-    """
-    Spheres with their ids and masks, the cell, and the real interactions.
-
-    Raises
-    ------
-    ReadError
-        If the file is not as YADE writes it.
-    """
-    path = snapshot.path
+def _read_save(path: Path, options: ReadOptions) -> GrainTable:
+    """What the elements of a saved simulation say; ReadError if they are not as YADE writes."""
     ids: list[float] = []
     spheres: list[list[float]] = []
     contacts: list[list[float]] = []
     # a class is spelled out once only, and named by its number afterwards
     shapes: dict[str, str] = {}
-    is_periodic, size = False, None
     try:
-        for element in _elements(path):
-            if element.tag == "isPeriodic":
-                is_periodic = (element.text or "").strip() == "1"
-            elif element.tag == "hSize":
-                size = [[_number(element, f"m{row}{k}") for row in range(3)] for k in range(3)]
-            elif element.find("iterMadeReal") is not None:
-                contacts.append(_contact(element))
-            else:
-                ids.append(_number(element, "id"))
-                if _shape(element, shapes) == "Sphere":
-                    spheres.append([_number(element, *one) for one in SPHERE.items()])
+        with open(plain(path), "rb") as stream:
+            parsed: Any = ElementTree.iterparse(stream)
+            for _, element in parsed:
+                # a contact, which stands in the first body that has it, or a body that is there
+                if element.tag != "px":
+                    continue
+                if element.find("iterMadeReal") is not None:
+                    contacts.append(_contact(element))
+                elif element.find("id") is not None and element.find("state") is not None:
+                    ids.append(_number(element, "id"))
+                    if _shape(element, shapes) == "Sphere":
+                        spheres.append([_number(element, *one) for one in SPHERE.items()])
+                else:
+                    continue
+                # memory never holds the whole file
+                element.clear()
+        scene = parsed.root
+        # the vectors of the cell are the columns of hSize
+        sides = [[_number(scene, f".//hSize/m{row}{k}") for row in range(3)] for k in range(3)]
     except (ElementTree.ParseError, LookupError, ValueError, OverflowError) as error:
         reason = f"cannot be read as a simulation that YADE saved (O.save): {error}"
         raise ReadError(f"{path}: {reason}") from None
-    # the vectors of the cell are the columns of hSize
-    cell = cell_of(path, size, PERIODIC, np.zeros(3)) if is_periodic and size else None
+    is_periodic = scene.findtext(".//isPeriodic") == "1"
+    cell = cell_of(path, sides, PERIODIC, np.zeros(3)) if is_periodic else None
     table = np.array(spheres).reshape(-1, 7)
     columns = dict(zip(("id", "mask", "clumpId", "radius"), table.T, strict=False))
     if np.all(columns["clumpId"] < 0):
         del columns["clumpId"]
     grains = grain_table(path, {**columns, "position": table[:, 4:]}, cell, options)
     return _with_contacts(path, grains, np.array(contacts).reshape(-1, 15), np.array(ids))
-
-
-def _elements(path: Path) -> Iterator[ElementTree.Element]:
-    """Bodies, contacts, ``hSize`` and ``isPeriodic``; memory never holds the whole file."""
-    with open(plain(path), "rb") as stream:
-        for _, element in ElementTree.iterparse(stream):
-            if element.tag in ("isPeriodic", "hSize"):
-                yield element
-            elif element.tag == "px":
-                # a contact, which stands in the first body that has it, or a body that is there
-                has = [element.find(name) is not None for name in ("iterMadeReal", "id", "state")]
-                if has[0] or all(has[1:]):
-                    yield element
-                    element.clear()
 
 
 def _shape(body: ElementTree.Element, shapes: dict[str, str]) -> str | None:
@@ -213,7 +210,7 @@ def cell_beside(path: Path, position: FloatArray) -> Cell | None:
         edges = corners[list(ENDS)] - corners[ORIGIN]
         cell = cell_of(file, edges, PERIODIC, corners[ORIGIN])
     else:
-        cell = read_save(snapshot_of_save(file), ReadOptions()).cell
+        cell = _read_save(file, ReadOptions()).cell
     if cell is None:
         return None
     fractions = cell.fractional(position)
@@ -248,7 +245,7 @@ def cell_file(path: Path) -> Path | None:
     saved = [
         file
         for file in folder.glob(f"{glob.escape(start)}*{step}.xml*")
-        if is_save(file) and snapshot_of_save(file).step == step
+        if SavedScene().snapshots(file)[0].step == step
     ]
     cells = _numbered(folder, f"{start}pericell.", stamp)
     return cells.get(step, saved[0] if len(saved) == 1 else None)

@@ -20,9 +20,10 @@ if TYPE_CHECKING:
     from scanfab.io.mesh import Mesh
 
 # step and time, as a comment in the first line, so that a series is listed without reading its
-# files; or as other programs and earlier versions write them, as text
-MOMENT = re.compile(
-    rb'(TimeValue|scanfab_step)(?:=|"[^>]*format="ascii"[^>]*>\s*)([-+.\deE]{1,30})(?=[\s<])'
+# files; or as other programs write them, as text
+STEP = re.compile(rb"scanfab_step=(-?\d{1,30})[\s<]")
+TIME = re.compile(
+    rb'TimeValue(?:=|"[^>]*format="ascii"[^>]*>\s*)([-+]?\d+\.?\d*(?:[eE][-+]?\d+)?)[\s<]'
 )
 # the elements of the arrays of the file as a whole are in its first bytes
 HEAD = 1 << 14
@@ -70,10 +71,10 @@ class VtpWriter:
         # a full disk is an OSError if VTK writes into memory first
         writer.WriteToOutputStringOn()
         writer.Write()
-        text = writer.GetOutputString()
-        said = [f"{FIELDS[one]}={frame[one]!r}" for one in ("step", "time") if one in frame]
-        mark = " ".join(["<!--", *said, "-->\n"])
-        path.write_bytes(mark.encode() + (text if isinstance(text, bytes) else text.encode()))
+        said = " ".join(f"{FIELDS[one]}={frame[one]!r}" for one in ("step", "time") if one in frame)
+        text: Any = writer.GetOutputString()
+        content = text if isinstance(text, bytes) else text.encode()
+        path.write_bytes(f"<!-- {said} -->\n".encode() + content)
         return Left(no_step=False, notes=tuple(arrays.notes))
 
 
@@ -85,9 +86,8 @@ def _array(name: str, values: npt.NDArray[Any]) -> Any:
     if values.dtype.kind == "U":
         array = vtkStringArray()
         array.SetNumberOfComponents(int(np.prod(values.shape[1:])))
-        array.SetNumberOfValues(values.size)
-        for place, word in enumerate(values.ravel().tolist()):
-            array.SetValue(place, word)
+        for word in values.ravel().tolist():
+            array.InsertNextValue(word)
     else:
         numbers = values.astype(np.uint8) if values.dtype.kind == "b" else values
         table = numbers.reshape(len(values), int(np.prod(values.shape[1:])))
@@ -98,12 +98,9 @@ def _array(name: str, values: npt.NDArray[Any]) -> Any:
 
 def moment_of(path: Path) -> tuple[int | None, float | None]:
     """Step and time, if they stand in the first bytes of a file."""
-    found = dict(MOMENT.findall(first_bytes(path, HEAD)))
-    step, time = found.get(b"scanfab_step"), found.get(b"TimeValue")
-    try:
-        return None if step is None else int(step), None if time is None else float(time)
-    except ValueError:
-        return None, None
+    head = first_bytes(path, HEAD)
+    step, time = STEP.search(head), TIME.search(head)
+    return step and int(step[1]), time and float(time[1])
 
 
 def says_all(path: Path) -> bool:
@@ -111,14 +108,11 @@ def says_all(path: Path) -> bool:
     return KNOWN.encode() in first_bytes(path, HEAD)
 
 
-def is_packing(mesh: Mesh) -> bool:
-    """Whether a file says all that there is to say, contacts and cell as well."""
-    return KNOWN in mesh.field_arrays
-
-
-def packing_of(path: Path, mesh: Mesh) -> tuple[Cell | None, ContactList | None]:
-    """The cell and the contacts of a packing; None if they are not known."""
+def packing_of(path: Path, mesh: Mesh) -> tuple[Cell | None, ContactList | None] | None:
+    """The cell and the contacts of a file that scanfab wrote; None for other files."""
     fields = mesh.field_arrays
+    if KNOWN not in fields:
+        return None
     cell = {name: fields[own] for name, own in FIELDS.items() if own in fields}
     contacts = contacts_of(mesh.lines, mesh.line_arrays) if np.any(fields[KNOWN]) else None
     return cell_of(path, cell), contacts

@@ -16,7 +16,9 @@ from tests.helpers.made.on_dem import COMPRESSION, FORCE, IDS, POSITION, draft_1
 
 @pytest.mark.parametrize("make", [draft_1, draft_2])
 def test_both_drafts_hold_the_same_packing(tmp_path, make):
-    packing = scanfab.read(make(tmp_path / "a.vtkhdf"))
+    """The signs are those of the draft."""
+    path = make(tmp_path / "a.vtkhdf")
+    packing, of_spheres = scanfab.read(path), scanfab.read(path, bodies="id").contacts
     np.testing.assert_array_equal(packing.position, POSITION)
     np.testing.assert_array_equal(packing.id, IDS)
     np.testing.assert_array_equal(packing.columns["clump_id"], [-1, 4, 4])
@@ -24,15 +26,8 @@ def test_both_drafts_hold_the_same_packing(tmp_path, make):
     # the pair of one clump is no contact, the virtual one neither, the wall's is counted
     np.testing.assert_array_equal(packing.contacts.pairs, [[0, 1]])
     np.testing.assert_array_equal(packing.wall_contacts, [1, 0, 0])
-    np.testing.assert_array_equal(packing.contacts.force, FORCE[:1])
-    np.testing.assert_array_equal(packing.contacts.force_n, COMPRESSION[:1])
-
-
-@pytest.mark.parametrize("make", [draft_1, draft_2])
-def test_signs_are_those_of_the_draft(tmp_path, make):
-    packing = scanfab.read(make(tmp_path / "a.vtkhdf"), bodies="id")
-    np.testing.assert_array_equal(packing.contacts.force, FORCE)
-    np.testing.assert_array_equal(packing.contacts.force_n, COMPRESSION[:2])
+    np.testing.assert_array_equal(of_spheres.force, FORCE)
+    np.testing.assert_array_equal(of_spheres.force_n, COMPRESSION[:2])
 
 
 def test_a_draft_whose_signs_are_not_known_is_refused(tmp_path):
@@ -57,60 +52,55 @@ def test_what_is_written_has_the_names_of_the_draft(tmp_path):
     assert mesh.n_verts == len(packing)
 
 
-def test_a_file_without_interactions_knows_no_contacts(tmp_path):
+def test_all_of_a_packing_comes_back_and_no_contacts_are_not_none_at_all(tmp_path):
+    packing = made_up_packings()["everything"]
+    (path,) = scanfab.convert(packing, tmp_path / "a.vtkhdf")
+    assert differences(packing, scanfab.read(path)) == []
     (path,) = scanfab.convert(made_up_packings()["plain"], tmp_path / "a.vtkhdf")
     assert scanfab.read(path).contacts is None
 
 
-def test_vtkhdf_of_other_programs_is_read_as_vtk(tmp_path):
+def test_vtkhdf_of_other_programs_is_read_as_vtk_and_other_hdf5_is_nobodys(tmp_path):
     with h5py.File(draft_1(tmp_path / "a.vtkhdf"), "a") as file:
         del file["ONDEM"]
     assert reader_for(tmp_path / "a.vtkhdf").name == "vtk"
     packing = scanfab.read(tmp_path / "a.vtkhdf")
     np.testing.assert_array_equal(packing.id, IDS)
     assert packing.contacts is None
-
-
-def test_other_hdf5_files_are_nobodys(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["x"] = np.ones(3)
     assert reader_for(tmp_path / "a.h5") is None
 
 
-def spoilt(file, what):
-    if what == "an external link":
-        file["VTKHDF/PointData/other"] = h5py.ExternalLink("other.h5", "/x")
-    elif what == "data in another file":
-        file.create_dataset("VTKHDF/PointData/z", (3,), "f8", external=[("z.bin", 0, 24)])
-    elif what == "virtual data":
-        layout = h5py.VirtualLayout((3,), "f8")
-        layout[:] = h5py.VirtualSource("other.h5", "x", (3,))
-        file.create_virtual_dataset("VTKHDF/PointData/z", layout)
-    elif what == "a bomb":
-        file.create_dataset("VTKHDF/PointData/z", (1 << 40,), "f8", chunks=(1 << 16,))
-    elif what == "other rows":
-        del file["VTKHDF/PointData/radius"]
-        file["VTKHDF/PointData/radius"] = np.ones(4)
-    else:
-        file.create_group("VTKHDF/Steps")
+def other_rows(group):
+    del group["radius"]
+    group["radius"] = np.ones(4)
 
 
-@pytest.mark.parametrize(
-    ("what", "reason"),
-    [
-        ("an external link", "stands in another file"),
-        ("data in another file", "stand in another file"),
-        ("virtual data", "stand in another file"),
-        ("a bomb", "Unable to allocate"),
-        ("other rows", "radius"),
-        ("steps in time", "steps in time"),
-    ],
-)
-def test_what_cannot_be_read_is_told(tmp_path, what, reason):
+def virtual_data(group):
+    layout = h5py.VirtualLayout((3,), "f8")
+    layout[:] = h5py.VirtualSource("other.h5", "x", (3,))
+    group.create_virtual_dataset("z", layout)
+
+
+SPOILT = {
+    "z stands in another file": lambda one: one.update({"z": h5py.ExternalLink("b.h5", "/x")}),
+    "data of .*z stand in another file": lambda one: one.create_dataset(
+        "z", (3,), "f8", external=[("z.bin", 0, 24)]
+    ),
+    "of VTKHDF/PointData/z stand in another": virtual_data,
+    "Unable to allocate": lambda one: one.create_dataset("z", (1 << 40,), "f8", chunks=(1 << 16,)),
+    "a radius for each": other_rows,
+    "steps in time": lambda one: one.parent.create_group("Steps"),
+}
+
+
+@pytest.mark.parametrize("reason", SPOILT)
+def test_what_cannot_be_read_is_told(tmp_path, reason):
     path = draft_1(tmp_path / "a.vtkhdf")
     (tmp_path / "z.bin").write_bytes(bytes(24))
     with h5py.File(path, "a") as file:
-        spoilt(file, what)
+        SPOILT[reason](file["VTKHDF/PointData"])
     with pytest.raises(ReadError, match=reason):
         scanfab.read(path)
 
@@ -118,9 +108,3 @@ def test_what_cannot_be_read_is_told(tmp_path, what, reason):
 def test_damaged_files_end_nothing(tmp_path):
     files = [draft_1(tmp_path / "a.vtkhdf")]
     check_reader(reader_named("on-dem"), files, tmp_path / "damaged", counts=True)
-
-
-def test_all_of_a_packing_comes_back(tmp_path):
-    packing = made_up_packings()["everything"]
-    (path,) = scanfab.convert(packing, tmp_path / "a.vtkhdf")
-    assert differences(packing, scanfab.read(path)) == []

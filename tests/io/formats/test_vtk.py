@@ -9,7 +9,6 @@ import pyvista
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
-from scanfab.io.reader import reader_for
 from tests.helpers.dumps import write
 from tests.helpers.truth import FLOOR
 
@@ -101,20 +100,14 @@ def test_lines_with_ids_name_grains_by_id(tmp_path):
     np.testing.assert_array_equal(packing.contacts.pairs, LINES[:, ::-1])
 
 
-@pytest.mark.parametrize("name", ["a.vtk", "a.vtp", "a.stl", "a.vti"])
-def test_walls_and_images_hold_no_grains(tmp_path, name):
-    wall, image = pyvista.Plane().triangulate(), pyvista.ImageData(dimensions=[3] * 3)
-    mesh = image if name == "a.vti" else wall
+@pytest.mark.parametrize("name", ["a.vtk", "a.vtp", "a.stl", "a.vti", "grid.vtk"])
+def test_walls_boxes_and_images_hold_no_grains(tmp_path, name):
+    others = {"a.vti": pyvista.ImageData(dimensions=[3] * 3), "grid.vtk": pyvista.RectilinearGrid()}
+    mesh = others.get(name, pyvista.Plane().triangulate())
     mesh["radius"] = np.ones(mesh.n_points)
     mesh.save(tmp_path / name)
     with pytest.raises(ReadError, match=r"no grains|no reader knows"):
         scanfab.read(tmp_path / name)
-
-
-@pytest.mark.parametrize("box", [pyvista.ImageData(dimensions=[2] * 3), pyvista.RectilinearGrid()])
-def test_boxes_are_neither_grains_nor_contacts(tmp_path, box):
-    box.save(tmp_path / "a.vtk")
-    assert reader_for(tmp_path / "a.vtk").kind(tmp_path / "a.vtk") == "other"
 
 
 @pytest.mark.parametrize("name", ["all_30000.vtm", "liggghts_simulation.pvd"])
@@ -126,37 +119,37 @@ def test_an_index_of_other_files_beside_the_grains_is_left_out(tmp_path, name):
     assert len(frame.read()) == 4
 
 
-def piece(path, count, points="", radius=""):
+def grid_without_cells(path, count, points="", radius=""):
     """XML as MercuryDPM writes it: a grid of points without cells, or without anything."""
-    root, more = ("PolyData", "Verts") if path.suffix == ".vtp" else ("UnstructuredGrid", "Cells")
     array = '<DataArray type="{}" Name="{}" NumberOfComponents="{}" format="ascii">{}</DataArray>'
     names = {"connectivity": "Int32", "offsets": "Int32", "types": "UInt8"}
     cells = "".join(array.format(type, name, 1, "") for name, type in names.items())
     return write(
         path,
-        f'<VTKFile type="{root}" version="0.1" byte_order="LittleEndian"><{root}>'
-        f'<Piece NumberOfPoints="{count}" NumberOf{more}="0">'
+        '<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian">'
+        f'<UnstructuredGrid><Piece NumberOfPoints="{count}" NumberOfCells="0">'
         f"<PointData>{array.format('Float32', 'Radius', 1, radius)}</PointData>"
-        f"<Points>{array.format('Float32', 'Position', 3, points)}</Points><{more}>{cells}</{more}>"
-        f"</Piece></{root}></VTKFile>",
+        f"<Points>{array.format('Float32', 'Position', 3, points)}</Points><Cells>{cells}</Cells>"
+        "</Piece></UnstructuredGrid></VTKFile>",
     )
 
 
-def test_a_grid_of_points_without_cells_is_a_cloud(tmp_path):
-    packing = scanfab.read(piece(tmp_path / "a.vtu", 2, "0 0 0 1 0 0", "0.5 0.5"))
-    np.testing.assert_array_equal(packing.radius, [0.5, 0.5])
-
-
-@pytest.mark.parametrize("ending", [".vtp", ".vtu", ".vtk"])
-def test_an_empty_frame_has_no_grains(tmp_path, ending, capfd):
-    path = tmp_path / f"a{ending}"
-    if ending == ".vtk":
-        text = "# vtk DataFile Version 3.0\nframe\nASCII\nDATASET POLYDATA\nPOINTS 0 float\n"
-        write(path, f"{text}POINT_DATA 0\nSCALARS Radius float 1\nLOOKUP_TABLE default\n")
-    else:
-        piece(path, 0)
-    assert len(scanfab.read(path)) == 0
+def test_a_grid_of_points_without_cells_is_a_cloud_and_may_be_empty(tmp_path, capfd):
+    path = grid_without_cells(tmp_path / "a.vtu", 2, "0 0 0 1 0 0", "0.5 0.5")
+    np.testing.assert_array_equal(scanfab.read(path).radius, [0.5, 0.5])
+    assert len(scanfab.read(grid_without_cells(path, 0))) == 0
+    text = "# vtk DataFile Version 3.0\nframe\nASCII\nDATASET POLYDATA\nPOINTS 0 float\n"
+    text += "POINT_DATA 0\nSCALARS Radius float 1\nLOOKUP_TABLE default\n"
+    assert len(scanfab.read(write(tmp_path / "a.vtk", text))) == 0
     assert capfd.readouterr() == ("", "")
+
+
+def test_arrays_of_a_vertex_at_each_point_are_those_of_the_points(tmp_path):
+    cells, more = [("vertex", np.arange(4)[:, None])], {"coordNumber": [np.arange(4)]}
+    mesh = meshio.Mesh(POSITION, cells, point_data={"radius": RADIUS}, cell_data=more)
+    mesh.write(tmp_path / "a.vtu")
+    packing = scanfab.read(tmp_path / "a.vtu")
+    np.testing.assert_array_equal(packing.columns["coordNumber"], range(4))
 
 
 @pytest.mark.parametrize(("sign", "grain"), [(1, "second"), (-1, "first")])

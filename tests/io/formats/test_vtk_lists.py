@@ -121,19 +121,22 @@ def test_the_parts_of_one_time_are_one_frame(tmp_path, one):
     np.testing.assert_array_equal(alone.read().id, packings[1].id)
 
 
-def test_parts_that_number_their_grains_alike_are_refused(tmp_path):
-    names = [cloud(tmp_path / f"{part}.vtp", [0, 1]).name for part in "ab"]
-    entries = [(name, f'timestep="1" part="{k}"') for k, name in enumerate(names)]
-    with pytest.raises(scanfab.ScanfabError, match=r"ids|twice"):
+@pytest.mark.parametrize(
+    ("names", "more", "told"),
+    [
+        (("a", "b"), ('timestep="5"', 'timestep="5"'), r"a\.vtp and b\.vtp have the same timestep"),
+        (("a", "b"), ('group="g"', 'group="g"'), r"a\.vtp and b\.vtp have the same timestep"),
+        (("a", "b"), ('part="0"', 'part="1"'), r"ids|twice"),
+        (("a", "points"), ('part="0"', 'part="1"'), r"points\.vtp are points without a radius"),
+    ],
+)
+def test_files_that_are_not_parts_of_one_frame_are_refused(tmp_path, names, more, told):
+    for name in "ab":
+        cloud(tmp_path / f"{name}.vtp", [0, 1])
+    pyvista.PolyData(POSITION).save(tmp_path / "points.vtp")
+    entries = zip((f"{name}.vtp" for name in names), more, strict=True)
+    with pytest.raises(scanfab.ScanfabError, match=told):
         scanfab.read(collection(tmp_path / "run.pvd", *entries))
-
-
-@pytest.mark.parametrize("more", ['timestep="5"', 'timestep="5" part="1"', 'group="g"'])
-def test_one_part_of_one_time_is_listed_once(tmp_path, more):
-    names = [cloud(tmp_path / f"{part}.vtp", [0, 1]).name for part in "ab"]
-    path = collection(tmp_path / "run.pvd", *((name, more) for name in names))
-    with pytest.raises(ReadError, match=r"a\.vtp and b\.vtp have the same timestep"):
-        scanfab.read(path)
 
 
 @pytest.mark.parametrize("more", ["", 'group="" part="0" timestep="7"'])
@@ -142,20 +145,3 @@ def test_a_list_of_one_file_is_a_frame(tmp_path, more):
     packing = scanfab.read(collection(tmp_path / "run.pvd", ("a_3.vtp", more)))
     assert (len(packing), packing.step) == (3, 3)
     assert packing.time == (7.0 if "timestep" in more else None)
-
-
-def test_a_part_that_says_all_of_a_frame_is_joined_with_no_other(tmp_path):
-    for part in range(2):
-        packing = scanfab.Packing(POSITION, 1.0, id=np.arange(4) + 10 * part, contacts=[[0, 1]])
-        scanfab.convert(packing, tmp_path / f"p{part}.vtp")
-    entries = [(f"p{part}.vtp", f'timestep="0" part="{part}"') for part in range(2)]
-    with pytest.raises(ReadError, match=r"cannot be joined with p1\.vtp of the same timestep"):
-        scanfab.read(collection(tmp_path / "run.pvd", *entries))
-
-
-def test_points_without_a_radius_are_no_part_of_a_frame(tmp_path):
-    cloud(tmp_path / "grains.vtp", [0, 1])
-    pyvista.PolyData(POSITION).save(tmp_path / "points.vtp")
-    entries = [(f"{name}.vtp", f'part="{name}"') for name in ("grains", "points")]
-    with pytest.raises(ReadError, match=r"points\.vtp are points without a radius"):
-        scanfab.read(collection(tmp_path / "run.pvd", *entries))

@@ -62,10 +62,7 @@ def test_every_form_gives_the_same_grains(name):
         np.testing.assert_array_equal(packing.id, TRUE_BODIES["id"])
 
 
-@pytest.mark.parametrize(
-    "name",
-    [PERIODIC_SPHERES, "periodic_x_y_z_r.txt", "periodic_id_x_y_z_r_matId.txt", PACK],
-)
+@pytest.mark.parametrize("name", [PERIODIC_SPHERES, "periodic_id_x_y_z_r_matId.txt", PACK])
 def test_the_periodic_grains_are_the_same_in_every_form(name):
     packing = scanfab.read(YADE / name, cell=None if name == PACK else CELL)
     np.testing.assert_allclose(packing.radius, PERIODIC_BODIES["r"], rtol=SIX_DIGITS)
@@ -116,21 +113,17 @@ def test_contacts_are_joined_by_place_where_there_are_no_ids(
 
 @pytest.mark.parametrize("contacts", EXPORTED + RECORDED)
 def test_contacts_with_facets_and_boxes_are_counted_where_they_are_written(contacts):
-    packing = scanfab.read(YADE / "id-spheres-00000000.vtk.gz", contacts=YADE / contacts)
+    packing = scanfab.read(YADE / HEAP[1], contacts=YADE / contacts)
     expected = np.bincount(TRUE_WALLS["sphere"], minlength=200)[packing.id]
-    assert expected.sum() == 107
-    expected *= contacts in EXPORTED
-    np.testing.assert_array_equal(packing.wall_contacts, expected)
+    np.testing.assert_array_equal(packing.wall_contacts, expected * (contacts in EXPORTED))
 
 
 def test_the_periodic_force_acts_on_the_second_body():
     contacts = YADE / PERIODIC_INTRS
     packing = scanfab.read(YADE / PERIODIC_SPHERES, contacts=contacts, cell=CELL)
-    assert packing.contacts.force is not None
     expected = true_vectors(PERIODIC_CONTACTS, "f")
     assert_same_vectors(forces_by_pair(packing), expected, atol=2e-4)
-    push = np.sum(packing.contacts.force * packing.contacts.normal, axis=1)
-    assert np.all(push > 0)
+    assert np.all(np.sum(packing.contacts.force * packing.contacts.normal, axis=1) > 0)
 
 
 def test_normal_and_shear_force_add_up(tmp_path):
@@ -142,7 +135,10 @@ def test_normal_and_shear_force_add_up(tmp_path):
     np.testing.assert_array_equal(packing.contacts.force, [[2, 3, 0]])
 
 
-def test_a_normal_force_alone_is_not_taken_for_the_whole():
+def test_the_normal_force_of_the_recorder_is_a_number_and_none_of_its_own_is_the_whole():
+    packing = scanfab.read(YADE / HEAP[1], contacts=YADE / RECORDED[1])
+    assert packing.contacts.force is None
+    assert packing.contacts.force_n.shape == (271,)
     assert scanfab.read(YADE / HEAP[1], contacts=YADE / EXPORTED[1]).contacts.force is None
 
 
@@ -163,14 +159,19 @@ def test_lines_to_images_without_a_cell_are_not_taken_for_walls(tmp_path):
         scanfab.read(spheres, contacts=lines)
 
 
-@pytest.mark.parametrize("name", ["ascii_boxes.30000.vtu", "zlib_facets.30000.vtu"])
-def test_boxes_and_facets_are_neither_grains_nor_contacts(name):
-    assert reader_for(YADE / name).kind(YADE / name) == "other"
-
-
-@pytest.mark.parametrize("name", [HEAP[1], *EXPORTED, *RECORDED, "text.txt", PACK])
-def test_yades_own_files_are_yades(name):
-    assert reader_for(YADE / name).name == "yade"
+@pytest.mark.parametrize(
+    ("name", "reader", "kind"),
+    [
+        ("ascii_boxes.30000.vtu", "vtk", "other"),
+        ("zlib_facets.30000.vtu", "vtk", "other"),
+        (HEAP[1], "yade", "grains"),
+        (PACK, "yade", "grains"),
+        *((name, "yade", "contacts") for name in EXPORTED[1:] + RECORDED),
+    ],
+)
+def test_what_a_file_holds(name, reader, kind):
+    found = reader_for(YADE / name)
+    assert (found.name, found.kind(YADE / name)) == (reader, kind)
 
 
 @pytest.mark.parametrize("format", ["yade", None])
@@ -183,22 +184,13 @@ def test_values_of_lost_contacts_are_refused_with_advice(tmp_path, name, format)
         scanfab.read(YADE / "id-spheres-00000000.vtk.gz", contacts=contacts, format=format)
 
 
-def test_other_line_ends_do_not_matter(tmp_path):
-    path = write(tmp_path / "a.txt", "#format x_y_z_r\r\n1\t2\t3\t0.5\r\n2\t2\t3\t0.5\r\n")
-    np.testing.assert_array_equal(scanfab.read(path).position, [[1, 2, 3], [2, 2, 3]])
-
-
 def test_attributes_have_the_names_of_the_second_line_or_are_numbered(tmp_path):
     assert sorted(scanfab.read(YADE / "x_y_z_r_attrs.txt").columns) == ["mask", "vx", "vy", "vz"]
-    path = write(tmp_path / "a.txt", "#format x_y_z_r_attrs\n1\t2\t3\t0.5\t7\t8\n")
+    path = write(tmp_path / "a.txt", "#format x_y_z_r_attrs\r\n1\t2\t3\t0.5\t7\t8\r\n")
     assert sorted(scanfab.read(path).columns) == ["attr1", "attr2"]
     write(path, "#format x_y_z_r_clumpId\n1\t2\t3\t0.5\t7\n")
     np.testing.assert_array_equal(scanfab.read(path).columns["clumpId"], [7])
-
-
-def test_a_text_without_grains_is_an_empty_frame(tmp_path, recwarn):
-    assert len(scanfab.read(write(tmp_path / "a.txt", "#format x_y_z_r\n"))) == 0
-    assert not recwarn.list
+    assert len(scanfab.read(write(path, "#format x_y_z_r\n"))) == 0
 
 
 @pytest.mark.parametrize(
@@ -208,7 +200,7 @@ def test_a_text_without_grains_is_an_empty_frame(tmp_path, recwarn):
         ("#format x_y_z_r\n1 2 3 oops\n", "a.txt, line 2: .*oops"),
         ("#format x_y_z_r\n1 2 3 1\n1 2 3\n", "a.txt, line 3: expected 4 columns"),
         ("#format x_y_z_r\n# a comment\n0 0 0 1\n3 x 0 1\n", "a.txt, line 4: .*'x'"),
-        ("##PERIODIC:: 1 2\n1 2 3 1\n", "line 1: expected three lengths"),
+        ("##PERIODIC:: 1 2\n1 2 3 1\n", "line 1: expected 3 numbers"),
         ("##PERIODIC:: 1 2 0\n1 2 3 1\n", "a.txt"),
     ],
 )
@@ -217,6 +209,7 @@ def test_a_text_that_cannot_be_read_says_why(tmp_path, text, message):
         scanfab.read(write(tmp_path / "a.txt", text))
 
 
-def test_a_text_holds_no_contacts():
+@pytest.mark.parametrize("name", ["x_y_z_r.txt", "periodic.xml.bz2"])
+def test_a_file_of_grains_holds_no_contacts_of_others(name):
     with pytest.raises(ReadError, match="expected contacts, found grains"):
-        scanfab.read(YADE / "text.txt", contacts=YADE / "x_y_z_r.txt")
+        scanfab.read(YADE / "text.txt", contacts=YADE / name)

@@ -40,12 +40,9 @@ def test_every_frame_has_its_own_cell_and_all_contacts(pattern):
         assert abs(len(geometric) - contacts) <= 3
 
 
-def test_contacts_of_the_exporter_come_along():
+def test_contacts_of_the_exporter_come_along_and_one_file_has_its_own_cell():
     found = [len(packing.contacts) for packing in frames("after-spheres-*")]
     assert found == TRUTH["contacts"].tolist() == [261, 260, 256]
-
-
-def test_one_file_has_the_cell_of_its_own_frame():
     packing = scanfab.read(STRAINED / "after-spheres-00000001.vtk.gz")
     np.testing.assert_allclose(packing.cell.vectors, vectors()[1], rtol=0, atol=1e-7)
 
@@ -70,10 +67,20 @@ def test_the_cell_of_another_frame_is_refused(tmp_path):
         scanfab.read(tmp_path / "lone-spheres-00000000.vtk.gz")
 
 
-def test_a_saved_state_of_another_step_is_not_taken(tmp_path):
-    shutil.copy(STRAINED / "saved_spheres.27500.vtu", tmp_path)
-    shutil.copy(STRAINED / "saved_17500.xml.bz2", tmp_path / "saved_27500.xml.bz2")
-    assert scanfab.read(tmp_path / "saved_spheres.27500.vtu").cell is None
+@pytest.mark.parametrize(
+    ("spheres", "own", "saved"),
+    [
+        ("saved_spheres.27500.vtu", "saved_spheres.27500.vtu", "saved_27500.xml.bz2"),
+        # the exporter counts its files: their numbers are no steps
+        ("after-spheres-00000001.vtk.gz", "x-spheres-00017500.vtk.gz", "x_17500.xml.bz2"),
+    ],
+)
+def test_a_saved_state_of_another_step_is_not_taken(tmp_path, spheres, own, saved):
+    shutil.copy(STRAINED / spheres, tmp_path / own)
+    shutil.copy(STRAINED / "saved_17500.xml.bz2", tmp_path / saved)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", "the cell is read from")
+        assert scanfab.read(tmp_path / own).cell is None
 
 
 def test_the_user_s_own_cell_comes_first():
@@ -131,13 +138,3 @@ def test_a_csv_file_of_cells_that_is_wrong_is_an_error_that_says_where(tmp_path,
     path.write_text(text)
     with pytest.raises(ReadError, match=f"cells.csv.*{message}"):
         scanfab.read_series(STRAINED / "rec_spheres.*", cell=path)
-
-
-def test_a_saved_state_is_no_cell_of_the_exporters_files_which_are_counted(tmp_path):
-    """Number 0 of the exporter is its first file, that of O.save the step 0 of the simulation."""
-    spheres = tmp_path / "x-spheres-00017500.vtk.gz"
-    shutil.copy(STRAINED / "after-spheres-00000001.vtk.gz", spheres)
-    shutil.copy(STRAINED / "saved_17500.xml.bz2", tmp_path / "x_17500.xml.bz2")
-    with warnings.catch_warnings():
-        warnings.filterwarnings("error", "the cell is read from")
-        assert scanfab.read(spheres).cell is None
