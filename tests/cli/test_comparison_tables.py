@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-
 from scanfab.cli.comparison_tables import print_comparison
+
 from scanfab.table.compare import compare_tables
 from tests.helpers.tables import curve, sheared
 
