@@ -28,7 +28,7 @@ from scanfab.pipeline.frames import Frames, Readable, Source
 from scanfab.pipeline.maps.frame import map_frame
 from scanfab.pipeline.plan import Plan, make_plan, plan_without_grains
 from scanfab.pipeline.settings import MAX_CHORDS, Settings
-from scanfab.pipeline.strain import Flips, Strains
+from scanfab.pipeline.strain import Flips
 from scanfab.pipeline.told import heard_by_thread
 from scanfab.scan.directions import DirectionRule
 from scanfab.table.row import Row
@@ -247,14 +247,15 @@ class _Run:
     def _plan(self) -> Plan:
         """Settings end here."""
         settings = self.frames.settings
-        strains = Strains.of(settings)
+        # an error in a file of strains comes before the first frame
+        plan = plan_without_grains(settings)
         first = self.frames.first()
         if first is None:
-            return plan_without_grains(settings)
+            return plan
         self.has_grains = True
         _, frame, sample = first
         tell(self.frames.notes(frame, sample))
-        plan = make_plan(settings, sample, strains)
+        plan = make_plan(settings, sample)
         tell(plan.notes)
         return plan
 

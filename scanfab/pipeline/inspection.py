@@ -35,36 +35,18 @@ class FrameReport(Record):
     boundary: Annotated[int, "number of boundary particles"]
     radius_min: Annotated[float | None, "smallest radius of a grain", LENGTH]
     radius_max: Annotated[float | None, "largest radius of a grain", LENGTH]
-    contacts: Annotated[
-        int,
-        "all that are listed or found by geometry, with boundary particles too",
-    ]
+    contacts: Annotated[int, "listed or found by geometry, those with boundary particles too"]
     contacts_from: Annotated[str, "file or geometric"]
     rattlers: Annotated[int, "grains with too few contacts; of clumps, with too few neighbours"]
-    coordination: Annotated[
-        float | None, "mean number of contacts of a grain; of clumps, neighbours"
-    ]
+    coordination: Annotated[float | None, "mean number of contacts, of clumps of neighbours"]
     cell: Annotated[list[list[float]] | None, "the lattice vectors, by rows", LENGTH]
     periodic: Annotated[list[bool] | None, "whether the sample repeats along each of them"]
-    columns: Annotated[
-        list[str],
-        "what the dump says of each particle; what is not standard by its own name",
-    ]
+    columns: Annotated[list[str], "of the particles; those that are not standard by their names"]
     warnings: Annotated[list[str], "what is doubtful"]
-    low: Annotated[
-        list[float] | None,
-        "corner of the box of the grains' surfaces, x y z; grains that flew away left out",
-        LENGTH,
-    ]
+    low: Annotated[list[float] | None, "corner of the box of the gathered grains' surfaces", LENGTH]
     high: Annotated[list[float] | None, "the opposite corner", LENGTH]
-    rv_center: Annotated[
-        list[float] | None,
-        "centre of the RV, which is that of the series' first frame that has grains",
-        LENGTH,
-    ]
-    rv_radius: Annotated[
-        float | None, "its radius; of a shape that is no sphere, of the ball that holds it", LENGTH
-    ]
+    rv_center: Annotated[list[float] | None, "centre of the RV of the series", LENGTH]
+    rv_radius: Annotated[float | None, "radius of the ball that holds the RV", LENGTH]
     rv_shape: Annotated[str | None, "its shape and size in words"]
     clumps: Annotated[int, "grains that are bodies of several spheres"]
     spheres: Annotated[int, "that the grains are made of"]
@@ -105,15 +87,29 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
 
 
 def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
-    """A frame, and what is doubtful about it."""
+    """A frame, and what is doubtful about it, also what makes it impossible to measure."""
+    told = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         sample = frames.read(frame)
     for one in caught:
         if issubclass(one.category, ScanfabNote):
             warnings.warn(one.message, stacklevel=2)
-    told = [str(one.message) for one in caught if not issubclass(one.category, ScanfabNote)]
-    return sample, [*told, *_hints(frame, sample, frames.settings)]
+        else:
+            told.append(str(one.message))
+    if len(sample.packing):
+        told += [one.text for one in boundary_hints(sample, frames.settings)]
+    try:
+        refuse_impossible(sample)
+    except PackingError as error:
+        told.append(str(error))
+    told += [one.text for one in doubts_of(sample, **frame.named)]
+    if no_cell := cell_doubt(sample, frame.carries):
+        told.append(no_cell)
+    elif hint := cell_hint(sample, frame.carries):
+        note(hint)
+    told += [one.text for one in sample.doubts_of_escaped()]
+    return sample, told
 
 
 def _rv(frames: Frames, sample: Sample) -> Window | None:
@@ -125,17 +121,11 @@ def _rv(frames: Frames, sample: Sample) -> Window | None:
 
 
 def _report(
-    source: str,
-    number: int,
-    frame: Frame,
-    sample: Sample,
-    told: list[str],
-    window: Window | None,
+    source: str, number: int, frame: Frame, sample: Sample, told: list[str], window: Window | None
 ) -> FrameReport:
-    packing, grains = sample.packing, sample.grains
+    packing, grains, cell = sample.packing, sample.grains, sample.packing.cell
     radius = packing.radius[grains]
     box = SurfaceBox.of(packing, sample.gathered) if grains.any() else None
-    cell = packing.cell
     return FrameReport(
         source=source,
         frame=number,
@@ -162,19 +152,3 @@ def _report(
         clumps=sample.clumps,
         spheres=int(grains.sum()),
     )
-
-
-def _hints(frame: Frame, sample: Sample, settings: Settings) -> list[str]:
-    """What looks wrong, also what makes the frame impossible to measure."""
-    hints = [one.text for one in boundary_hints(sample, settings)] if len(sample.packing) else []
-    try:
-        refuse_impossible(sample)
-    except PackingError as error:
-        hints.append(str(error))
-    no_cell = cell_doubt(sample, frame.carries)
-    hints += [one.text for one in doubts_of(sample, **frame.named)]
-    hints += [no_cell] if no_cell else []
-    hints += [one.text for one in sample.doubts_of_escaped()]
-    if not no_cell and (hint := cell_hint(sample, frame.carries)):
-        note(hint)
-    return hints

@@ -76,35 +76,36 @@ class Plan:
     rvs: tuple[RV, ...]
     """Of the first frame that has grains, if :meth:`in_frame` has not put others in their place, in
     ascending order; the first is scanned until its tolerance holds, the others along its lines."""
-    deformation: Deformation | None
-    """What the windows follow."""
     more_columns: tuple[str, ...]
     """Of the table, behind those that it always has."""
     groups: tuple[str, ...]
     """Of further columns, see :data:`scanfab.fabric.registry.GROUPS`."""
-    cutoff: float
-    """Of the scan that is to meet the tolerance."""
     cutoffs: tuple[float, ...]
     """Of the table's rows, in ascending order."""
     rule: DirectionRule
-    spacing: float
-    """Between the lines of one axis and replicate."""
-    replicates: int
-    """Of a fixed scan; of the first round of an auto scan."""
-    auto: str
-    """What the scan may add to meet the tolerance: ``""``, ``replicates`` or ``directions``."""
     rule_is_asked_for: bool
     """Then an auto scan keeps it."""
     edge: str
     """What counts at the window's surface, see :mod:`scanfab.scan.edges`."""
     lists_gaps: bool
     """Whether sums for one cut-off do not suffice."""
-    map_settings: MapSettings | None = None
+    map_settings: MapSettings | None
     """Of a map; else None."""
+    space: Space
+    """The plane in which all grains of the series lie, if they are discs."""
+    # what follows is not known of a series without grains
+    cutoff: float = math.nan
+    """Of the scan that is to meet the tolerance."""
+    spacing: float = math.nan
+    """Between the lines of one axis and replicate."""
+    replicates: int = 0
+    """Of a fixed scan; of the first round of an auto scan."""
+    auto: str = ""
+    """What the scan may add to meet the tolerance: ``""``, ``replicates`` or ``directions``."""
+    deformation: Deformation | None = None
+    """What the windows follow."""
     map_blocks: MapBlocks | None = None
     """Of a map whose series has grains: what its blocks tile."""
-    space: Space = SPACE
-    """The plane in which all grains of the series lie, if they are discs."""
     notes: tuple[Note, ...] = ()
     """What is doubtful about the settings, for a user who has chosen them."""
 
@@ -139,7 +140,36 @@ class Plan:
             yield replace(self, rvs=(rv,), variants=variants, replicates=replicates, auto="")
 
 
-def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None) -> Plan:
+def plan_without_grains(settings: Settings, space: Space = SPACE) -> Plan:
+    """
+    What settings say by themselves.
+
+    That is the plan of a series without any grain: its frames have rows, but nothing is scanned.
+    """
+    return Plan(
+        samples=sample_rule(settings),
+        strains=Strains.of(settings),
+        variants=settings.variants,
+        axis=settings.axis,
+        moment=settings.moment,
+        seed=settings.seed,
+        workers=settings.workers,
+        tolerance=settings.tolerance,
+        max_chords=settings.max_chords,
+        rvs=sizes_of(settings),
+        more_columns=settings.more_columns,
+        groups=settings.with_,
+        cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),
+        rule=settings.directions or usual_rule(space),
+        rule_is_asked_for=settings.directions is not None,
+        edge=settings.edge,
+        lists_gaps=settings.lists_gaps,
+        map_settings=settings if isinstance(settings, MapSettings) else None,
+        space=space,
+    )
+
+
+def make_plan(settings: Settings, sample: Sample) -> Plan:
     """
     Resolve settings with the first frame that has grains.
 
@@ -149,8 +179,6 @@ def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None
         Nothing behind the plan sees them.
     sample : Sample
         The first frame that has grains.
-    strains : Strains, optional
-        What the settings say of strains, if that has been looked up already.
 
     Raises
     ------
@@ -160,51 +188,41 @@ def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None
         If the packing cannot be measured.
     """
     refuse_impossible(sample)
-    space = sample.packing.space
-    settings = settings_in(settings, space)
-    grains = sample.grains
-    radii = sample.packing.radius[grains]
-    lengths = {
-        "rmin": float(radii.min()),
-        "rmean": float(radii.mean()),
-        "rmax": float(radii.max()),
-    }
+    settings = settings_in(settings, sample.packing.space)
+    plan = plan_without_grains(settings, sample.packing.space)
+    radii = sample.packing.radius[sample.grains]
+    r_min, r_mean, r_max = float(radii.min()), float(radii.mean()), float(radii.max())
+    lengths = {"rmin": r_min, "rmean": r_mean, "rmax": r_max}
     box = SurfaceBox.of(sample.packing, sample.gathered)
-    strains = replace(strains or Strains.of(settings), axis=settings.axis)
-    plan = _without_lengths(settings, strains, space)
-    notes: list[Note] = []
     windows = windows_of(sample, settings) if settings.needs_window else []
-    for window in windows:
-        notes += doubts_of_rv(window, sample, box, lengths["rmax"])
+    notes = [one for window in windows for one in doubts_of_rv(window, sample, box, r_max)]
     blocks: MapBlocks | None = None
     if isinstance(settings, MapSettings):
         blocks = map_blocks(settings, sample)
-        notes += blocks.doubts(sample, next(iter(windows), None), lengths["rmean"])
-    scanned = _scanned(box, windows[0].shape if windows else None)
-    rule = plan.rule
-    if rule.bias > 0.1 * settings.tolerance:
-        text = f"directions {rule.name}: an isotropic sample would get alpha = {rule.bias:.2g}"
+        notes += blocks.doubts(sample, next(iter(windows), None), r_mean)
+    if plan.rule.bias > 0.1 * settings.tolerance:
+        text = (
+            f"directions {plan.rule.name}: an isotropic sample would get "
+            f"alpha = {plan.rule.bias:.2g}"
+        )
         notes.append(Note("biased_directions", text))
+    deformation = None
+    if settings.rv_follows != "none" and settings.needs_window:
+        deformation = Deformation.since(sample, settings.strain, settings.axis)
     cutoff = settings.cutoff.resolve(lengths)
     # as many as were asked for, also if two are equal: every frame has the same number of rows
     cutoffs = tuple(sorted(one.resolve(lengths) for one in settings.cutoffs)) or (cutoff,)
     return replace(
         plan._with(windows),
         strains=plan.strains.since(sample),
-        deformation=_deformation(settings, sample),
+        deformation=deformation,
         max_chords=plan.max_chords * _share_of_first(windows, settings),
         cutoff=cutoff,
         cutoffs=cutoffs,
         map_blocks=blocks,
         notes=tuple(notes),
-        **_lines(settings, rule, scanned, lengths),
+        **_lines(settings, len(plan.rule), box, windows[0].shape if windows else None, lengths),
     )
-
-
-def _deformation(settings: Settings, sample: Sample) -> Deformation | None:
-    if settings.rv_follows == "none" or not settings.needs_window:
-        return None
-    return Deformation.since(sample, settings.strain, settings.axis)
 
 
 def _share_of_first(windows: Sequence[Window], settings: Settings) -> float:
@@ -218,102 +236,54 @@ def _share_of_first(windows: Sequence[Window], settings: Settings) -> float:
     return volumes[0] / sum(volumes)
 
 
-class _Scanned(NamedTuple):
-    """How large is what lines scan: the window, or of the whole half the smallest extent."""
-
-    reach: float
-    area: float
-    """That lines of one direction pierce, in the mean of all; in a plane a length."""
-    depth: float
-    """Three quarters of the mean length of the lines in it: of a sphere the radius."""
-    space: Space
-
-
-def _scanned(box: SurfaceBox, window: Convex | None) -> _Scanned:
-    space = box.space
-    if space.is_plane:
-        window = window or circle(0.5 * box.smallest_extent, space)
-    elif window is None or window.is_sphere:
-        reach = 0.5 * box.smallest_extent if window is None else window.reach
-        return _Scanned(reach, math.pi * reach**2, reach, space)
-    area = window.mean_shadow
-    return _Scanned(window.reach, area, 0.75 * window.volume / area, space)
-
-
 def _lines(
-    settings: Settings, rule: DirectionRule, scanned: _Scanned, lengths: dict[str, float]
+    settings: Settings, axes: int, box: SurfaceBox, shape: Convex | None, lengths: dict[str, float]
 ) -> dict[str, Any]:
     """How close the lines are, in how many replicates, and what an auto scan may add."""
-    reach = scanned.reach
+    space = box.space
+    reach, area, depth = _scanned(box, shape)
     if settings.spacing is None:
-        spacing = _auto_spacing(settings, len(rule), scanned, lengths)
+        spacing = _auto_spacing(settings, axes, area, depth, lengths["rmean"], space)
         return {"spacing": spacing, "replicates": REPLICATES, "auto": "replicates"}
     asked = settings.spacing.resolve(lengths)
-    if asked > 2.0 * reach:
-        what = "RV" if settings.needs_window else "sample"
+    if not CLOSEST * reach <= asked <= 2.0 * reach:
         raise SettingsError(
-            f"spacing: {asked:g} between lines is more than the {what} is wide ({2.0 * reach:g}): "
-            f"lengths are in the dump's unit; did you mean 1rmin ({lengths['rmin']:g})?"
+            f"spacing: expected a length from {CLOSEST * reach:.2g} to {2.0 * reach:.4g}, the "
+            f"width of what is scanned, found {asked:g}: lengths are in the dump's unit; did you "
+            f"mean 1rmin ({lengths['rmin']:g})?"
         )
-    if asked < CLOSEST * reach:
-        raise SettingsError(
-            f"spacing: {asked:g} between lines is less than {CLOSEST:g} of the radius of what they "
-            f"scan ({reach:g}): choose a wider spacing"
-        )
-    lines = scanned.space.lines(scanned.area, asked)
     auto = "directions" if settings.directions is None else ""
     fewest, most = (REPLICATES, MOST_REPLICATES) if auto else (1, REPLICATES)
-    replicates = int(min(max(lines / FEWEST_LINES, fewest), most))
-    spacing = asked * scanned.space.apart(replicates)
-    return {"spacing": spacing, "replicates": replicates, "auto": auto}
+    replicates = int(min(max(space.lines(area, asked) / FEWEST_LINES, fewest), most))
+    return {"spacing": asked * space.apart(replicates), "replicates": replicates, "auto": auto}
 
 
-def plan_without_grains(settings: Settings) -> Plan:
-    """The plan of a series without any grain: its frames have rows, but nothing is scanned."""
-    return _without_lengths(settings, Strains.of(settings))
+def _scanned(box: SurfaceBox, shape: Convex | None) -> tuple[float, float, float]:
+    """
+    How large is what lines scan: the window, or of the whole half the smallest extent.
 
-
-def _without_lengths(settings: Settings, strains: Strains, space: Space = SPACE) -> Plan:
-    """What settings say by themselves."""
-    return Plan(
-        samples=sample_rule(settings),
-        strains=strains,
-        variants=settings.variants,
-        axis=settings.axis,
-        moment=settings.moment,
-        seed=settings.seed,
-        workers=settings.workers,
-        tolerance=settings.tolerance,
-        max_chords=settings.max_chords,
-        rvs=sizes_of(settings),
-        deformation=None,
-        more_columns=settings.more_columns,
-        groups=settings.with_,
-        cutoff=math.nan,
-        cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),
-        rule=settings.directions or usual_rule(space),
-        spacing=math.nan,
-        replicates=0,
-        auto="",
-        rule_is_asked_for=settings.directions is not None,
-        edge=settings.edge,
-        lists_gaps=settings.lists_gaps,
-        map_settings=settings if isinstance(settings, MapSettings) else None,
-        space=space,
-    )
+    That is its reach; the area that lines of one direction pierce, in the mean of all (in a plane
+    a length); and three quarters of the mean length of the lines in it, of a sphere the radius.
+    """
+    reach = 0.5 * box.smallest_extent if shape is None else shape.reach
+    if box.space.is_plane:
+        shape = shape or circle(reach, box.space)
+    elif shape is None or shape.is_sphere:
+        return reach, math.pi * reach**2, reach
+    area = shape.mean_shadow
+    return reach, area, 0.75 * shape.volume / area
 
 
 def _auto_spacing(
-    settings: Settings, axes: int, scanned: _Scanned, lengths: dict[str, float]
+    settings: Settings, axes: int, area: float, depth: float, radius: float, space: Space
 ) -> float:
     """
     Spacing of one replicate's lines at which the first round is likely to meet the tolerance.
 
     Never so wide that lines get too few, nor closer than is of use: more directions are added then.
     """
-    area, radius, space = scanned.area, lengths["rmean"], scanned.space
     noise = NOISE[space.dimension]
-    segments_per_line = max(scanned.depth / (3.0 * radius), 1.0)
+    segments_per_line = max(depth / (3.0 * radius), 1.0)
     # lines * segments_per_line = segments, and lines are so many axes' area / spacing²
     lines = noise.segments / settings.tolerance**2 / (REPLICATES * axes * segments_per_line)
     # of which each block gets its share

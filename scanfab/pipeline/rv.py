@@ -9,18 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scanfab.base import shapes
 from scanfab.base.convex import Convex
 from scanfab.base.errors import Note, SettingsError
-from scanfab.base.shapes import (
-    box,
-    circle,
-    cylinder,
-    ellipse,
-    ellipsoid,
-    polyhedron,
-    rectangle,
-    sphere,
-)
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.io.surface import read_surface
@@ -28,7 +19,7 @@ from scanfab.packing.plane import spelt_plane
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import RV_MEANING, SurfaceBox, Window
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.strain import strain_mode
+from scanfab.pipeline.strain import cell_of, centers_of, strain_mode
 from scanfab.pipeline.values import Vector
 
 # of the smallest grain: what nobody means
@@ -63,81 +54,58 @@ def windows_of(sample: Sample, settings: Settings) -> list[Window]:
         If the file of its surface cannot be read.
     """
     surfaces = SurfaceBox.of(sample.packing, sample.gathered)
-    return [_window(sample, settings, one, surfaces) for one in settings.rvs]
+    half = 0.5 * surfaces.extents
+    return [_window(sample, settings, one * half, surfaces.center) for one in settings.rvs]
 
 
-def _window(sample: Sample, settings: Settings, fraction: float, surfaces: SurfaceBox) -> Window:
-    space = sample.packing.space
-    if space.is_plane:
-        shape, center = _flat_shape(settings, 0.5 * surfaces.extents, fraction, space), None
-    else:
-        shape, center = _shape(settings, 0.5 * surfaces.extents, fraction)
+def _window(sample: Sample, settings: Settings, part: FloatArray, middle: FloatArray) -> Window:
+    """The RV whose sizes, where none are given, are those of a part of the sample's box."""
+    packing, space = sample.packing, sample.packing.space
+    shape, center = _shape(settings, part, space)
     if settings.rv_center is not None:
         center = np.array(settings.rv_center, dtype=float)
     elif center is None:
-        center = np.array(surfaces.center, dtype=float)
+        center = np.array(middle, dtype=float)
     if space.across is not None:
-        center[space.across] = _in_plane(center[space.across], sample)
-    smallest = float(sample.packing.radius[sample.grains].min())
+        # an RV that lies beside the plane by rounding is one in the plane
+        if abs(center[space.across] - packing.place_across) > packing.radius.max():
+            raise SettingsError(
+                f"rv_center: lies outside {space} of the discs: expected "
+                f"{spelt_plane(packing.position, space)}, found {center[space.across]:g}"
+            )
+        center[space.across] = packing.place_across
+    smallest = float(packing.radius[sample.grains].min())
     half = 0.5 * float((shape.high - shape.low)[list(space.along)].min())
     if half < SMALLEST * smallest:
-        what = f"a radius of {half:g}" if shape.is_sphere else f"a {shape}"
         raise SettingsError(
-            f"rv: {what} is nothing beside that of the smallest grain ({smallest:g}): choose a "
+            f"rv: the {shape} is nothing beside the smallest grain (radius {smallest:g}): choose a "
             f"larger `rv`, `rv_radius` or `rv_size`"
         )
     return Window(center, shape)
 
 
-def _in_plane(place: float, sample: Sample) -> float:
-    """The coordinate of the discs' plane, for an RV that lies beside it by rounding."""
-    packing = sample.packing
-    if abs(place - packing.place_across) > packing.radius.max():
-        raise SettingsError(
-            f"rv_center: lies outside {packing.space} of the discs: expected "
-            f"{spelt_plane(packing.position, packing.space)}, found {place:g}"
-        )
-    return packing.place_across
-
-
-def _flat_shape(settings: Settings, half: FloatArray, fraction: float, plane: Space) -> Convex:
-    """The shape in a plane; the sphere is its circle."""
-    part = fraction * half[sorted(plane.along)]
-    if settings.rv_shape == "sphere":
-        radius = settings.rv_radius
-        return circle(float(part.min()) if radius is None else radius, plane)
-    if settings.rv_shape == "box":
-        return rectangle(settings.rv_size or 2.0 * part, plane)
-    return ellipse(settings.rv_size or part, plane)
-
-
-def _shape(
-    settings: Settings, half: FloatArray, fraction: float
-) -> tuple[Convex, FloatArray | None]:
-    """
-    The shape, and its centre if a file says where it is.
-
-    ``half`` are the sample's half extents, of which the sizes are the fraction where none are
-    given.
-    """
-    sizes, part = settings.rv_size, fraction * half
-    if settings.rv_shape == "sphere":
-        radius = settings.rv_radius
-        return sphere(float(part.min()) if radius is None else radius), None
-    if settings.rv_shape == "box":
-        return box(sizes or 2.0 * part), None
-    if settings.rv_shape == "ellipsoid":
-        return ellipsoid(sizes or part), None
-    if settings.rv_shape == "cylinder":
+def _shape(settings: Settings, part: FloatArray, space: Space) -> tuple[Convex, FloatArray | None]:
+    """The shape, in a plane a flat one, and its centre if a file says where it is."""
+    kind, sizes, is_plane = settings.rv_shape, settings.rv_size, space.is_plane
+    part = part[sorted(space.along)]
+    if kind == "sphere":
+        radius = settings.rv_radius or float(part.min())
+        return shapes.circle(radius, space) if is_plane else shapes.sphere(radius), None
+    if kind == "box":
+        edges = sizes or 2.0 * part
+        return shapes.rectangle(edges, space) if is_plane else shapes.box(edges), None
+    if kind == "ellipsoid":
+        axes = sizes or part
+        return shapes.ellipse(axes, space) if is_plane else shapes.ellipsoid(axes), None
+    if kind == "cylinder":
         axis = settings.rv_axis or settings.axis
         radius, height = sizes or _cylinder_within(part, axis)
-        return cylinder(radius, height, axis), None
-    path = Path(settings.rv_shape)
+        return shapes.cylinder(radius, height, axis), None
     try:
-        return polyhedron(*read_surface(path))
+        return shapes.polyhedron(*read_surface(Path(kind)))
     except SettingsError as error:
         raise SettingsError(
-            f"rv_shape: {path}: {error}: expected a closed convex surface"
+            f"rv_shape: {kind}: {error}: expected a closed convex surface"
         ) from None
 
 
@@ -223,8 +191,9 @@ class Deformation:
                 'sample deforms: choose `strain="grains"`, or leave out `rv_follows`'
             )
         origin, edges = _edges(sample, mode)
-        own = _own_edges(edges, sample.packing.space)
-        if abs(np.linalg.det(own / max(float(np.abs(own).max()), 1e-300))) < 1e-9:
+        space = sample.packing.space
+        scale = float(np.abs(edges[list(space.along)]).max())
+        if abs(np.linalg.det(edges)) <= 1e-9 * scale**space.dimension:
             raise SettingsError(f"rv_follows: the {mode} it is to follow has no volume")
         return cls(mode, origin, edges)
 
@@ -240,30 +209,18 @@ class Deformation:
         ]
 
 
-def _own_edges(edges: FloatArray, space: Space) -> FloatArray:
-    """Those that lie in the space: of a plane two, there."""
-    if space.across is None:
-        return edges
-    return edges[list(space.along)][:, edges[space.across] == 0.0]
-
-
 def _edges(sample: Sample, mode: str) -> tuple[FloatArray, FloatArray]:
-    """Origin and edges, as columns, of what is followed."""
+    """Origin and edges, as columns, of what is followed; nothing changes across a plane."""
+    space = sample.packing.space
     if mode == "cell":
-        cell = sample.packing.cell
-        if cell is None:
-            raise SettingsError("rv_follows: the RV is to follow the cell, but the dump has none")
+        cell = cell_of(sample)
         vectors = cell.vectors.copy()
-        if sample.packing.space.across is not None:
-            # nothing changes across the plane
-            vectors[vectors[:, sample.packing.space.across] != 0.0] = sample.packing.space.normal
+        if space.across is not None:
+            vectors[vectors[:, space.across] != 0.0] = space.normal
         return cell.origin, vectors.T
-    chosen = sample.boundary if mode == "boundary" else sample.gathered
-    if not chosen.any():
-        raise SettingsError(f"rv_follows: the RV is to follow the {mode}, but the frame has none")
-    position = sample.packing.position[chosen]
+    position = centers_of(sample, mode)
     low, high = position.min(axis=0), position.max(axis=0)
     edges = np.diag(high - low)
-    if sample.packing.space.across is not None:
-        edges[(sample.packing.space.across,) * 2] = 1.0
+    if space.across is not None:
+        edges[space.across, space.across] = 1.0
     return low, edges

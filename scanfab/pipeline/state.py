@@ -14,7 +14,6 @@ from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.fabric.measured import ContactForces, SampleState
 from scanfab.fabric.state import love_weber
 from scanfab.packing.clump_volumes import lens_volumes, own_shares
-from scanfab.packing.contacts import WallForces
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample, Variant
 from scanfab.packing.window import Window
@@ -24,11 +23,6 @@ from scanfab.scan.directions import direction_rule, plane_rule
 POINTS = 2048
 # grains at a time, times their points: some tens of megabytes
 CHUNK = 256
-WALLS_LEFT_OUT = (
-    "grains touch walls, and the forces of these contacts are not known (they are read from "
-    "LIGGGHTS' wall/gran/local and YADE's O.save): the stress leaves them out; choose an RV away "
-    "from the walls"
-)
 
 
 def refuse_without_forces(sample: Sample) -> None:
@@ -61,10 +55,9 @@ def contact_forces(sample: Sample, chosen: BoolArray) -> ContactForces | None:
     return ContactForces(branch, contacts.force_n[chosen], force)
 
 
-def _refuse_odd_forces(packing: Packing, force: FloatArray) -> None:
-    """PackingError if a force is no finite number, shape (M,) or (M, 3)."""
-    # -1 for the second part would be undecided without a contact
-    wrong = ~np.isfinite(force.reshape(len(force), force[:1].size or 1)).all(axis=1)
+def _refuse_odd_forces(packing: Packing, force_n: FloatArray) -> None:
+    """PackingError if a force is no finite number: then its normal part is none either."""
+    wrong = ~np.isfinite(force_n)
     if wrong.any():
         assert packing.contacts is not None
         one, two = packing.id[packing.contacts.pairs[np.argmax(wrong)]]
@@ -75,47 +68,45 @@ def _refuse_odd_forces(packing: Packing, force: FloatArray) -> None:
 
 def sample_state(sample: Sample, variant: Variant, window: Window | None) -> SampleState:
     """
-    The state of the whole, or of the RV.
+    The state of the RV; without a window, of the whole.
 
     Rattlers are solid, and all contacts bear stress, in all variants; the coordination is of the
     variant's grains.
     """
-    region = window if variant.in_window else None
-    counted = sample.once(sample.counted(variant, region) & ~sample.removed(variant))
+    counted = sample.once(sample.counted(variant, window) & ~sample.removed(variant))
     numbers = sample.numbers_of(variant)[counted]
     held = numbers[numbers >= 2]
     return SampleState(
-        void_ratio=_void_ratio(sample, region),
+        void_ratio=_void_ratio(sample, window),
         coordination_mechanical=float(held.mean()) if len(held) else None,
-        stress=_stress(sample, region),
+        stress=_stress(sample, window),
         space=sample.packing.space,
     )
 
 
-def doubts_of_state(sample: Sample, variant: Variant, window: Window | None) -> dict[str, str]:
+def doubts_of_state(sample: Sample, window: Window | None) -> dict[str, str]:
     """Why there is no stress, or whom it leaves out, by the code of a note."""
     contacts, packing = sample.contacts, sample.packing
-    region = window if variant.in_window else None
     if len(contacts) and contacts.force is None:
         known = "no forces" if contacts.force_n is None else "the normal part of forces only"
         return {
             "no_stress": f"the contacts have {known}: stress, and what follows from it, is empty"
         }
-    if _volume(packing, region) is None:
+    if _volume(packing, window) is None:
         return {
             "no_volume": "void ratio and stress of the whole are empty: they need a volume, which "
             "is that of a cell that repeats along all its vectors, or of an RV"
         }
-    return {"wall_stress": WALLS_LEFT_OUT} if _lacks_walls(sample, region) else {}
-
-
-def _lacks_walls(sample: Sample, region: Window | None) -> bool:
-    """Whether grains touch walls, in the RV if there is one, and with forces that nobody knows."""
-    packing = sample.packing
-    if packing.wall_forces is not None:
-        return False
-    touching = packing.position[(packing.wall_contacts > 0) & sample.grains]
-    return bool(len(touching) if region is None else region.contains(touching, packing).any())
+    at_walls = packing.position[(packing.wall_contacts > 0) & sample.grains]
+    if window is not None:
+        at_walls = at_walls[window.contains(at_walls, packing)]
+    if packing.wall_forces is not None or not len(at_walls):
+        return {}
+    return {
+        "wall_stress": "grains touch walls, and the forces of these contacts are not known (they "
+        "are read from LIGGGHTS' wall/gran/local and YADE's O.save): the stress leaves them out; "
+        "choose an RV away from the walls"
+    }
 
 
 def _volume(packing: Packing, window: Window | None) -> float | None:
@@ -146,46 +137,37 @@ def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
     """Of all contacts that a grain has part in; None without forces or a volume."""
     packing, contacts = sample.packing, sample.contacts
     volume = _volume(packing, window)
-    if contacts.force is None or volume is None:
+    if contacts.force is None or contacts.force_n is None or volume is None:
         return None
-    _refuse_odd_forces(packing, contacts.force)
+    _refuse_odd_forces(packing, contacts.force_n)
     one, two = contacts.pairs.T
-    start, branch = _places(packing)[one], _branches(packing)
-    end = start + branch
+    places = _places(packing)
+    start, end = places[one], places[one] + _branches(packing)
     # boundary is a wall: the branch of such a contact ends where the grain does
     start = np.where(sample.boundary[one][:, None], contacts.point, start)
     end = np.where(sample.boundary[two][:, None], contacts.point, end)
     branch = end - start
     chosen = ~(sample.boundary[one] & sample.boundary[two]) & branch.any(axis=1)
     start, branch, force = start[chosen], branch[chosen], contacts.force[chosen]
-    if packing.wall_forces is not None:
-        walls = _at_walls(sample, packing.wall_forces)
-        start, branch, force = map(np.concatenate, zip((start, branch, force), walls, strict=True))
+    walls = packing.wall_forces
+    if walls is not None:
+        # the branch from where a grain touches a wall to its place
+        ours = sample.grains[walls.row]
+        start = np.concatenate([start, walls.point[ours]])
+        branch = np.concatenate([branch, places[walls.row[ours]] - walls.point[ours]])
+        force = np.concatenate([force, walls.force[ours]])
     if window is not None:
-        branch = branch * _shares(start, branch, window, packing)[:, None]
+        # the part of each branch that lies in the window, of all its images together
+        longest = float(np.linalg.norm(branch, axis=1).max(initial=0.0))
+        origin, shifts = window.images(start, packing, longest)
+        share = sum(window.shape.share(origin + shift, branch) for shift in shifts)
+        branch = branch * np.asarray(share)[:, None]
     return love_weber(force, branch, volume)
-
-
-def _at_walls(sample: Sample, walls: WallForces) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Where grains touch walls, from there to their places, and the forces on them."""
-    ours = sample.grains[walls.row]
-    row, point, force = walls.row[ours], walls.point[ours], walls.force[ours]
-    return point, _places(sample.packing)[row] - point, force
-
-
-def _shares(start: FloatArray, branch: FloatArray, window: Window, packing: Packing) -> FloatArray:
-    """The part of each branch that lies in the window, of all its images together."""
-    longest = float(np.linalg.norm(branch, axis=1).max(initial=0.0))
-    origin, shifts = window.images(start, packing, longest)
-    found = np.zeros(len(branch))
-    for shift in shifts:
-        found += window.shape.share(origin + shift, branch)
-    return found
 
 
 def _void_ratio(sample: Sample, window: Window | None) -> float | None:
     """(1 - ν)/ν with the volumes of grains summed up; None without a volume or grains."""
-    packing = sample.packing
+    packing, space = sample.packing, sample.packing.space
     volume = _volume(packing, window)
     if volume is None:
         return None
@@ -193,44 +175,30 @@ def _void_ratio(sample: Sample, window: Window | None) -> float | None:
     # in a clump what several spheres share is there once
     share = np.ones_like(radius)
     if packing.bodies is not None:
-        share = own_shares(packing, partial(_rays, space=packing.space))[sample.grains]
+        share = own_shares(packing, partial(_rays, space=space))[sample.grains]
     if window is None:
-        solid = float(np.sum(packing.space.volume(radius) * share))
+        solid = float(np.sum(space.volume(radius) * share))
     else:
-        solid = _volume_inside(position, radius, share, window, packing)
+        # through periodic faces too
+        solid = 0.0
+        origin, shifts = window.images(position, packing, float(radius.max(initial=0.0)))
+        for shift in shifts:
+            near = window.shape.may_meet(origin + shift, radius)
+            inside = cut_volumes((origin + shift)[near], radius[near], window.shape, space)
+            solid += float((inside * share[near]).sum())
     return None if solid == 0.0 else (volume - solid) / solid
-
-
-def _volume_inside(
-    position: FloatArray, radius: FloatArray, share: FloatArray, window: Window, packing: Packing
-) -> float:
-    """
-    What of the volumes of spheres lies in a window, through periodic faces too.
-
-    Of the volume of each, ``share`` counts, shape (N,).
-    """
-    shape, total = window.shape, 0.0
-    origin, shifts = window.images(position, packing, float(radius.max(initial=0.0)))
-    for shift in shifts:
-        places = origin + shift
-        near = shape.may_meet(places, radius)
-        part = lenses if shape.is_sphere else cut_volumes
-        inside = part(places[near], radius[near], shape, packing.space)
-        total += float((inside * share[near]).sum())
-    return total
-
-
-def lenses(
-    places: FloatArray, radius: FloatArray, ball: Convex, space: Space = SPACE
-) -> FloatArray:
-    """Volumes that spheres share with a ball about the origin, shape (N,)."""
-    return lens_volumes(np.linalg.norm(places, axis=1), radius, ball.reach, space)
 
 
 def cut_volumes(
     places: FloatArray, radius: FloatArray, shape: Convex, space: Space = SPACE
 ) -> FloatArray:
-    """Volumes that spheres share with a region, by points that fill each evenly, shape (N,)."""
+    """
+    Volumes that spheres share with a region about the origin, shape (N,).
+
+    Exact for a region that is a sphere; else by points that fill each sphere evenly.
+    """
+    if shape.is_sphere:
+        return lens_volumes(np.linalg.norm(places, axis=1), radius, shape.reach, space)
     points = _points_in_ball(space)
     found = surely_inside(shape, places, radius).astype(np.float64)
     cut = np.flatnonzero(found == 0.0)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import Note, SettingsError
+from scanfab.base.typing import FloatArray
 from scanfab.io.layout import FrameFile
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
@@ -44,38 +45,46 @@ def axial_length(sample: Sample, mode: str, axis: Vector) -> float | None:
         If what the mode measures does not exist.
     """
     mode = strain_mode(sample, mode, axis)
-    if not mode:
-        return None
-    cell = sample.packing.cell
-    along, on_axis = _along(axis)
-    if mode == "cell":
-        if cell is None or not on_axis:
-            what = "the dump has no cell" if cell is None else "the axis is not x, y or z"
-            raise SettingsError(f"strain: cell was asked for, but {what}")
-        return float(cell.vectors[along, along])
-    chosen = sample.boundary if mode == "boundary" else sample.gathered
-    if not chosen.any():
-        raise SettingsError(
-            f"strain: {mode} was asked for, but the frame has none"
-            + (": name them with `boundary`" if mode == "boundary" else "")
-        )
-    return float(np.ptp(sample.packing.position[chosen] @ np.array(axis)))
+    if mode != "cell":
+        return float(np.ptp(centers_of(sample, mode) @ np.array(axis))) if mode else None
+    along, is_along = _nearest(axis)
+    if not is_along:
+        raise SettingsError("strain: cell was asked for, but the axis is not x, y or z")
+    return float(cell_of(sample).vectors[along, along])
 
 
 def strain_mode(sample: Sample, mode: str, axis: Vector) -> str:
     """What ``auto`` stands for in a frame, empty where it finds nothing; else the mode itself."""
     if mode != "auto":
         return mode
-    cell, (along, on_axis) = sample.packing.cell, _along(axis)
-    if cell is not None and on_axis and cell.periodic[along]:
+    cell, (along, is_along) = sample.packing.cell, _nearest(axis)
+    if cell is not None and is_along and cell.periodic[along]:
         return "cell"
     return "boundary" if sample.boundary.any() else ""
 
 
-def _along(axis: Vector) -> tuple[int, bool]:
+def _nearest(axis: Vector) -> tuple[int, bool]:
     """Which of x, y, z is nearest to the axis, and whether that is the axis itself."""
     along = int(np.argmax(np.abs(axis)))
     return along, abs(axis[along]) > 1 - 1e-12
+
+
+def cell_of(sample: Sample) -> Cell:
+    """The cell that the strain is measured by; SettingsError without one."""
+    if sample.packing.cell is None:
+        raise SettingsError("strain: cell was asked for, but the dump has no cell")
+    return sample.packing.cell
+
+
+def centers_of(sample: Sample, mode: str) -> FloatArray:
+    """The centres of boundary or grains, shape (K, 3); SettingsError without any."""
+    chosen = sample.boundary if mode == "boundary" else sample.gathered
+    if not chosen.any():
+        raise SettingsError(
+            f"strain: {mode} was asked for, but the frame has none"
+            + (": name them with `boundary`" if mode == "boundary" else "")
+        )
+    return sample.packing.position[chosen]
 
 
 def shear_strain(cell: Cell | None, first: Cell | None) -> float | None:
@@ -153,40 +162,15 @@ def is_flipped(cell: Cell | None, before: Cell | None) -> bool:
     """
     if cell is None or before is None or not (cell.is_endless and before.is_endless):
         return False
-    change = np.linalg.solve(cell.own_vectors.T, before.own_vectors.T)
-    whole = np.rint(change)
-    return bool(
-        np.any(whole != np.eye(len(whole)))
-        and round(abs(np.linalg.det(whole))) == 1
-        and max(_tilt(cell), _tilt(before)) <= MOST_TILT
-    )
-
-
-def _tilt(cell: Cell) -> float:
-    """By how many lengths of another vector a vector leans, at most."""
-    vectors = cell.own_vectors
-    lengths = np.linalg.norm(vectors, axis=1)
-    leaning = (vectors @ vectors.T) / lengths**2
-    return float(np.abs(leaning[np.tril_indices(len(vectors), -1)]).max())
-
-
-class StrainFile:
-    """
-    Strains from a CSV file with the columns ``step`` or ``frame``, and ``strain``.
-
-    Raises
-    ------
-    ReadError
-        If a column is missing or a value is no number.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._file = FrameFile(path, ["strain"])
-
-    def at(self, frame: int, step: int | None) -> float | None:
-        """The strain of a frame; None if the file does not name it."""
-        found = self._file.at(frame, step)
-        return None if found is None else found[0]
+    change = np.rint(np.linalg.solve(cell.own_vectors.T, before.own_vectors.T))
+    if np.array_equal(change, np.eye(len(change))) or round(abs(np.linalg.det(change))) != 1:
+        return False
+    for vectors in (cell.own_vectors, before.own_vectors):
+        # by how many lengths of another vector each vector leans
+        leaning = (vectors @ vectors.T) / np.linalg.norm(vectors, axis=1) ** 2
+        if np.abs(np.tril(leaning, -1)).max() > MOST_TILT:
+            return False
+    return True
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +180,7 @@ class Strains:
     mode: str
     """As for :func:`axial_length`; of no meaning if there is a file."""
     axis: Vector
-    file: StrainFile | None = None
+    file: FrameFile | None = None
     length: float | None = None
     """Of the first frame that has grains, dump's length unit."""
     cell: Cell | None = None
@@ -212,7 +196,8 @@ class Strains:
         ReadError
             If the file of strains cannot be read.
         """
-        file = None if settings.strain in STRAIN_MODES else StrainFile(Path(settings.strain))
+        is_file = settings.strain not in STRAIN_MODES
+        file = FrameFile(Path(settings.strain), ["strain"]) if is_file else None
         return cls(settings.strain, settings.axis, file)
 
     def since(self, sample: Sample) -> Strains:
@@ -222,20 +207,18 @@ class Strains:
 
     def at(self, number: int, sample: Sample) -> dict[str, float | None]:
         """Axial, shear and volumetric strain of a frame, by the names of their columns."""
-        cells = (sample.packing.cell if sample.grains.any() else None, self.cell)
-        return {
-            "strain": self._axial(number, sample),
-            "shear_strain": shear_strain(*cells),
-            "volumetric_strain": volumetric_strain(*cells),
-        }
-
-    def _axial(self, number: int, sample: Sample) -> float | None:
+        axial, has_grains = None, sample.grains.any()
         if self.file is not None:
-            return self.file.at(number, sample.packing.step)
-        if self.length is None or not sample.grains.any():
-            return None
-        length = axial_length(sample, self.mode, self.axis)
-        return None if length is None or self.length == 0 else 1.0 - length / self.length
+            (axial,) = self.file.at(number, sample.packing.step) or (None,)
+        elif self.length and has_grains:
+            length = axial_length(sample, self.mode, self.axis)
+            axial = None if length is None else 1.0 - length / self.length
+        cell = sample.packing.cell if has_grains else None
+        return {
+            "strain": axial,
+            "shear_strain": shear_strain(cell, self.cell),
+            "volumetric_strain": volumetric_strain(cell, self.cell),
+        }
 
 
 class Flips:
@@ -249,14 +232,13 @@ class Flips:
     def notes(self, number: int, cell: Cell | None) -> list[Note]:
         """What to tell once the cell of one more frame is known."""
         self.cells[number] = cell
-        pairs = [(early, early + self.step) for early in (number - self.step, number)]
-        flipped = [p for p in pairs if is_flipped(self.cells.get(p[1]), self.cells.get(p[0]))]
-        return [Note("flipped_cell", _flipped(*pair)) for pair in flipped]
-
-
-def _flipped(early: int, late: int) -> str:
-    return (
-        f"the cell seems to be flipped between the frames {early} and {late}: from there on its "
-        f"vectors are others than in the first frame, and shear_strain is not the strain since "
-        f"then (LAMMPS: fix deform ... flip no)"
-    )
+        return [
+            Note(
+                "flipped_cell",
+                f"the cell seems to be flipped between the frames {early} and {late}: from there "
+                f"on its vectors are others than in the first frame, and shear_strain is not the "
+                f"strain since then (LAMMPS: fix deform ... flip no)",
+            )
+            for early, late in ((number - self.step, number), (number, number + self.step))
+            if is_flipped(self.cells.get(late), self.cells.get(early))
+        ]

@@ -167,7 +167,7 @@ class VariantColumns:
         """Whether there is no void fabric, or a doubtful one, or lines without a grain."""
         texts = doubts_of_lines(self.sums, self.variant, self.left_out) | self._doubts_of_void()
         if "state" in self.plan.groups:
-            texts |= doubts_of_state(self.sample, self.variant, self.window)
+            texts |= doubts_of_state(self.sample, self.window)
         if "forces" in self.plan.groups:
             texts |= doubts_of_forces(self.measured)
         about = self.variant.name if self.rv is None else f"{self.variant.name} (RV {self.rv:g})"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from scanfab.base.errors import (
     Note,
@@ -18,8 +17,8 @@ from scanfab.packing.sample import Sample
 from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.strain import StrainFile, axial_length, shear_strain
-from scanfab.pipeline.values import STRAIN_MODES, Vector
+from scanfab.pipeline.strain import Strains, shear_strain
+from scanfab.pipeline.values import Vector
 from scanfab.pipeline.window_settings import settings_in
 from scanfab.table.curves import SAME, frame_strain_column
 from scanfab.viz.scene import Scene, about_window, scene_of
@@ -128,13 +127,9 @@ def _strain_column(
 
 def _axial(number: int, sample: Sample, first: Sample | None, settings: Settings) -> float | None:
     """Axial strain as the fabric table has it; None also where it cannot be had."""
-    if settings.strain not in STRAIN_MODES:
-        return StrainFile(Path(settings.strain)).at(number, sample.packing.step)
-    if first is None or not sample.grains.any():
-        return None
-    try:
-        lengths = [axial_length(one, settings.strain, settings.axis) for one in (first, sample)]
-    except SettingsError:
-        return None
-    start, now = lengths
-    return None if not start or now is None else 1.0 - now / start
+    strains = Strains.of(settings)
+    with suppress(SettingsError):
+        if first is not None:
+            strains = strains.since(first)
+        return strains.at(number, sample)["strain"]
+    return None

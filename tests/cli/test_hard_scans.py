@@ -35,8 +35,8 @@ def answer(capsys, tmp_path):
         (("--directions", "fibonacci:1"), 2, "the 1 axes of fibonacci:1 lie in one plane"),
         (("--max-chords", "0"), 2, "max-chords: expected a number of at least 1"),
         (("--max-chords", "5"), 1, "max-chords: 5 chords are fewer than"),
-        (("--spacing", "50", "--directions", "20"), 1, "spacing: 50 between lines is more than"),
-        (("--spacing", "50"), 1, "spacing: 50 between lines is more than"),
+        (("--spacing", "50", "--directions", "20"), 1, "spacing: expected a length from"),
+        (("--spacing", "50"), 1, "spacing: expected a length from"),
         (("--spacing", "1e-6", "--directions", "20"), 1, "choose a wider spacing"),
     ],
 )

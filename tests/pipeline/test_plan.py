@@ -193,7 +193,7 @@ def test_cell_that_does_not_repeat_is_no_obstacle(packing):
 
 @pytest.mark.parametrize("variants", ["a", "cd"])
 def test_spacing_wider_than_the_sample_is_refused(packing, variants):
-    match = r"spacing: 100 between lines is more than the (sample|RV) is wide \(\d.*1rmin \(0\.4"
+    match = r"spacing: expected a length from .* found 100: .*1rmin \(0\.4"
     with pytest.raises(SettingsError, match=match):
         plan_of(packing, spacing=100.0, directions=20, variants=variants)
     with pytest.raises(SettingsError, match=match):
@@ -212,12 +212,10 @@ def test_exact_rules_have_no_bias_to_warn_of(packing):
         assert plan_of(packing, directions=rule, tolerance=1e-12).rule.bias < 1e-13
 
 
-@pytest.mark.parametrize(("cutoff", "is_absurd"), [(1000.0, True), (9.0, False)])
-def test_a_cutoff_of_hundreds_of_radii_asks_for_rmin(packing, cutoff, is_absurd):
-    options = {"spacing": 0.8, "directions": 9, "variants": "c", "cutoff": cutoff}
-    with pytest.warns(ScanfabWarning, match="no void segment reaches the cut-off") as told:
+def test_a_cutoff_of_hundreds_of_radii_asks_for_rmin(packing):
+    options = {"spacing": 0.8, "directions": 9, "variants": "c", "cutoff": 1000.0}
+    with pytest.warns(ScanfabWarning, match="no void segment reaches .*did you mean 1rmin?"):
         compute(packing, **options)
-    assert any("did you mean 1rmin?" in str(one.message) for one in told) == is_absurd
 
 
 def test_an_absurd_spacing_asks_for_rmin(packing):

@@ -109,7 +109,7 @@ def test_a_surface_that_is_no_convex_body_is_refused_by_its_file(flat, tmp_path)
         ({"rv_shape": "box", "rv": 2.0}, "beyond the sample"),
         (
             {"rv_shape": "ellipsoid", "rv_size": "1e-12,1,1"},
-            "rv: a ellipsoid .* is nothing beside that of the smallest grain",
+            "rv: the ellipsoid .* is nothing beside the smallest grain",
         ),
         ({"rv_shape": "box", "rv_size": "2,2,1e-11"}, "is nothing beside"),
         (
