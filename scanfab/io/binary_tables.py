@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import lzma
-import math
 import re
 import zipfile
-import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,8 +20,8 @@ Arrays = dict[str, npt.NDArray[Any]]
 
 IS_PARQUET = b"PAR1"
 IS_NPZ = b"PK"
-# headers and members of an archive, of which sound ones have fewer
-MOST_HEADER, MOST_MEMBERS = 10_000, 1000
+# characters of the header of an array
+MOST_HEADER = 10_000
 # kinds of arrays that hold numbers or text
 KINDS = "biufU"
 # how packing.nfo names the numbers of a packing
@@ -35,11 +32,6 @@ NFO = re.compile(
 # arrays of an NPZ file that are centres, and those that are pairs
 POSITIONS = ("position", "positions", "pos", "points", "centers", "centres")
 PAIRS = ("pairs", "contacts", "ids")
-# what libraries raise for damaged files
-DAMAGED: tuple[type[Exception], ...] = (
-    *(zipfile.BadZipFile, OSError, ValueError, MemoryError),
-    *(NotImplementedError, EOFError, KeyError, RuntimeError, zlib.error, lzma.LZMAError),
-)
 
 
 def binary_names(path: Path) -> list[str] | None:
@@ -48,8 +40,8 @@ def binary_names(path: Path) -> list[str] | None:
         return ["x", "y", "z", "diameter"]
     head = first_bytes(path, 8)
     if head.startswith(IS_PARQUET):
-        with _parquet(path) as file:
-            return list(file.schema_arrow.names)
+        with _told(path, "Parquet"):
+            return list(_open_parquet(path).schema_arrow.names)
     if head.startswith(IS_NPZ):
         return [part for name, shape in npz_shapes(path).items() for part in _parts(name, shape)]
     return None
@@ -60,46 +52,47 @@ def read_binary(path: Path) -> Arrays:
     if is_xyzd(path):
         return _read_xyzd(path)
     if first_bytes(path, 8).startswith(IS_PARQUET):
-        return _read_parquet(path)
-    columns = {}
+        with _told(path, "Parquet"):
+            return _read_parquet(path)
+    columns: Arrays = {}
     for name, values in read_npz(path).items():
-        for place, part in enumerate(_parts(name, values.shape)):
-            columns[part] = values if values.ndim == 1 else values[:, place]
+        parts = _parts(name, values.shape)
+        columns |= dict(zip(parts, values.T if values.ndim == 2 else [values], strict=False))
     # arrays of another length than the grains are no columns of them
     rows = len(columns["x"]) if "x" in columns else max(map(len, columns.values()), default=0)
     return {name: values for name, values in columns.items() if len(values) == rows}
 
 
 @contextmanager
-def _told(path: Path, kind: str, *more: type[Exception]) -> Iterator[None]:
+def _told(path: Path, kind: str) -> Iterator[None]:
     """Turn the errors of a library into those of the file."""
     try:
         yield
-    except (*DAMAGED, *more) as error:
+    except ReadError:
+        raise
+    # for a damaged file libraries raise whatever they meet
+    except Exception as error:
         reason = str(error).partition("\n")[0][:200] or type(error).__name__
         raise ReadError(f"{path}: cannot be read as {kind}: {reason}") from None
 
 
-@contextmanager
-def _parquet(path: Path) -> Iterator[Any]:
-    """An open file of Parquet."""
-    from pyarrow import ArrowException, parquet
+def _open_parquet(path: Path) -> Any:
+    from pyarrow import parquet
 
-    with _told(path, "Parquet", ArrowException):
-        yield parquet.ParquetFile(plain(path), thrift_string_size_limit=1 << 20)
+    return parquet.ParquetFile(plain(path), thrift_string_size_limit=1 << 20)
 
 
 def _read_parquet(path: Path) -> Arrays:
     found: Arrays = {}
-    with _parquet(path) as file:
-        names = file.schema_arrow.names
-        _check_room(path, 8.0 * file.metadata.num_rows * len(names))
-        for name, column in zip(names, file.read().columns, strict=True):
-            values = column.to_numpy()
-            if values.dtype == object and all(isinstance(one, str | None) for one in values):
-                values = np.array([one or "" for one in values], dtype=np.str_)
-            if values.dtype.kind in KINDS:
-                found[name] = values
+    file = _open_parquet(path)
+    names = file.schema_arrow.names
+    _check_room(path, 8.0 * file.metadata.num_rows * len(names))
+    for name, column in zip(names, file.read().columns, strict=True):
+        values = column.to_numpy()
+        if values.dtype == object and all(isinstance(one, str | None) for one in values):
+            values = np.array([one or "" for one in values], dtype=np.str_)
+        if values.dtype.kind in KINDS:
+            found[name] = values
     return found
 
 
@@ -121,26 +114,15 @@ def _parts(name: str, shape: tuple[int, ...]) -> list[str]:
 
 
 def npz_shapes(path: Path) -> dict[str, tuple[int, ...]]:
-    """The shapes of the arrays of numbers and text in an NPZ file; pickled objects are refused."""
-    found = {}
+    """The shapes of the arrays of numbers and text in an NPZ file."""
+    found, form = {}, np.lib.format
+    read = {(1, 0): form.read_array_header_1_0, (2, 0): form.read_array_header_2_0}
     with _told(path, "NPZ"), zipfile.ZipFile(plain(path)) as archive:
-        members = archive.infolist()
-        if len(members) > MOST_MEMBERS:
-            raise ValueError(f"expected some arrays, found {len(members)} files in the archive")
-        for member in (one for one in members if one.filename.endswith(".npy")):
-            name = member.filename.removesuffix(".npy")
-            with archive.open(member) as stream:
-                is_first = np.lib.format.read_magic(stream) == (1, 0)
-                form: Any = np.lib.format
-                read = form.read_array_header_1_0 if is_first else form.read_array_header_2_0
-                shape, _, dtype = read(stream, MOST_HEADER)
-                size = member.file_size - stream.tell()
-            if dtype.hasobject:
-                raise ValueError(f"{name} holds pickled objects, which can run programs")
-            if size != dtype.itemsize * math.prod(shape):
-                raise ValueError(f"{name} has {size} bytes, which are not of its shape {shape}")
+        for name in (one for one in archive.namelist() if one.endswith(".npy")):
+            with archive.open(name) as stream:
+                shape, _, dtype = read[form.read_magic(stream)](stream, MOST_HEADER)
             if dtype.kind in KINDS:
-                found[name] = shape
+                found[name.removesuffix(".npy")] = shape
     return found
 
 
@@ -171,17 +153,19 @@ def _read_xyzd(path: Path) -> Arrays:
         raise ReadError(f"{path}: expected whole rows of four doubles, 32 bytes each, {found}")
     check_memory(path, 3.0 * size)
     x, y, z, diameter = np.fromfile(file, "<f8").reshape(-1, 4).astype(np.float64).T
-    info = _nfo(path)
+    info, factor = _nfo(path), 1.0
     if info is None:
         warn(f"{path}: diameters are not scaled, since there is no packing.nfo beside the file")
-        return {"x": x, "y": y, "z": z, "diameter": diameter}
-    solid = [1.0 - info.get(f"{one} porosity", [1.0])[0] for one in ("final", "theoretical")]
-    factor = (solid[0] / solid[1]) ** (1 / 3) if min(solid) > 0 else np.nan
-    if not 0.5 < factor < 2.0:
-        raise ReadError(
-            f"{path.with_name('packing.nfo')}: expected a theoretical and a final porosity "
-            f"between 0 and 1, by which the diameters of {path.name} are scaled"
+    else:
+        final, theory = (
+            1.0 - info.get(f"{k} porosity", [1.0])[0] for k in ("final", "theoretical")
         )
+        factor = (final / theory) ** (1 / 3) if min(final, theory) > 0 else np.nan
+        if not 0.5 < factor < 2.0:
+            raise ReadError(
+                f"{path.with_name('packing.nfo')}: expected a theoretical and a final porosity "
+                f"between 0 and 1, by which the diameters of {path.name} are scaled"
+            )
     if factor != 1.0:
         told = f"diameters are multiplied by {factor:.6g}, from the porosities in packing.nfo"
         note(f"{path}: {told}")
