@@ -226,8 +226,7 @@ def branches(grains: GrainTable, rows: IntArray) -> FloatArray:
 
 def _sign(values: FloatArray, what: str, doubt: str) -> float | None:
     """The sign that nearly all values have (1 without any); None, with a warning, without one."""
-    values = values[values != 0]
-    share = float(np.mean(values > 0)) if len(values) else 1.0
+    share = float(np.mean(values[values != 0] > 0)) if values.any() else 1.0
     if 1 - NEARLY_ALL < share < NEARLY_ALL:
         warn(f"{what}: {share:.0%} {doubt}")
         return None
@@ -291,22 +290,18 @@ def join_table(path: Path, grains: GrainTable, found: Columns) -> JoinedContacts
     shift = _vectors(path, grains, found, "ix iy iz")
     image = None if shift is None else whole_numbers(path, shift.ravel()).reshape(-1, 3)
     joined = join_ids(path, grains, pairs, force, walls=False, image=image, force_n=force_n)
-    _tell_twice(path, pairs, image)
-    touched = rows_of_ids(grains, ids[walls]).max(axis=1)
-    count = count_walls(touched[touched >= 0], len(grains.radius))
-    return joined._replace(wall_contacts=joined.wall_contacts + count)
-
-
-def _tell_twice(path: Path, pairs: IntArray, image: IntArray | None) -> None:
-    """Warn of pairs that are listed twice, where no column says that their images differ."""
+    # of a pair in either order, with the image of the second grain from the first
     keys = np.sort(pairs, axis=1)
     if image is not None:
         keys = np.hstack([keys, np.where(pairs[:, :1] > pairs[:, 1:], -image, image)])
     unique, counts = np.unique(keys, axis=0, return_counts=True)
-    twice = unique[counts > 1]
-    if len(twice):
-        told = f"{path}: {len(twice)} of {len(unique)} pairs are listed more than once, such as "
-        warn(f"{told}{twice[0, 0]} and {twice[0, 1]}: each row counts as a contact")
+    if np.any(counts > 1):
+        first, second, *_ = unique[np.argmax(counts)]
+        told = f"{path}: {np.count_nonzero(counts > 1)} of {len(unique)} pairs are listed more "
+        warn(f"{told}than once, such as {first} and {second}: each row counts as a contact")
+    touched = rows_of_ids(grains, ids[walls]).max(axis=1)
+    count = count_walls(touched[touched >= 0], len(grains.radius))
+    return joined._replace(wall_contacts=joined.wall_contacts + count)
 
 
 def _with_ids(path: Path, grains: GrainTable, ids: IntArray) -> GrainTable:
@@ -329,11 +324,12 @@ def _with_ids(path: Path, grains: GrainTable, ids: IntArray) -> GrainTable:
             f"{path}: names grains by numbers, but the grain file has no ids, and as rows these "
             f'are no neighbours: name the ids of grains with `columns={{"id": ...}}`'
         )
-    base = fits[0] if fits else 0
-    if fits:
-        told = f"the grains have no ids: contacts name their rows, counted from {base}"
-        note(f"{told}, since these are neighbours")
-    return grains._replace(id=np.arange(base, base + count))
+    for base in fits:
+        note(
+            f"the grains have no ids: contacts name their rows, counted from {base}, since these "
+            f"are neighbours"
+        )
+    return grains._replace(id=np.arange(count) + sum(fits))
 
 
 def _vectors(path: Path, grains: GrainTable, found: Columns, names: str) -> FloatArray | None:

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from scanfab.base.errors import ReadError
-from scanfab.io.files import first_bytes, plain
+from scanfab.io.files import first_bytes
 from scanfab.io.reader import Snapshot
-from scanfab.io.text import Columns, Layout, is_number, read_rows, text_of, warn_of_end, words_of
+from scanfab.io.text import Columns, Layout, is_number, read_rows, text_of, words_of
 
 # bytes of a file that are looked at, and the rows among them
 HEAD, SAMPLE = 1 << 18, 20
@@ -82,7 +82,7 @@ def text_table(path: Path, skip: int) -> TextTable:
         first, rows = numbers[1] if len(numbers) > 1 else first + 1, rows[1:]
         width = len(rows[0]) if rows else len(names)
     elif first > skip:
-        names = _names_in_comment(lines[first - 1], separator, width)
+        names = _names_in_comment(lines[first - 1], width)
     # a row below names that was cut is found when the table is read
     for number, row in zip(numbers if names is None else (), rows, strict=False):
         if len(row) != width:
@@ -129,8 +129,6 @@ def read_text(
             f"their numbers with `columns`"
         )
     rows = text_of(Snapshot(path, start=table.start))
-    if table.start > plain(path).stat().st_size:  # the line of names has no end
-        warn_of_end(path)
     first = WITH_COMMA.search(rows) if table.layout.comma else None
     if first and all(THOUSANDS.fullmatch(one[0]) for one in WITH_COMMA.finditer(rows)):
         raise ReadError(
@@ -162,14 +160,10 @@ def _score(lines: Sequence[str], separator: str, comma: bool) -> float:
     return alike * (1e-3 + numbers) if alike or separator == " " else -1.0
 
 
-def _names_in_comment(comment: str, separator: str, width: int) -> list[str] | None:
+def _names_in_comment(comment: str, width: int) -> list[str] | None:
     """The names in the line above the rows, as ``numpy.savetxt`` writes them, if it holds names."""
-    text = comment.strip().lstrip("#%!/")
-    for one in (separator, " ", ",", ";"):
-        words = [word.strip() for word in words_of(text, one)]
-        if len(words) == width and all(words) and not any(map(is_number, words)):
-            return words
-    return None
+    words = re.split(r"[\s,;]+", comment.strip().lstrip("#%!/").strip())
+    return words if len(words) == width and not any(map(is_number, words)) else None
 
 
 class FrameFile:

@@ -14,7 +14,6 @@ import re
 import sys
 from collections.abc import Collection
 from io import BytesIO
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -152,15 +151,11 @@ def read_rows(
     if columns is None:
         raise (ReadError if has_end else CutError)(_bad_line(snapshot, rows, layout))
     if not has_end:
-        warn_of_end(snapshot.path)
+        told = f"{snapshot.path}: the last line has no end"
+        if grows():
+            raise CutError(f"{told}: the file is still being written")
+        warn(f"{told}: if the file was cut, rows or digits may be missing")
     return columns
-
-
-def warn_of_end(path: Path) -> None:
-    """Warn that the last line has no end; CutError if the file may still be being written."""
-    if grows():
-        raise CutError(f"{path}: the last line has no end: the file is still being written")
-    warn(f"{path}: the last line has no end: if the file was cut, rows or digits may be missing")
 
 
 def columns_of(_path: str, rows: bytes, layout: Layout) -> Columns | None:

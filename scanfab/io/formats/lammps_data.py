@@ -23,7 +23,7 @@ STEP = re.compile(rb"timestep = (\d{1,18})\b")
 SECTION = re.compile(rb"\n[ \t]*([A-Z][A-Za-z ]*?)[ \t]*(?:#[ \t]*(\S+)[^\n]*)?\r?$", re.MULTILINE)
 # the box in the header: bounds and perhaps a tilt, or vectors and their origin
 BOUNDS, TILT = (b"xlo xhi", b"ylo yhi", b"zlo zhi"), b"xy xz yz"
-VECTORS = (b"avec", b"bvec", b"cvec", b"abc origin")
+VECTORS, ORIGIN = (b"avec", b"bvec", b"cvec"), b"abc origin"
 # orders of the columns; image flags, and of hybrid styles the columns of others, stand behind
 PLAIN = ("id", "type", "diameter", "density", "x", "y", "z")
 HYBRID = ("id", "type", "x", "y", "z", "diameter", "density")
@@ -109,14 +109,14 @@ def _header(text: bytes) -> dict[bytes, bytes]:
 
 def _cell(path: Path, header: dict[bytes, bytes]) -> Cell | None:
     """The box, from its lower and upper bounds and its tilt, or from three vectors."""
-    keys, count = (VECTORS, 12) if VECTORS[0] in header else (BOUNDS, 6)
-    if TILT in header:
-        keys, count = (*BOUNDS, TILT), 9
-    text = b" ".join(header.get(key, b"") for key in keys)
-    found = np.array(numbers(f"{path}: {b', '.join(keys).decode()}", text, count))
-    bounds = found.reshape(3, 2) if count == 6 else found[:-3].reshape(3, -1)
-    if count > 6:
-        bounds = np.column_stack([bounds, found[-3:]])
+    is_general = VECTORS[0] in header
+    keys, behind = (VECTORS, ORIGIN) if is_general else (BOUNDS, TILT)
+    count = 12 if is_general else 9 if behind in header else 6
+    # the tilt or the origin has a number for each line above it
+    more = header.get(behind, b"").split()
+    lines = [b" ".join([header.get(key, b""), *more[k : k + 1]]) for k, key in enumerate(keys)]
+    where = f"{path}: {b', '.join((*keys, behind)[: count // 3]).decode()}"
+    bounds = np.reshape(numbers(where, b" ".join(lines), count), (3, -1))
     return box_cell(path, bounds, (False, False, False), is_around=False)
 
 

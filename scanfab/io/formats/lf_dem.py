@@ -54,7 +54,10 @@ class LfDemReader(shared.GrainsOnly):
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """Columns by their titles; the images above and below are shifted along x."""
         path = snapshot.path
-        count, x, y, z = _sizes(path)
+        found = dict(SIZES.findall(first_bytes(path, shared.HEADER_BYTES)))
+        words = b" ".join(found.get(name, b"") for name in (b"np", b"Lx", b"Ly", b"Lz"))
+        where = f"{path}: lines '# np', '# Lx', '# Ly' and '# Lz'"
+        count, x, y, z = shared.numbers(where, words, 4)
         needed = ("particle index", "radius", POSITION)
         columns, shift = _columns(snapshot, needed, int(count))
         columns["id"], columns["position"] = columns.pop("particle index"), columns.pop(POSITION)
@@ -105,18 +108,6 @@ def _legend(path: Path) -> dict[str, range]:
     return found
 
 
-def _width(legend: dict[str, range]) -> int:
-    """The number of columns; 0 if the titles are damaged, which is told when a frame is read."""
-    return max((places.stop for places in legend.values()), default=0)
-
-
-def _sizes(path: Path) -> list[float]:
-    """The number of grains and the edges of the cell."""
-    found = dict(SIZES.findall(first_bytes(path, shared.HEADER_BYTES)))
-    words = b" ".join(found.get(name, b"") for name in (b"np", b"Lx", b"Ly", b"Lz"))
-    return shared.numbers(f"{path}: lines '# np', '# Lx', '# Ly' and '# Lz'", words, 4)
-
-
 def _columns(
     snapshot: Snapshot, needed: tuple[str, ...], count: int | None = None
 ) -> tuple[Columns, float]:
@@ -128,7 +119,8 @@ def _columns(
             f"{path}: expected '# strain shear_disp rate' and the titles {', '.join(needed)}, "
             f"found {spelt(data)} and the titles {', '.join(legend)}"
         )
-    layout = Layout(tuple(shared.numbered(_width(legend))), line=2)
+    width = max(places.stop for places in legend.values())
+    layout = Layout(tuple(shared.numbered(width)), line=2)
     rows = read_rows(snapshot, data[frame.end() :], layout, count=count, what="particles")
     table = np.column_stack([*rows.values()])
     columns = {

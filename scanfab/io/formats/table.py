@@ -31,8 +31,8 @@ NUMBERS = ("x", "y", "z", "radius", "diameter", "volume", *WHOLE)
 MOST_COLUMNS = 4096
 CENTRES, SIZES = {"x", "y", "z"}, {"radius", "diameter", "volume"}
 OF_GRAINS = ("x", "y", "z", "radius", "diameter", "id", "clump")
-# grains by which a table without names is judged, and the least median distance of a grain from
-# the nearest one, in r1 + r2: below it the radii are diameters, or these are several frames
+# first grains by which a table without names is judged, and the least median distance of a grain
+# from the nearest one, in its diameters: below it the radii are diameters, or these are frames
 LOOKED_AT, LEAST_DISTANCE = 2000, 0.75
 ASK = (
     'name them, for instance `columns="x=1,y=2,z=3,radius=4"` (or diameter=4; numbers of columns '
@@ -105,14 +105,14 @@ class TableReader:
             table_names.refuse_frames(path, columns)
             table_names.check_units(path, found)
         if "volume" in found and not found.keys() & {"radius", "diameter"}:
-            volume = found["volume"]
-            note(f"radii are those of spheres of the volumes in {volume}: is each particle one?")
-            columns["radius"] = np.cbrt(0.75 / np.pi * doubles(columns[volume]))
+            own = found["volume"]
+            note(f"radii are those of spheres of the volumes in {own}: is each particle one?")
+            columns["radius"] = np.cbrt(0.75 / np.pi * doubles(columns[own]))
             found["radius"] = "radius"
         # of the columns that are known only by their usual names, those of grains
-        own = {one: found[one] for one in found if one in options.columns or one in OF_GRAINS}
+        known = {k: own for k, own in found.items() if k in options.columns or k in OF_GRAINS}
         cell = xyzd_cell(path) if is_xyzd(path) else None
-        return grain_table(path, columns, cell, replace(options, columns=own))
+        return grain_table(path, columns, cell, replace(options, columns=known))
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
@@ -162,20 +162,22 @@ class TableReader:
                 found.append({})
                 wrong = str(error)
         pairs, grains = found
-        is_of_grains = pairs.keys() >= CENTRES and SIZES & pairs.keys()
-        has_ids = {"id1", "id2"} <= pairs.keys() and not is_of_grains
+        has_ids = {"id1", "id2"} <= pairs.keys() and not _are_grains(pairs)
         if self.options.contact_columns and has_ids:
             # other tables may have columns of these numbers: ids are whole numbers
             places = [head.layout.names.index(pairs[one]) for one in ("id1", "id2")]
             if all("".join(row[k].strip() for k in places).isdigit() for row in head.rows):
                 return "contacts"
-        if grains.keys() >= CENTRES and SIZES & grains.keys():
-            return "grains"
-        if has_ids:
-            return "contacts"
+        if _are_grains(grains) or has_ids:
+            return "grains" if _are_grains(grains) else "contacts"
         if grains.keys() >= CENTRES:
             return "points"
         raise ReadError(wrong)
+
+
+def _are_grains(columns: dict[str, str]) -> bool:
+    """Whether columns say where grains are, and how large."""
+    return columns.keys() >= CENTRES and not SIZES.isdisjoint(columns)
 
 
 @dataclass(frozen=True)
@@ -254,10 +256,8 @@ def _refuse_wrong_guess(path: Path, found: dict[str, str], columns: Columns) -> 
     elif "clump" in found and columns[found["clump"]].dtype.kind != "i":
         lacks = "some numbers of clumps would not be whole"
     elif len(radius) > 1 and np.all(np.abs(position) < MOST):
-        chosen = np.random.default_rng(0).permutation(len(radius))[:LOOKED_AT]
-        near = KDTree(position, balanced_tree=False).query(position[chosen], k=2)
-        away, other = (nearest[:, 1] for nearest in near)
-        if np.median(away / (radius[chosen] + radius[other])) < LEAST_DISTANCE:
+        away, nearest = KDTree(position, balanced_tree=False).query(position[:LOOKED_AT], k=2)
+        if np.median(away[:, 1] / radius[nearest].sum(axis=1)) < LEAST_DISTANCE:
             lacks = "grains would lie in one another: is the last a diameter, or are these two "
             lacks += "frames"
     told = " ".join(found)

@@ -159,9 +159,6 @@ def check_units(path: Path, found: Mapping[str, str], contacts: bool = False) ->
     if len({units[name] for name in named}) > 1:
         what = "forces" if contacts else "lengths (and volumes in its cube)"
         raise ReadError(f"{path}: expected {what} of one unit, found {', '.join(named)}")
-    if named and len(named) < len(units) and not contacts:
-        lacking = ", ".join(name for name in units if name not in named)
-        warn(f"{path}: {', '.join(named)} name a unit, {lacking} none: it is taken for all")
 
 
 def refuse_frames(path: Path, columns: Columns) -> None:

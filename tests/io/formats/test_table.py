@@ -199,11 +199,8 @@ def test_ids_above_what_decimals_hold_stay_exact(tmp_path):
     np.testing.assert_array_equal(read(path).id, ID + 2**53)
 
 
-def test_a_table_without_rows_is_an_empty_frame_unless_its_names_were_cut(tmp_path):
+def test_a_table_without_rows_is_an_empty_frame(tmp_path):
     assert len(read(write(tmp_path / "g.csv", "id,x,y,z,radius\n"))) == 0
-    path = write(tmp_path / "g.csv", "id,x,y,z,rad")
-    with pytest.warns(ScanfabWarning, match=r"g\.csv: the last line has no end"):
-        assert len(scanfab.read(path, columns={"radius": "rad"})) == 0
 
 
 def test_side_columns_may_have_gaps(tmp_path, capsys):
