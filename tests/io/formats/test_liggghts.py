@@ -174,14 +174,6 @@ def test_the_box_beside_a_vtk_file_is_its_cell(tmp_path, name, ending):
     assert packing.cell.periodic == (True, True, False)
 
 
-def test_the_pieces_of_a_vtm_file_are_read_by_themselves():
-    folder = FLOOR / "vtm" / "all_30000"
-    contacts = folder / "all_30000_0.vtp"
-    packing = scanfab.read(folder / "all_30000_1.vtu", contacts=contacts, **FLOOR_CELL)
-    assert_true_grains(packing, FLOOR)
-    assert_true_contacts(packing, FLOOR)
-
-
 def test_a_contact_across_a_face_without_a_cell_asks_for_it():
     with pytest.raises(scanfab.PackingError, match="name its cell"):
         scanfab.read(FLOOR / "grains_30000.vtk", contacts=FLOOR / "pairs_pos_id_force_30000.vtk")

@@ -51,15 +51,6 @@ def test_contacts_go_by_their_time_and_forces_act_on_the_second_grain(run):
     assert (cell.periodic, cell.vectors.diagonal().tolist()) == ((False,) * 3, [1, 2, 3])
 
 
-def test_one_frame_of_contacts_is_not_that_of_all_grains(tmp_path):
-    write(tmp_path / "run.data", data_frame(0.1) + data_frame(0.2))
-    write(tmp_path / "run.fstat", fstat_frame(0.2, contacts_at(0.2)))
-    series = scanfab.read_series(tmp_path, cell=(1, 2, 3))
-    assert len(series[1].read().contacts) == 2
-    with pytest.warns(ScanfabWarning, match="no contact file for time 0.1"):
-        assert series[0].read().contacts is None
-
-
 def test_planes_and_frames_without_grains(tmp_path):
     rows = "0.1 1 9 9 0.1 0 0 0\n0.29 1 9 9 0.1 0 0 1\n"
     packing = scanfab.read(write(tmp_path / "a.data", f"2 0.5 0 0 1 2 \n{rows}"), dim=2)

@@ -12,7 +12,7 @@ import scanfab
 from scanfab import ReadError, ScanfabNote
 from scanfab.io import reader as readers
 from scanfab.io.formats import musen as musen_reader
-from scanfab.io.reader import ReadOptions, reader_named
+from scanfab.io.reader import reader_named
 from scanfab.testing import check_reader
 from tests.helpers.dumps import write
 from tests.helpers.made import esys, gsd, musen
@@ -106,16 +106,6 @@ def test_the_kit(tmp_path, format):
     for path in paths:
         if reader.kind(path) == "grains":
             check_reader(reader, [path], tmp_path / "damaged", counts=path.name in COUNTED)
-
-
-def test_there_are_no_contacts(tmp_path):
-    path, reader = SMALL["mfix"](tmp_path)[0], reader_named("mfix")
-    with pytest.raises(ReadError, match="expected contacts, found grains"):
-        scanfab.read(path, contacts=path)
-    snapshot = reader.snapshots(path)[0]
-    grains = reader.read_grains(snapshot, ReadOptions())
-    with pytest.raises(ReadError, match="mfix files hold no contacts"):
-        reader.read_contacts(snapshot, ReadOptions(), grains)
 
 
 @pytest.mark.parametrize("behind", ["", esys.TURNS, " 1", " 1 0.1" + esys.TURNS + " 1"])

@@ -134,32 +134,27 @@ def test_only_a_periodic_box_must_have_a_volume(tmp_path, edge):
         read(tmp_path, dump_text(box=box, flags=" ff pp ff"))
 
 
-COUNTS = [("ATOMS\n3", f"ATOMS\n{bad}", "whole number") for bad in ("", "many", "-1", "9" * 30)]
-STEPS = [("STEP\n0", f"STEP\n{bad}", "whole number") for bad in ("", "ten", "1.5", "9" * 5000)]
-BOXES = [("ff ff ff", flags, "BOX BOUNDS.*expected") for flags in ("zz zz zz", "pp pp", "xy xz yz")]
+WHOLE = [("ATOMS\n3", f"ATOMS\n{bad}", "whole number") for bad in ("", "many", "-1", "9" * 30)]
+WHOLE += [("STEP\n0", f"STEP\n{bad}", "whole number") for bad in ("", "ten", "1.5", "9" * 5000)]
 
 
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        *COUNTS,
-        *STEPS,
-        *BOXES,
+        *WHOLE,
+        ("ff ff ff", "zz zz zz", "BOX BOUNDS.*expected"),
+        ("ff ff ff", "pp pp", "BOX BOUNDS.*expected"),
         ("ITEM: TIMESTEP\n0\n", "", "expected the header of a frame"),
         ("BOX BOUNDS ff ff ff\n0 1\n", "BOX BOUNDS ff ff ff\n", "BOX BOUNDS.*expected 6 numbers"),
-        ("ff ff ff\n0 1", "ff ff ff\n0 one", "BOX BOUNDS.*expected 6 numbers"),
         ("ITEM: TIMESTEP", TIMES.format("now") + "ITEM: TIMESTEP", "ITEM: TIME: expected 1 num"),
         ("ATOMS\n3", "ATOMS\n9", "step 0: .*counts 9 rows, found 3: the file is incomplete"),
         ("ATOMS\n3", "ATOMS\n2", "counts 2 rows, found 3"),
-        ("ATOMS\n3", "ATOMS\n999999999999", "counts 999999999999 rows"),
         ("0.39", "oops", "dump, line 1[19]: .* found 'oops'"),
         ("2 1 0.39", "2 1", "dump, line 11: expected 6 columns, found 5"),
         ("natoms: 3", "natoms: 4", "counts 4 rows, found 3"),
-        ("natoms: 3", "natoms: x", "whole number"),
         (", -3, ]\n  -", ", ]\n  -", "line 18: expected 7 columns, found 6"),
         ("p, f", "p, q", "expected three boundary flags"),
         ("box:", "bax:", "expected 6 numbers"),
-        ("timestep: 100", "timestep:", "whole number as ITEM: TIMESTEP"),
         ("data:\n  - [", "", "whole number"),
     ],
 )
