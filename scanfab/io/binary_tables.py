@@ -106,11 +106,10 @@ def _parts(name: str, shape: tuple[int, ...]) -> list[str]:
     """The names of the columns of an array of an NPZ file; none if it cannot be columns."""
     if len(shape) != 2 or shape[1] > 9:
         return [name] if len(shape) == 1 else []
-    if name.lower() in POSITIONS:
-        return list("xyz"[: shape[1]])
-    if name.lower() in PAIRS and shape[1] == 2:
-        return ["id1", "id2"]
-    return [f"{name}_{axis}" for axis in ("xyz" if shape[1] == 3 else range(shape[1]))]
+    axes = list("xyz"[: shape[1]]) if shape[1] < 4 else [f"{k}" for k in range(shape[1])]
+    is_pair = name.lower() in PAIRS and shape[1] == 2
+    known = axes if name.lower() in POSITIONS else ["id1", "id2"] if is_pair else None
+    return known or [f"{name}_{axis}" for axis in axes]
 
 
 def npz_shapes(path: Path) -> dict[str, tuple[int, ...]]:

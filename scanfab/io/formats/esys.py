@@ -28,10 +28,10 @@ BASIC = "x y z radius id tag mass x0 y0 z0 xo yo zo vx vy vz fx fy fz sx sy sz"
 TURNS = "q0 q1 q2 q3 wx wy wz"
 # snapshots and checkpoints, without and with rotation; by the number of their columns
 TITLES = (BASIC, f"{BASIC} {TURNS}", f"{BASIC} is_dynamic", f"{BASIC} is_dynamic i {TURNS} is_rot")
-LAYOUTS = {len(one.split()): Layout(tuple(one.split()), whole=["id"]) for one in TITLES}
+LAYOUTS = {len(one.split()): Layout(tuple(one.split()), line=2, whole=["id"]) for one in TITLES}
 # name of a worker's file, and the number of particles in its first line
 PART = re.compile(r"(.*_t=\d+_)[1-9]\d*(\.\w+)")
-COUNT = re.compile(rb"\s*(\d{1,15})[ \t]*\r?\n")
+COUNT = re.compile(rb"[ \t]*(\d{1,15})[ \t]*\r?\n")
 LONGEST = 1 << 20
 
 
@@ -100,7 +100,6 @@ def _particles(file: Path) -> Columns:
     lines = data[head.end() :].split(b"\n")
     found = [*takewhile(lambda line: len(line.split()) in LAYOUTS, lines)]
     layout = LAYOUTS[len(found[0].split()) if found else len(BASIC.split())]
-    layout = layout._replace(line=data.count(b"\n", 0, head.end()) + 1)
     # the last row has its line end if anything stands behind it
     rows = b"\n".join([*found, *[b""] * (len(found) < len(lines))])
     return read_rows(Snapshot(file), rows, layout, count=int(head[1]), what="particles")

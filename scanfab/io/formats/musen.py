@@ -93,7 +93,8 @@ def _export(path: Path, stamp: Stamp) -> tuple[Columns, Cell | None, bool]:
 
 def _spheres(path: Path, rows: list[bytes]) -> Columns:
     """What is read of each sphere; all spheres must have the properties of the first one."""
-    words, names, states = rows[0].split(), list[str](), 0
+    words, states = rows[0].split(), 0
+    names: list[str] = []
     keys: dict[str, bytes] = {}
     while len(names) < len(words) and (key := words[len(names)]) in SIZES:
         states += key == TIME
@@ -108,9 +109,9 @@ def _spheres(path: Path, rows: list[bytes]) -> Columns:
             f"{path}: expected properties 0 ID ... 5 RADIUS ... 2 TIME 12 X Y Z ... in the rows of "
             f"spheres, found {spelt(b' '.join([*keys.values(), *words[len(names) :]]))}"
         )
-    read = {name for name in names if "_" not in name}
-    layout = Layout(tuple(names), optional={*names} - read)
+    read = [name for name in names if "_" not in name]
+    layout = Layout(tuple(names), optional={*names} - {*read})
     columns = read_rows(Snapshot(path), b"\n".join([*rows, b""]), layout)
     if any(np.any(columns[name] != float(key)) for name, key in keys.items()):
         raise ReadError(f"{path}: expected the properties of the first sphere in the rows of all")
-    return {name: columns[name] for name in read - keys.keys()}
+    return {name: columns[name] for name in read if name not in keys}

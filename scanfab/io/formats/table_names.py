@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scanfab.base.errors import ReadError, warn
+from scanfab.base.errors import ReadError
 from scanfab.io.columns import (
     DIAMETER_NAMES,
     ID_NAMES,
@@ -24,8 +24,6 @@ Names = Mapping[str, tuple[str, ...]]
 
 # columns that tell frames of one file apart
 FRAME_NAMES = ("step", "timestep", "time.step", "frame", "time", "time.s", "time.ms")
-# those that may, and may be a property of grains, too
-PERHAPS_FRAMES = ("t", "iteration", "iter", "cycle", "cycles", "snapshot", "increment")
 # of contacts: the force on either grain, the image of the second, the force on the first or second,
 # the normal and the tangential part; names behind the first ones are PFC's and EDEM's
 FORCES: Names = {
@@ -162,16 +160,10 @@ def check_units(path: Path, found: Mapping[str, str], contacts: bool = False) ->
 
 
 def refuse_frames(path: Path, columns: Columns) -> None:
-    """ReadError, or a warning if it is not sure, for a table of several frames."""
+    """ReadError for a table of several frames."""
     for name, values in columns.items():
-        plain = plain_name(name)
-        if values.dtype.kind not in "iuf" or plain not in (*FRAME_NAMES, *PERHAPS_FRAMES):
-            continue
-        count = len(np.unique(values))
-        told = f"{path}: the column {name} has {count} values"
-        if count > 1 and plain in FRAME_NAMES:
-            raise ReadError(f"{told}: expected one frame in a file")
-        blocks = np.count_nonzero(np.diff(values)) + 1
-        if 1 < count == blocks <= len(values) / 2:
-            told += ", each in rows that follow each other"
-            warn(f"{told}: if these are frames, write each to a file of its own")
+        count = len(np.unique(values)) if is_frame_name(name) else 1
+        if count > 1:
+            raise ReadError(
+                f"{path}: the column {name} has {count} values: expected one frame in a file"
+            )

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import shutil
 import struct
-import subprocess
 
 import numpy as np
 import pytest
@@ -82,34 +80,3 @@ ONE, BLOCK = binary_dump(names=NAMES), struct.pack("<i", 18)
 def test_what_cannot_be_read_is_told(tmp_path, data, told):
     with pytest.raises(ReadError, match=rf"dump.bin.*{told}"):
         scanfab.read(written(tmp_path, data))
-
-
-DECK = """
-units si
-atom_style sphere
-boundary p p f
-newton off
-comm_modify vel yes
-region box block 0 1 0 1 0 1 units box
-create_box 1 box
-create_atoms 1 random 40 7 box
-set group all diameter 0.05
-set group all density 2500
-pair_style gran/hooke 200000.0 NULL 50.0 NULL 0.5 0
-pair_coeff * *
-fix 1 all nve/sphere
-dump text all custom 1 t.*.txt id type x y z radius
-dump bits all custom 1 b.*.bin id type x y z radius
-dump_modify text format float %.17g
-run 0
-"""
-
-
-@pytest.mark.skipif(shutil.which("lmp") is None, reason="LAMMPS is not installed")
-def test_lammps_own_dumps_are_the_same_packing(tmp_path):
-    (tmp_path / "deck").write_text(DECK)
-    subprocess.run(["lmp", "-in", "deck"], cwd=tmp_path, check=True, capture_output=True)
-    text, bits = (scanfab.read(tmp_path / name) for name in ("t.0.txt", "b.0.bin"))
-    np.testing.assert_array_equal(text.position, bits.position)
-    np.testing.assert_array_equal(text.id, bits.id)
-    assert text.cell.periodic == bits.cell.periodic == (True, True, False)

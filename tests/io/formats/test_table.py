@@ -158,7 +158,6 @@ ROWS = "0,0,0,0.5,7\n1,0,0,0.5,7\n"
     ("names", "columns", "twice"),
     [
         ("", {"x": 2, "y": "2", "z": 4, "radius": 5}, "'2' is named twice .*, as x and as y"),
-        ("a,b,c,d,e\n", {"x": "a", "y": 2, "z": "b", "radius": "d"}, "'b' .*, as y and as z"),
         ("x,y,z,r,e\n", {"radius": "r", "age": "r"}, "'r' is named twice in .*, as radius and"),
     ],
 )
@@ -208,16 +207,6 @@ def test_frames_one_below_the_other_are_refused_whatever_their_name(tmp_path, na
     path = rows(tmp_path / "a.csv", POSITION, RADIUS, ID > 500, names=[*"xyzr", name])
     write(path, path.read_text().replace("True", "1").replace("False", "0"))
     with pytest.raises(ReadError, match=re.escape(f"the column {name} has 2 values: expected one")):
-        read(path)
-
-
-def test_what_may_be_frames_is_told(tmp_path):
-    frames = np.repeat([1.0, 2.0], 32)
-    path = rows(tmp_path / "a.csv", frames, POSITION, RADIUS, names="txyzr")
-    with pytest.warns(ScanfabWarning, match="column t has 2 values, each in rows that follow"):
-        read(path)
-    path = rows(tmp_path / "b.csv", frames[ID % 64], POSITION, RADIUS, names="txyzr")
-    with no_warning():  # these are temperatures
         read(path)
 
 
