@@ -9,6 +9,7 @@ import struct
 import sys
 import tempfile
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from scanfab.base.errors import ReadError
 from scanfab.io import files
 from scanfab.io import text as text_table
 from scanfab.io.mesh import read_mesh
-from tests.helpers.dumps import dump_text
+from tests.helpers.dumps import dump_text, write
 
 BLOCK = 1 << 20
 ZEROS = zlib.compress(bytes(BLOCK))
@@ -33,15 +34,6 @@ def packed(data: bytes = b"", zeros: int = 0) -> str:
     return base64.b64encode(sizes).decode() + base64.b64encode(b"".join(blocks)).decode()
 
 
-def polydata(count: int, points: str, *arrays: str, lines: int = 0) -> bytes:
-    return (
-        '<VTKFile type="PolyData" byte_order="LittleEndian" header_type="UInt64" '
-        'compressor="vtkZLibDataCompressor"><PolyData>'
-        f'<Piece NumberOfPoints="{count}" NumberOfLines="{lines}"><PointData>{"".join(arrays)}'
-        f"</PointData><Points>{array('Points', points, 3)}</Points></Piece></PolyData></VTKFile>"
-    ).encode()
-
-
 def array(name: str, content: str, components: int = 1) -> str:
     return (
         f'<DataArray type="Float64" Name="{name}" NumberOfComponents="{components}" '
@@ -49,47 +41,45 @@ def array(name: str, content: str, components: int = 1) -> str:
     )
 
 
-def some_points(count: int) -> str:
-    return packed(np.random.default_rng(0).uniform(size=3 * count).tobytes())
+def polydata(path: Path, count: int, points: str, *arrays: str) -> Path:
+    return write(
+        path,
+        '<VTKFile type="PolyData" byte_order="LittleEndian" header_type="UInt64" '
+        'compressor="vtkZLibDataCompressor"><PolyData>'
+        f'<Piece NumberOfPoints="{count}"><PointData>{"".join(arrays)}</PointData>'
+        f"<Points>{array('Points', points, 3)}</Points></Piece></PolyData></VTKFile>",
+    )
+
+
+SOME_POINTS = packed(np.random.default_rng(0).uniform(size=300).tobytes())
+LONG = packed(zeros=600)
 
 
 @pytest.mark.parametrize(
-    ("data", "told"),
+    ("count", "points", "more", "told"),
     [
-        (
-            polydata(100, some_points(100), array("radius", packed(zeros=600))),
-            "radius has 78643200 of 100 values",
-        ),
-        (
-            polydata(100, some_points(100), array("a", packed(zeros=600), 600 * BLOCK // 800)),
-            "its library crashed",
-        ),
-        (polydata(600 * BLOCK, packed(zeros=600)), "Points has 78643200 of|its library crashed"),
+        (100, SOME_POINTS, [array("radius", LONG)], "radius has 78643200 of 100 values"),
+        (100, SOME_POINTS, [array("a", LONG, 600 * BLOCK // 800)], "its library crashed"),
+        (600 * BLOCK, LONG, [], "Points has 78643200 of|its library crashed"),
     ],
 )
-def test_arrays_that_are_far_too_long_are_refused(tmp_path, data, told):
-    path = tmp_path / "a.vtp"
-    path.write_bytes(data)
+def test_arrays_that_are_far_too_long_are_refused(tmp_path, count, points, more, told):
     with pytest.raises(ReadError, match=told):
-        read_mesh(path)
+        read_mesh(polydata(tmp_path / "a.vtp", count, points, *more))
 
 
 def test_an_array_of_one_value_is_no_bomb(tmp_path):
     """All grains of one radius: a thousand bytes in one."""
-    count = 3 * BLOCK
-    radii = array("radius", packed(zeros=24))
+    count, radii = 3 * BLOCK, array("radius", packed(zeros=24))
     lattice = np.stack(np.meshgrid(np.arange(128.0), np.arange(128.0), np.arange(192.0)), -1)
-    path = tmp_path / "a.vtp"
-    path.write_bytes(polydata(count, packed(lattice.tobytes()), radii))
-    mesh = read_mesh(path)
+    mesh = read_mesh(polydata(tmp_path / "a.vtp", count, packed(lattice.tobytes()), radii))
     np.testing.assert_array_equal(mesh.points, lattice.reshape(-1, 3))
     np.testing.assert_array_equal(mesh.point_arrays["radius"], np.zeros(count))
 
 
 def test_what_does_not_fit_into_memory_is_told(tmp_path, monkeypatch):
-    monkeypatch.setattr(files, "free_memory", lambda: 1_000_000)
-    path = tmp_path / "a.vtp"
-    path.write_bytes(polydata(100_000, some_points(100_000)))
+    monkeypatch.setattr(files, "free_memory", lambda: 1_000)
+    path = polydata(tmp_path / "a.vtp", 100, SOME_POINTS)
     with pytest.raises(ReadError, match=r"needs about 0.0 GB of memory .*and 0.0 GB are free"):
         scanfab.read(path)
 

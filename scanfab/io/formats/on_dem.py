@@ -1,14 +1,12 @@
 """
-ON-DEM's exchange format (VTKHDF with a group ONDEM), read and written.
+ON-DEM's exchange format (VTKHDF with a group ONDEM).
 
-Drafts 0.1 and 0.2 are read, and 0.1 is written. They differ in more than names: the normal force is
-positive in compression in the first, and in traction in the second. What the draft has no name for
-(the cell, images, the whole force) has a name of ours.
+Drafts 0.1 and 0.2 are read, and 0.1 is written (by `writers.vtk`). They differ in more than names:
+the normal force is positive in compression in the first, and in traction in the second.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,21 +22,15 @@ from scanfab.io.formats.shared import GrainsOnly
 from scanfab.io.hdf import HdfFile, is_hdf, read_hdf_file
 from scanfab.io.mesh import Arrays, joined_arrays
 from scanfab.io.reader import Carries, GrainTable, ReadOptions, Snapshot
-from scanfab.io.writer import Left, as_arrays, cell_of
-from scanfab.packing.packing import Packing
+from scanfab.io.writer import cell_of
+from scanfab.io.writers.vtk import BODIES, INTERACTIONS, SCENE, SCENE_NAMES, STROKE, write_on_dem
 
 # what a positive normal force means, by draft: +1 compression
 SIGNS = {"0.1": 1.0, "0.2": -1.0}
-SCENE, BODIES, INTERACTIONS = "ONDEM/Scene", "ONDEM/Bodies/sphere", "ONDEM/Interactions"
-# attributes of the scene, by the names of writer.Arrays
-FRAME = {"step": "iteration", "time": "time", "cell": "cell"}
-FRAME |= {"origin": "cell_origin", "periodic": "cell_periodic"}
 # the columns of interactions that matter, and the shapes of their values
 COLUMNS: dict[str, tuple[int, ...]] = {"id1": (), "id2": (), "virtual": (), "normal_force": ()}
 COLUMNS |= dict.fromkeys(("normal", "shear_force", "force", "image"), (3,))
 NONE: Arrays = {"id1": np.zeros(0), "id2": np.zeros(0)}
-# stands for / in the names of columns, which would make a group
-STROKE = "\u2215"
 
 
 class OnDemReader(GrainsOnly):
@@ -48,6 +40,7 @@ class OnDemReader(GrainsOnly):
     description = "ON-DEM's VTKHDF (drafts 0.1 and 0.2): spheres and contacts with forces"
     extensions: tuple[str, ...] = (".vtkhdf",)
     lists_contacts = True
+    write = staticmethod(write_on_dem)
 
     def recognises(self, path: Path) -> bool:
         """By the groups VTKHDF and ONDEM."""
@@ -71,63 +64,11 @@ class OnDemReader(GrainsOnly):
         """The bodies with a radius, and the interactions between them."""
         path, file = snapshot.path, read_hdf_file(snapshot.path)
         scene = file.attributes.get(SCENE, {})
-        cell = cell_of(path, {name: scene[own] for name, own in FRAME.items() if own in scene})
+        cell = cell_of(
+            path, {name: scene[own] for name, own in SCENE_NAMES.items() if own in scene}
+        )
         grains = grain_table(path, _spheres(path, file), cell, options)
         return grains if INTERACTIONS not in file.attributes else _joined(path, file, grains)
-
-    def write(self, packing: Packing, path: Path) -> Left:
-        """Write one frame; it holds everything."""
-        import h5py
-
-        arrays, count = as_arrays(packing), len(packing)
-        columns = {**arrays.grains, **arrays.own}
-        columns["body_id"] = columns.pop("id")
-        # VTK reads no texts at points
-        texts = {name: values for name, values in columns.items() if values.dtype.kind == "U"}
-        # in memory first: on a full disk HDF5 ends the process
-        with h5py.File(path, "w", driver="core", backing_store=False, track_order=True) as file:
-            file.attrs.update(file_format="ON-DEM VTKHDF", file_format_version="0.1-draft")
-            file.attrs["source_code"] = "scanfab"
-            # PolyData with a vertex at each point, so that ParaView shows them
-            group = file.create_group("VTKHDF", track_order=True)
-            group.attrs.update(Type=np.bytes_("PolyData"), Version=np.array([2, 0]))
-            group["NumberOfPoints"] = np.array([count])
-            group["Points"] = packing.position
-            for cells, filled in {
-                "Vertices": count,
-                "Lines": 0,
-                "Polygons": 0,
-                "Strips": 0,
-            }.items():
-                group[f"{cells}/NumberOfCells"] = np.array([filled])
-                group[f"{cells}/NumberOfConnectivityIds"] = np.array([filled])
-                group[f"{cells}/Connectivity"] = np.arange(filled)
-                group[f"{cells}/Offsets"] = np.arange(filled + 1)
-            points = group.create_group("PointData", track_order=True)
-            _write(points, {name: one for name, one in columns.items() if name not in texts})
-            if texts:
-                _write(file.create_group(BODIES), {"body_id": packing.id, **texts})
-            scene = file.create_group(SCENE)
-            scene.attrs["scanfab"] = 1
-            for name, value in arrays.frame.items():
-                scene.attrs[FRAME[name]] = np.int8(value) if name == "periodic" else value
-            if (contacts := packing.contacts) is not None:
-                group = file.create_group(INTERACTIONS)
-                group.attrs["count"] = len(contacts)
-                # as the draft has them, and the whole force, which no rounding has touched
-                table = {**arrays.contacts, "virtual": np.zeros(len(contacts), np.int8)}
-                table |= {"normal": contacts.normal, "contact_point": contacts.point}
-                table.pop("force_n", None)
-                if contacts.force_n is not None:
-                    table["normal_force"] = contacts.force_n
-                if contacts.force is not None and contacts.force_n is not None:
-                    normal_part = contacts.force_n[:, None] * contacts.normal
-                    table["shear_force"] = contacts.force - normal_part
-                _write(group, table)
-            file.flush()
-            image = file.id.get_file_image()
-        path.write_bytes(image)
-        return Left(no_step=False, notes=tuple(arrays.notes))
 
 
 def _scene(path: Path) -> dict[str, Any]:
@@ -202,14 +143,3 @@ def _force(path: Path, file: HdfFile, table: Arrays) -> tuple[FloatArray | None,
     if not {"normal", "shear_force"} <= table.keys():
         return None, normal
     return doubles(normal[:, None] * table["normal"] + table["shear_force"]), None
-
-
-def _write(group: Any, columns: Mapping[str, Any]) -> None:
-    import h5py
-
-    for name, values in columns.items():
-        plain = name.replace("/", STROKE)
-        if values.dtype.kind == "U":
-            group.create_dataset(plain, data=values.astype(object), dtype=h5py.string_dtype())
-        else:
-            group[plain] = values.astype(np.uint8) if values.dtype.kind == "b" else values

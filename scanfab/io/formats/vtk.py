@@ -18,7 +18,7 @@ from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
 from scanfab.io.formats.yade_save import cell_beside, cell_file, is_cell_file
 from scanfab.io.mesh import Mesh, elements, form_of, holds_mesh, listed, read_mesh
 from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.io.writers.vtp import moment_of, packing_of, says_all
+from scanfab.io.writers.vtk import moment_of, packing_of, says_all
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList
 

@@ -1,4 +1,9 @@
-"""Packings as VTK's PolyData (``.vtp``): spheres as points, contacts as lines between them."""
+"""
+Packings as VTK's PolyData (``.vtp``) and as ON-DEM's VTKHDF, draft 0.1.
+
+Spheres are points. In PolyData contacts are lines between them; ON-DEM has a table of them. What
+its draft has no name for (the cell, images, the whole force) has a name of ours.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.io.files import first_bytes
-from scanfab.io.writer import Left, as_arrays, cell_of, contacts_of
+from scanfab.io.writer import Columns, Left, as_arrays, cell_of, contacts_of
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList
 from scanfab.packing.packing import Packing
@@ -31,6 +36,13 @@ HEAD = 1 << 14
 KNOWN = "scanfab_contacts"
 FIELDS = {name: f"scanfab_{name}" for name in ("step", "cell", "origin", "periodic")}
 FIELDS["time"] = "TimeValue"
+
+# the groups of ON-DEM, and the attributes of its scene by the names of writer.Arrays
+SCENE, BODIES, INTERACTIONS = "ONDEM/Scene", "ONDEM/Bodies/sphere", "ONDEM/Interactions"
+SCENE_NAMES = {"step": "iteration", "time": "time", "cell": "cell"}
+SCENE_NAMES |= {"origin": "cell_origin", "periodic": "cell_periodic"}
+# stands for / in the names of columns, which would make a group
+STROKE = "\u2215"
 
 
 class VtpWriter:
@@ -116,3 +128,69 @@ def packing_of(path: Path, mesh: Mesh) -> tuple[Cell | None, ContactList | None]
     cell = {name: fields[own] for name, own in FIELDS.items() if own in fields}
     contacts = contacts_of(mesh.lines, mesh.line_arrays) if np.any(fields[KNOWN]) else None
     return cell_of(path, cell), contacts
+
+
+def write_on_dem(packing: Packing, path: Path) -> Left:
+    """Write one frame; it holds everything."""
+    import h5py
+
+    arrays, count = as_arrays(packing), len(packing)
+    columns = {**arrays.grains, **arrays.own}
+    columns["body_id"] = columns.pop("id")
+    # VTK reads no texts at points
+    texts = {name: values for name, values in columns.items() if values.dtype.kind == "U"}
+    # in memory first: on a full disk HDF5 ends the process
+    with h5py.File(path, "w", driver="core", backing_store=False, track_order=True) as file:
+        file.attrs.update(file_format="ON-DEM VTKHDF", file_format_version="0.1-draft")
+        file.attrs["source_code"] = "scanfab"
+        # PolyData with a vertex at each point, so that ParaView shows them
+        group = file.create_group("VTKHDF", track_order=True)
+        group.attrs.update(Type=np.bytes_("PolyData"), Version=np.array([2, 0]))
+        group["NumberOfPoints"] = np.array([count])
+        group["Points"] = packing.position
+        for cells, filled in {
+            "Vertices": count,
+            "Lines": 0,
+            "Polygons": 0,
+            "Strips": 0,
+        }.items():
+            group[f"{cells}/NumberOfCells"] = np.array([filled])
+            group[f"{cells}/NumberOfConnectivityIds"] = np.array([filled])
+            group[f"{cells}/Connectivity"] = np.arange(filled)
+            group[f"{cells}/Offsets"] = np.arange(filled + 1)
+        points = group.create_group("PointData", track_order=True)
+        _write(points, {name: one for name, one in columns.items() if name not in texts})
+        if texts:
+            _write(file.create_group(BODIES), {"body_id": packing.id, **texts})
+        scene = file.create_group(SCENE)
+        scene.attrs["scanfab"] = 1
+        for name, value in arrays.frame.items():
+            scene.attrs[SCENE_NAMES[name]] = np.int8(value) if name == "periodic" else value
+        if (contacts := packing.contacts) is not None:
+            group = file.create_group(INTERACTIONS)
+            group.attrs["count"] = len(contacts)
+            # as the draft has them, and the whole force, which no rounding has touched
+            table = {**arrays.contacts, "virtual": np.zeros(len(contacts), np.int8)}
+            table |= {"normal": contacts.normal, "contact_point": contacts.point}
+            table.pop("force_n", None)
+            if contacts.force_n is not None:
+                table["normal_force"] = contacts.force_n
+            if contacts.force is not None and contacts.force_n is not None:
+                normal_part = contacts.force_n[:, None] * contacts.normal
+                table["shear_force"] = contacts.force - normal_part
+            _write(group, table)
+        file.flush()
+        image = file.id.get_file_image()
+    path.write_bytes(image)
+    return Left(no_step=False, notes=tuple(arrays.notes))
+
+
+def _write(group: Any, columns: Columns) -> None:
+    import h5py
+
+    for name, values in columns.items():
+        plain = name.replace("/", STROKE)
+        if values.dtype.kind == "U":
+            group.create_dataset(plain, data=values.astype(object), dtype=h5py.string_dtype())
+        else:
+            group[plain] = values.astype(np.uint8) if values.dtype.kind == "b" else values
