@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,9 +14,6 @@ from scanfab.base.typing import IntArray
 
 # lengths from LEAST to MOST: the cubes of these are still numbers
 LEAST, MOST = 1e-100, 1e100
-
-Arrays = TypeVar("Arrays")
-"""A dataclass all of whose fields are arrays."""
 
 
 def doubles(values: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
@@ -67,9 +64,13 @@ def grains_named(id: IntArray, wrong: npt.NDArray[np.bool_]) -> str:
     return f"grain {first}" if number == 1 else f"{number} grains, the first is {first}"
 
 
-def concatenated(parts: Sequence[Arrays]) -> Arrays:
-    """Dataclasses of arrays as one, in which each field has those of all parts, in their order."""
-    kind: Any = type(parts[0])
-    names = [field.name for field in fields(kind)]
-    whole: Arrays = kind(*(np.concatenate([getattr(one, name) for one in parts]) for name in names))
-    return whole
+def concatenated(parts: Sequence[Any]) -> Any:
+    """Arrays, or dataclasses and dicts of arrays, as one that has those of all parts in order."""
+    first = parts[0]
+    if isinstance(first, np.ndarray):
+        return np.concatenate(parts)
+    if isinstance(first, dict):
+        return {key: concatenated([one[key] for one in parts]) for key in first}
+    names = [field.name for field in fields(first)]
+    whole = {name: concatenated([getattr(one, name) for one in parts]) for name in names}
+    return type(first)(**whole)

@@ -25,7 +25,6 @@ from scanfab.packing.sample import Sample
 from scanfab.pipeline.cluster import DaskExecutor, DeadWorkersError
 from scanfab.pipeline.frame import FrameResult, compute_frame
 from scanfab.pipeline.frames import Frames, Readable, Source
-from scanfab.pipeline.maps.frame import map_frame
 from scanfab.pipeline.plan import Plan, make_plan, plan_without_grains
 from scanfab.pipeline.settings import MAX_CHORDS, Settings
 from scanfab.pipeline.strain import Flips
@@ -200,8 +199,7 @@ class _FrameJob:
 
     def _computed(self, plan: Plan) -> _Computed:
         begun = time.perf_counter()
-        compute_one = map_frame if plan.map_settings else compute_frame
-        found = compute_one(self.frame, plan, number=self.number, source=self.source)
+        found = compute_frame(self.frame, plan, number=self.number, source=self.source)
         seconds = time.perf_counter() - begun
         grains = found.sample.number(found.sample.grains)
         LOGGER.info("%s: frame %d: %d grains in %.2g s", self.source, self.number, grains, seconds)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 from scanfab.base.errors import Note, PackingError, joined
@@ -15,11 +16,13 @@ from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.pipeline.frames import Readable
+from scanfab.pipeline.maps.rows import map_rows
 from scanfab.pipeline.measurement import Measurement, measure
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.state import refuse_without_forces
 from scanfab.pipeline.variant_columns import VariantColumns, no_columns
-from scanfab.table.columns import complete_row
+from scanfab.scan.blocks import Blocks
+from scanfab.table.columns import complete_row, row_of
 from scanfab.table.row import Row
 
 OTHER_CUTOFFS = "error_at_other_cutoffs"
@@ -34,10 +37,13 @@ class FrameResult:
     number: int
     sample: Sample
     measurements: tuple[Measurement, ...]
-    """One for each RV, the smallest first, which has the whole, too; none without any grain."""
+    """One for each RV, the smallest first, which has the whole, too; none without any grain, and
+    none of a map."""
     rows: list[Row]
     notes: tuple[Note, ...] = ()
     """What is doubtful about them."""
+    blocks: tuple[Blocks, Blocks] | None = None
+    """Of a map those of the whole sample and of the RV; None without any grain."""
 
     def measured(self, variant: str, rv: float | None = None) -> Measurement:
         """
@@ -98,6 +104,10 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
     known = frame_values(frame, plan, number, source)
     if not frame.grains.any():
         return FrameResult(source, number, frame, (), list(_empty_rows(known, plan)))
+    if plan.map_settings is not None:
+        rows, notes, blocks = map_rows(frame, plan.in_frame(frame), known, f"frame {number}")
+        notes = [*frame.doubts_of_escaped(), *notes]
+        return FrameResult(source, number, frame, (), rows, tuple(notes), blocks)
     if "forces" in plan.groups:
         refuse_without_forces(frame)
     measurements = measure(frame, plan.in_frame(frame), f"frame {number}")
@@ -132,6 +142,10 @@ def check_space(sample: Sample, plan: Plan) -> None:
 def _empty_rows(known: Mapping[str, Any], plan: Plan) -> Iterator[Row]:
     """The rows of a frame without grains."""
     empty = {**no_columns(plan.more_columns), **known}
+    if plan.map_settings is not None:
+        for variant, block in product(plan.variants, range(plan.map_settings.blocks)):
+            yield row_of(plan.map_settings.columns, {**empty, "variant": variant, "block": block})
+        return
     for variant in plan.variants:
         for rv in plan.rvs_of(variant):
             own = {RV_COLUMN.name: rv.fraction} if RV_COLUMN.name in plan.more_columns else {}

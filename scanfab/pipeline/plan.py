@@ -15,7 +15,7 @@ from scanfab.packing.doubts import refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample, SampleRule
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import sample_rule
-from scanfab.pipeline.maps.blocks import MapBlocks, map_blocks
+from scanfab.pipeline.maps.blocks import MapBlocks
 from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.pipeline.rv import RV, Deformation, doubts_of_rv, sizes_of, windows_of
 from scanfab.pipeline.settings import Settings
@@ -198,7 +198,7 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     notes = [one for window in windows for one in doubts_of_rv(window, sample, box, r_max)]
     blocks: MapBlocks | None = None
     if isinstance(settings, MapSettings):
-        blocks = map_blocks(settings, sample)
+        blocks = MapBlocks.of(settings, sample)
         notes += blocks.doubts(sample, next(iter(windows), None), r_mean)
     if plan.rule.bias > 0.1 * settings.tolerance:
         text = (

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -19,22 +21,31 @@ class Blocks:
     """
     Blocks of space: parts of a parallelepiped, of a periodic cell, or of shells about a centre.
 
-    A place x has the coordinates f = M x + t. Where one repeats, its fractional part counts; where
-    it does not, places with f outside 0 to 1 are in no block. Of the axis i, a place lies in the
-    part ⌊p_i f_i⌋. With shells, it also lies in the shell ⌊s |(f - ½) E|⌋, if the distance
-    |(f - ½) E| is not above 1. Block numbers from 0 count the first axis fastest, and shells last.
+    A place x has coordinates f with x = corner + f E, and E the edges. Where one repeats, its
+    fractional part counts; where it does not, places with f outside 0 to 1 are in no block. Of the
+    axis i, a place lies in the part ⌊p_i f_i⌋. With s shells about the middle, it also lies in the
+    shell ⌊s d / R⌋, if its distance d from the middle is not above R. Block numbers from 0 count
+    the first axis fastest, and shells last.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.scan.blocks import Blocks
+    >>> halves = Blocks(np.zeros(3), np.diag([2.0, 1.0, 1.0]), (2, 1, 1))
+    >>> halves.of(np.array([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [2.5, 0.5, 0.5]]))
+    array([ 0,  1, -1])
     """
 
-    matrix: FloatArray
-    """M, shape (3, 3), per length unit."""
-    shift: FloatArray
-    """t, shape (3,), dimensionless."""
-    parts: tuple[int, int, int] = (2, 2, 2)
-    """p: how many parts there are along each axis."""
-    repeats: tuple[bool, bool, bool] = (True, True, True)
-    """Along which axes."""
-    edges: FloatArray | None = None
-    """E, shape (3, 3): the parallelepiped's edges as rows, over the outermost shell's radius."""
+    corner: FloatArray
+    """From which the edges run, dump's length unit, shape (3,)."""
+    edges: FloatArray
+    """Of the parallelepiped, as rows, shape (3, 3)."""
+    parts: tuple[int, ...] = (2, 2, 2)
+    """p: how many parts there are along each edge."""
+    repeats: Sequence[bool] | BoolArray = (False, False, False)
+    """Along which edges it is the period of a periodic medium."""
+    radius: float = 0.0
+    """R of the outermost shell; 0 without shells."""
     shells: int = 1
     """s: how many shells of equal thickness there are."""
 
@@ -50,9 +61,7 @@ class Blocks:
         space: Space = SPACE,
     ) -> Blocks:
         """
-        The octants about a centre, of places within a reach of it; dump's length unit.
-
-        In a plane quadrants.
+        The octants about a centre, of places within a reach of it; in a plane quadrants.
 
         One of the axes that part them is the given one: then they are mirror images of one another
         with respect to it, as they must be in order to differ by chance alone.
@@ -61,8 +70,9 @@ class Blocks:
         # about x, y or z the octants are those of the coordinates
         is_coordinate = np.count_nonzero(along) == 1
         parting = np.eye(3) if is_coordinate else line_triads(along[None], space)[0]
-        matrix = parting / (4.0 * reach)
-        return cls(matrix, 0.5 - matrix @ center, _halves(parting, space))
+        # coordinates from a quarter to three quarters of a period
+        edges = 4.0 * reach * parting
+        return cls._halves(center - 0.5 * edges.sum(axis=0), edges, space)
 
     @classmethod
     def of_periods(
@@ -76,8 +86,6 @@ class Blocks:
         """
         Halves of a cell's periods; along its other vectors, of what the positions take.
 
-        In a plane not across it.
-
         Parameters
         ----------
         vectors, origin, periodic : ndarray, shapes (3, 3), (3,), (3,)
@@ -85,77 +93,61 @@ class Blocks:
         position : ndarray, shape (N, 3)
             Of the grains, dump's length unit.
         space : Space, optional
-            The plane in which they lie, if they do.
+            The plane in which they lie, if they do: across it there are no halves.
         """
-        inverse = np.linalg.inv(vectors)
-        matrix = inverse.T
-        shift = -matrix @ origin
-        along = (position - origin) @ inverse
+        along = (position - origin) @ np.linalg.inv(vectors)
         low, high = along.min(axis=0), along.max(axis=0)
-        # far less than a period, about the middle
-        scale = np.where(periodic, 1.0, 0.25 / (1.0 + high - low))
-        middle = np.where(periodic, 0.0, 0.5 - scale * 0.5 * (low + high))
-        return cls(scale[:, None] * matrix, scale * shift + middle, _halves(vectors, space))
+        # far more than the positions take, about their middle
+        length = np.where(periodic, 1.0, 4.0 * (1.0 + high - low))
+        start = np.where(periodic, 0.0, 0.5 * (low + high - length))
+        return cls._halves(origin + start @ vectors, length[:, None] * vectors, space)
 
     @classmethod
-    def of_edges(
-        cls,
-        edges: FloatArray,
-        corner: FloatArray,
-        parts: tuple[int, int, int],
-        repeats: npt.ArrayLike = (False, False, False),
-    ) -> Blocks:
-        """
-        Equal parts of a parallelepiped.
-
-        Parameters
-        ----------
-        edges : ndarray, shape (3, 3)
-            As rows, dump's length unit.
-        corner : ndarray, shape (3,)
-            From which they run.
-        parts : tuple of int
-            Of each edge.
-        repeats : array_like of bool, shape (3,)
-            Along which edges it is the period of a periodic medium.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from scanfab.scan.blocks import Blocks
-        >>> halves = Blocks.of_edges(np.diag([2.0, 1.0, 1.0]), np.zeros(3), (2, 1, 1))
-        >>> halves.of(np.array([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [2.5, 0.5, 0.5]]))
-        array([ 0,  1, -1])
-        """
-        matrix = np.asarray(np.linalg.inv(edges).T, np.float64)
-        first, second, third = (bool(one) for one in np.asarray(repeats))
-        return cls(matrix, -matrix @ corner, parts, (first, second, third))
-
-    def with_shells(self, number: int, radius: float) -> Blocks:
-        """So many shells about the middle of the parallelepiped, up to a radius, in its place."""
-        edges = np.asarray(np.linalg.inv(self.matrix.T) / radius, np.float64)
-        return replace(self, parts=(1, 1, 1), edges=edges, shells=number)
+    def _halves(cls, corner: FloatArray, edges: FloatArray, space: Space) -> Blocks:
+        """Two parts along each edge but the one across a plane; all repeat, so none is outside."""
+        across = space.across
+        parts = tuple(2 if across is None or not edge[across] else 1 for edge in edges)
+        return cls(corner, edges, parts, (True, True, True))
 
     def moved(self, origin: FloatArray) -> Blocks:
         """Blocks of the dump's coordinates as blocks of places from an origin."""
-        return replace(self, shift=self.shift + self.matrix @ origin)
+        return replace(self, corner=self.corner - origin)
 
-    def finer(self, splits: tuple[int, int, int]) -> Blocks:
-        """Each block in so many parts along each axis."""
-        first, second, third = (p * s for p, s in zip(self.parts, splits, strict=True))
-        return replace(self, parts=(first, second, third))
+    @cached_property
+    def splits(self) -> tuple[int, ...]:
+        """In how many parts along each edge a block is split in eight, the longest edge first."""
+        if self.radius:
+            return 2, 2, 2
+        length = np.linalg.norm(self.edges, axis=1) / self.parts
+        splits = np.ones(3, np.int64)
+        for _ in range(3):
+            # of edges that are equal but for rounding the first
+            left = length / splits
+            splits[np.argmax(left > 0.999 * left.max())] *= 2
+        return tuple(splits.tolist())
 
-    def of_finer(self, splits: tuple[int, int, int]) -> IntArray:
-        """For each block of :meth:`finer` its block here, and which part of it, shape (2, K)."""
-        fine = self.finer(splits)
-        rest = np.arange(len(fine))
-        block, part, blocks_before, parts_before = np.zeros_like(rest), np.zeros_like(rest), 1, 1
-        for parts, split in zip(self.parts, splits, strict=True):
-            along, rest = rest % (parts * split), rest // (parts * split)
-            block += blocks_before * (along // split)
-            part += parts_before * (along % split)
-            blocks_before, parts_before = blocks_before * parts, parts_before * split
-        return np.array([block + blocks_before * rest, part])
+    def finer(self) -> Blocks:
+        """The eight parts of each block as blocks."""
+        return replace(self, parts=tuple(np.multiply(self.parts, self.splits).tolist()))
+
+    def by_part(self, values: FloatArray) -> FloatArray:
+        """Values of the blocks of :meth:`finer`, (..., 8 B), by block and part, (..., B, 8)."""
+        shape = values.shape[:-1]
+        counts = zip(reversed(self.parts), reversed(self.splits), strict=True)
+        apart = values.reshape(*shape, self.shells, *(n for pair in counts for n in pair))
+        # shell, z block, z part, y block, ...: the parts come last
+        apart = np.moveaxis(apart, (-5, -3, -1), (-3, -2, -1))
+        return apart.reshape(*shape, len(self), 8)
+
+    @property
+    def matrix(self) -> FloatArray:
+        """M of the coordinates f = M x + t, shape (3, 3), per length unit."""
+        return np.asarray(np.linalg.inv(self.edges).T, np.float64)
+
+    @property
+    def shift(self) -> FloatArray:
+        """t, shape (3,), dimensionless."""
+        return -self.matrix @ self.corner
 
     def of(self, places: FloatArray) -> IntArray:
         """
@@ -168,105 +160,72 @@ class Blocks:
         >>> Blocks.about(np.zeros(3), 1.0).of(np.array([[-0.1, -0.2, -0.3], [0.1, -0.2, 0.3]]))
         array([0, 5])
         """
-        numbers, none = np.zeros(len(places), np.int64), np.zeros(len(places), bool)
-        before, square = 1, np.zeros((len(places), 3))
-        axes = zip(self.matrix, self.shift, self.parts, self.repeats, strict=True)
-        for axis, (matrix, shift, parts, repeats) in enumerate(axes):
-            along = places @ matrix + shift
-            if repeats:
-                along -= np.floor(along)
-            none |= (along < 0.0) | (along > 1.0)
-            # rounding makes a whole period of what is just below 0
-            part = np.clip(np.where(none, 0.0, along) * parts, 0, parts - 1)
-            numbers += before * part.astype(np.int64)
-            before *= parts
-            if self.edges is not None:
-                square += (along - 0.5)[:, None] * self.edges[axis]
-        distance = np.linalg.norm(square, axis=1)
-        none |= distance > 1.0
-        shell = np.minimum(distance * self.shells, self.shells - 1)
-        return np.where(none, -1, numbers + before * np.where(none, 0, shell).astype(np.int64))
-
-    @property
-    def corner_edges(self) -> tuple[FloatArray, FloatArray]:
-        """The corner and the edges, as rows, of the parallelepiped; shapes (3,), (3, 3)."""
-        edges = np.asarray(np.linalg.inv(self.matrix.T), np.float64)
-        return -self.shift @ edges, edges
-
-    @property
-    def radius(self) -> float:
-        """Of the outermost shell; 0 without shells."""
-        if self.edges is None:
-            return 0.0
-        return float(np.linalg.norm(self.corner_edges[1][0]) / np.linalg.norm(self.edges[0]))
+        parts, before = np.array(self.parts), math.prod(self.parts)
+        along = places @ self.matrix.T + self.shift
+        along -= np.where(self.repeats, np.floor(along), 0.0)
+        none = np.any((along < 0.0) | (along > 1.0), axis=1)
+        # rounding makes a whole period of what is just below 0
+        part = np.clip(along * parts, 0, parts - 1).astype(np.int64)
+        numbers = part @ np.cumprod([1, *self.parts[:2]])
+        if self.radius:
+            distance = np.linalg.norm((along - 0.5) @ self.edges, axis=1) / self.radius
+            none |= distance > 1.0
+            numbers += before * np.minimum(distance * self.shells, self.shells - 1).astype(np.int64)
+        return np.where(none, -1, numbers)
 
     @property
     def heights(self) -> FloatArray:
         """How thick the blocks are between opposite faces; of shells each the same; shape (3,)."""
-        if self.edges is not None:
+        if self.radius:
             return np.full(3, self.radius / self.shells)
-        heights: FloatArray = 1.0 / np.linalg.norm(self.matrix, axis=1) / np.array(self.parts)
-        return heights
-
-    def lattice(self, offset: float) -> FloatArray:
-        """Of each block of the grid a place by its number's order: 0 a corner, ½ the middle."""
-        corner, edges = self.corner_edges
-        steps = [(np.arange(parts) + offset) / parts for parts in self.parts]
-        z, y, x = np.meshgrid(*reversed(steps), indexing="ij")
-        return corner + np.column_stack([x.ravel(), y.ravel(), z.ravel()]) @ edges
+        return np.asarray(1.0 / np.linalg.norm(self.matrix, axis=1) / self.parts)
 
     @property
     def middles(self) -> FloatArray:
         """Of the blocks; of shells their centre; shape (B, 3)."""
-        return np.tile(self.lattice(0.5), (self.shells, 1))
+        steps = (_steps(self.parts) + 0.5) / self.parts
+        return np.tile(self.corner + steps @ self.edges, (self.shells, 1))
 
     @property
     def corners(self) -> FloatArray:
         """Of the blocks of a grid, shape (B, 8, 3), the first axis fastest."""
-        _, edges = self.corner_edges
-        z, y, x = np.meshgrid(*3 * [[0.0, 1.0]], indexing="ij")
-        to_corner = np.column_stack([x.ravel(), y.ravel(), z.ravel()]) / np.array(self.parts)
-        return np.asarray(self.lattice(0.0)[:, None] + to_corner @ edges)
+        steps = _steps(self.parts)[:, None] + _steps((2, 2, 2))
+        return np.asarray(self.corner + steps / self.parts @ self.edges)
 
     @property
-    def radii(self) -> FloatArray:
-        """Inner and outer radius of the shells, shape (S, 2)."""
-        bounds = self.radius * np.arange(self.shells + 1) / self.shells
-        return np.column_stack([bounds[:-1], bounds[1:]])
+    def bounds(self) -> FloatArray:
+        """Radii that begin and end the shells, from 0 to the outermost, shape (S + 1,)."""
+        return np.asarray(self.radius * np.arange(self.shells + 1) / self.shells)
 
     @property
     def volumes(self) -> FloatArray:
-        """Of the blocks, where :attr:`parts` are those of a grid or shells are whole, (B,)."""
-        if self.edges is None:
-            each = 1.0 / abs(np.linalg.det(self.matrix)) / math.prod(self.parts)
-            return np.full(len(self), each)
-        inner, outer = self.radii.T
-        return np.asarray(4.0 / 3.0 * np.pi * (outer**3 - inner**3) / math.prod(self.parts))
+        """Of the blocks of a grid, or of whole shells, shape (B,)."""
+        whole = np.full(self.shells, abs(np.linalg.det(self.edges)))
+        if self.radius:
+            whole = 4.0 / 3.0 * np.pi * np.diff(self.bounds**3)
+        parts = math.prod(self.parts)
+        return np.repeat(whole / parts, parts)
 
-    @property
-    def form(self) -> FloatArray:
-        """|(f - ½) E|² as a form of f - ½: xx, yy, zz, xy, xz, yz; shape (6,)."""
-        if self.edges is None:
-            return np.zeros(6)
-        square = self.edges @ self.edges.T
-        i, j = np.array([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]).T
-        return np.asarray(square[i, j] * np.where(i == j, 1.0, 2.0))
+
+def _steps(parts: Sequence[int]) -> FloatArray:
+    """The numbers of all parts along three edges, the first fastest, shape (N, 3)."""
+    return np.indices(parts[::-1]).reshape(3, -1)[::-1].T.astype(np.float64)
 
 
 def partition_of(whole: Blocks, window: Blocks) -> Partition:
     """Blocks as the numbers that kernels take."""
     both = whole, window
-    octants = all(one.parts == (2, 2, 2) and all(one.repeats) and one.edges is None for one in both)
+    octants = all(one.parts == (2, 2, 2) and all(one.repeats) and not one.radius for one in both)
+    i, j = np.array([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]).T
+    form = np.zeros((2, 6))
+    for kind, one in enumerate(both):
+        if one.radius:
+            square = one.edges @ one.edges.T / one.radius**2
+            form[kind] = square[i, j] * np.where(i == j, 1.0, 2.0)
     return Partition(
         to_block=np.array([np.column_stack([one.matrix, one.shift]) for one in both]),
         parts=np.array([[*one.parts, one.shells] for one in both], dtype=np.float64),
         repeats=np.array([one.repeats for one in both], dtype=np.float64),
-        form=np.array([one.form for one in both]),
+        form=form,
         halves=True if octants else None,
     )
-
-
-def _halves(vectors: FloatArray, space: Space) -> tuple[int, int, int]:
-    """Two parts along each of three vectors, but for the one across a plane."""
-    one, two, three = (2 if space.across is None or not v[space.across] else 1 for v in vectors)
-    return one, two, three

@@ -134,7 +134,8 @@ class ScanSums:
         -------
         ScanSums
         """
-        return concatenated(list(parts))
+        whole: ScanSums = concatenated(list(parts))
+        return whole
 
 
 def scan_lines(

@@ -16,7 +16,6 @@ from scanfab.fabric.tensor import COMPONENTS
 from scanfab.packing.sample import VARIANTS
 from scanfab.packing.window import Window
 from scanfab.pipeline.frame import FrameResult
-from scanfab.pipeline.maps.frame import MapResult
 from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.settings import Settings
@@ -128,7 +127,7 @@ class MapFolder(vtk.Folder):
 
     def __call__(self, result: FrameResult) -> None:
         """The blocks of each variant as cells with all columns."""
-        if not isinstance(result, MapResult) or result.blocks is None:
+        if result.blocks is None:
             return
         with self.lock:
             for variant in dict.fromkeys(row.variant for row in result.rows):

@@ -169,16 +169,15 @@ def block_mesh(blocks: Blocks, values: Mapping[str, npt.ArrayLike]) -> Any:
     """The blocks of a map as hexahedra; a shell is many, each with the shell's values."""
     import pyvista
 
-    if blocks.edges is None:
-        corner, edges = blocks.corner_edges
+    if not blocks.radius:
         steps = [np.linspace(0.0, 1.0, count + 1) for count in blocks.parts]
-        at = corner + np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1) @ edges
+        at = blocks.corner + np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1) @ blocks.edges
         block = np.arange(len(blocks))
     else:
         azimuth, polar, radius = np.meshgrid(
             np.linspace(0.0, 2.0 * np.pi, AZIMUTHS + 1),
             np.linspace(0.0, np.pi, POLAR + 1),
-            np.append(blocks.radii[:, 0], blocks.radius),
+            blocks.bounds,
             indexing="ij",
         )
         unit = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]

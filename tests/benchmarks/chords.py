@@ -8,6 +8,7 @@ import subprocess
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -313,11 +314,11 @@ def _maps(repeats):
     position, radius = dense(PAPER)
     solids = Solids(position, radius, np.zeros(PAPER, bool))
     reach = float(np.abs(position).max() + radius.max())
-    box = Blocks.of_edges(2 * reach * np.eye(3), np.full(3, -reach), (10, 10, 10))
+    box = Blocks(np.full(3, -reach), 2 * reach * np.eye(3), (10, 10, 10))
     kinds = {
         "octants": Blocks.about(np.zeros(3), 2 * reach),
         "a grid of 1,000 blocks": box,
-        "10 shells": box.with_shells(10, reach),
+        "10 shells": replace(box, parts=(1, 1, 1), radius=reach, shells=10),
     }
     rows = []
     for spacing, directions in ((0.3, 16), (1.0, 100), (1.5, 200)):

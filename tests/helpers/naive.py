@@ -193,22 +193,23 @@ def void_segments(position, radius, triad, offset, spacing, clip):
 
 def block(place, blocks):
     """The block of a place, from its definition; -1 for none."""
-    number, before, coordinates = 0, 1, []
+    number, before, distance = 0, 1, np.zeros(3)
+    coordinates = np.linalg.solve(blocks.edges.T, place - blocks.corner)
     for axis, parts in enumerate(blocks.parts):
-        along = blocks.matrix[axis] @ place + blocks.shift[axis]
+        along = coordinates[axis]
         if blocks.repeats[axis]:
             along %= 1.0
         elif not 0 <= along <= 1:
             return -1
         number += before * min(int(along * parts), parts - 1)
         before *= parts
-        coordinates.append(along - 0.5)
-    if blocks.edges is None:
+        distance += (along - 0.5) * blocks.edges[axis]
+    if not blocks.radius:
         return number
-    distance = np.linalg.norm(np.array(coordinates) @ blocks.edges)
-    if distance > 1:
+    share = np.linalg.norm(distance) / blocks.radius
+    if share > 1:
         return -1
-    return number + before * min(int(distance * blocks.shells), blocks.shells - 1)
+    return number + before * min(int(share * blocks.shells), blocks.shells - 1)
 
 
 def octant(place, center):

@@ -1,12 +1,13 @@
 """How much of a map's blocks lies in an RV, and so their solid fraction: closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, compute, fabric_map, find_contacts, sphere
+from scanfab import Cell, Packing, Window, compute, fabric_map, find_contacts, sphere
 from scanfab.base.shapes import box, cylinder
-from scanfab.pipeline.maps.blocks import splits_of
-from scanfab.pipeline.maps.surface import volumes_inside
+from scanfab.pipeline.maps.volumes import volumes_inside
 from scanfab.scan.blocks import Blocks
 from tests.helpers.lattices import shaken_cubic
 
@@ -16,13 +17,13 @@ CENTER = np.array([1.0, -2.0, 0.5])
 def tiling(half, parts):
     """A box about the centre in equal parts."""
     half = np.asarray(half)
-    return Blocks.of_edges(np.diag(2 * half), CENTER - half, parts)
+    return Blocks(CENTER - half, np.diag(2 * half), parts)
 
 
 @pytest.mark.parametrize("slices", [1, 3, 5, 16])
 def test_slices_of_a_ball_have_their_volume(slices):
     blocks = tiling([2.0, 2.0, 2.0], (1, 1, slices))
-    found = volumes_inside(blocks, splits_of(blocks), sphere(2.0), CENTER)
+    found = volumes_inside(blocks, Window(CENTER, sphere(2.0)))
     z = np.linspace(-2, 2, slices + 1)
     below = np.pi * (4 * z - z**3 / 3)
     np.testing.assert_allclose(found.sum(axis=1), np.diff(below), rtol=5e-4)
@@ -36,7 +37,7 @@ def test_a_grid_fills_its_window(parts):
         ([1.0, 2.0, 3.0], box([2.0, 4.0, 6.0]), 48.0),
     ]:
         blocks = tiling(half, parts)
-        found = volumes_inside(blocks, splits_of(blocks), shape, CENTER)
+        found = volumes_inside(blocks, Window(CENTER, shape))
         assert found.sum() == pytest.approx(volume, rel=1e-3)
         assert np.all(found <= blocks.volumes[:, None] / 8 * (1 + 1e-12))
         # blocks on opposite sides of the centre
@@ -46,8 +47,8 @@ def test_a_grid_fills_its_window(parts):
 def test_shells_end_at_the_surface_of_a_box():
     """The ball of radius 1 in a cube of edge 2 is whole; beyond its corners there is nothing."""
     reach = np.sqrt(3.0)
-    blocks = tiling([reach] * 3, (1, 1, 1)).with_shells(4, reach)
-    found = volumes_inside(blocks, (2, 2, 2), box([2.0, 2.0, 2.0]), CENTER)
+    blocks = replace(tiling([reach] * 3, (1, 1, 1)), radius=reach, shells=4)
+    found = volumes_inside(blocks, Window(CENTER, box([2.0, 2.0, 2.0])))
     assert found.sum() == pytest.approx(8.0, rel=1e-3)
     within = 4 / 3 * np.pi * (reach * np.array([1, 2]) / 4) ** 3
     np.testing.assert_allclose(found[:2].sum(axis=1), np.diff(within, prepend=0.0), rtol=1e-9)

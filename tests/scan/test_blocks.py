@@ -29,10 +29,11 @@ def some_blocks(random, repeats=(False, False, False)):
     """A grid, slices and shells of a parallelepiped that holds part of a sample."""
     edges = TILTED @ rotation(random).T if random.random() < 0.7 else np.diag([4.0, 5.0, 3.5])
     corner = -0.5 * edges.sum(axis=0) + random.uniform(-0.5, 0.5, 3)
-    grid = Blocks.of_edges(edges, corner, (3, 2, 4), repeats)
-    slices = Blocks.of_edges(edges, corner, (1, 5, 1), repeats)
+    grid = Blocks(corner, edges, (3, 2, 4), repeats)
+    slices = Blocks(corner, edges, (1, 5, 1), repeats)
     radius = random.uniform(0.8, 1.0) * 0.5 * grid.heights @ np.array([0, 2, 0])
-    return grid, slices, grid.with_shells(3, radius), slices.finer((2, 1, 3))
+    shells = Blocks(corner, edges, (1, 1, 1), repeats, radius, 3)
+    return grid, slices, shells, slices.finer()
 
 
 def kept_in(segments, blocks):
@@ -63,21 +64,29 @@ def test_blocks_are_those_of_the_naive_twin(repeats):
             found = blocks.of(places)
             assert found.tolist() == [naive.block(place, blocks) for place in places]
             assert -1 <= found.min() < found.max() < len(blocks)
-            if all(repeats) and blocks.edges is None:
+            if all(repeats) and not blocks.radius:
                 assert found.min() == 0
 
 
-def test_a_finer_block_is_of_the_block_that_holds_it():
+def test_a_finer_block_is_a_part_of_the_block_that_holds_it():
     random = np.random.default_rng(2)
     places = random.uniform(-3, 3, (500, 3))
     for blocks in some_blocks(random):
-        for splits in [(2, 2, 2), (1, 4, 2), (8, 1, 1)]:
-            finer = blocks.finer(splits).of(places)
-            block, part = blocks.of_finer(splits)
-            inside = finer >= 0
-            assert np.array_equal(block[finer[inside]], blocks.of(places)[inside])
-            # each block has each of its parts once
-            assert len(set(zip(block, part, strict=True))) == len(block) == 8 * len(blocks)
+        fine, coarse = blocks.finer(), blocks.of(places)
+        assert np.prod(blocks.splits) == 8
+        # each finer block once, in the row of the block that holds it
+        rows = blocks.by_part(np.arange(8 * len(blocks)))
+        assert np.array_equal(np.sort(rows, axis=None), np.arange(8 * len(blocks)))
+        inside = coarse >= 0
+        assert np.all((rows[coarse[inside]] == fine.of(places)[inside, None]).any(axis=1))
+        assert np.array_equal(fine.of(places) < 0, ~inside)
+        both = blocks.by_part(np.stack([fine.volumes, 2 * fine.volumes]))
+        np.testing.assert_allclose(both.sum(axis=-1), [blocks.volumes, 2 * blocks.volumes])
+
+
+def test_the_longest_edge_is_split_first():
+    for parts, splits in [((2, 1, 1), (2, 2, 2)), ((1, 1, 5), (4, 2, 1)), ((9, 1, 9), (1, 8, 1))]:
+        assert Blocks(np.zeros(3), 4.0 * np.eye(3), parts).splits == splits
 
 
 def test_volumes_middles_and_corners_are_those_of_the_places_inside():
@@ -87,7 +96,7 @@ def test_volumes_middles_and_corners_are_those_of_the_places_inside():
         found = blocks.of(random.uniform(low, high, (400_000, 3)))
         counted = np.bincount(found[found >= 0], minlength=len(blocks)) / 400_000
         np.testing.assert_allclose(counted * (high - low) ** 3, blocks.volumes, rtol=0.2)
-        if blocks.edges is None:
+        if not blocks.radius:
             np.testing.assert_allclose(blocks.corners.mean(axis=1), blocks.middles)
 
 
@@ -125,8 +134,9 @@ def check_periodic_whole(random, periods):
     solids = Solids(np.zeros((0, 3)), np.zeros(0), np.zeros(0, bool), None, medium)
     triad = np.stack([*np.zeros((2, 3)), normal])
     corner = random.uniform(-1, 1, 3)
-    grid = Blocks.of_edges(cell.vectors, corner, (2, 3, 4), cell.periodic)
-    shells = grid.with_shells(3, 0.5 * float(cell.heights.min()))
+    grid = Blocks(corner, cell.vectors, (2, 3, 4), cell.periodic)
+    radius = 0.5 * float(cell.heights.min())
+    shells = Blocks(corner, cell.vectors, (1, 1, 1), cell.periodic, radius, 3)
     for blocks in (grid, shells):
         fast = fast_sums(solids, blocks, triad, offset, spacing, "a")[0]
         np.testing.assert_allclose(fast, kept_in(segments, blocks), rtol=1e-9, atol=1e-9)
@@ -180,8 +190,8 @@ def test_all_blocks_together_are_the_scan_of_the_same_lines(edge):
     random = np.random.default_rng(6)
     spheres = poisson_spheres(random, 0.15, 4.0)
     solids = open_solids(*spheres, random.random(len(spheres.radius)) < 0.2, sphere(2.0), edge)
-    blocks = Blocks.of_edges(14.0 * rotation(random), np.zeros(3), (5, 6, 3))
-    blocks = blocks.moved(blocks.lattice(0.5).mean(axis=0))
+    blocks = Blocks(np.zeros(3), 14.0 * rotation(random), (5, 6, 3))
+    blocks = blocks.moved(blocks.middles.mean(axis=0))
     words = {"spacing": 0.3, "replicates": range(3), "variants": "abcd"}
     found = scan_gaps(solids, RULE, cutoffs=[0.1, 0.5], blocks=(blocks, blocks), **words)
     for place, cutoff in enumerate([0.1, 0.5]):

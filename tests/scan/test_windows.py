@@ -20,6 +20,7 @@ NOTHING = Spheres(np.zeros((0, 3)), np.zeros(0))
 TURN = rotation(np.random.default_rng(4))
 HALF = np.array([0.8, 1.1, 1.5])
 RULE = direction_rule("lebedev:5")
+ENDLESS = (True, True, True)
 # with volume and surface
 WINDOWS = {
     "sphere": (sphere(1.2), 4 / 3 * np.pi * 1.2**3, 4 * np.pi * 1.2**2),
@@ -97,7 +98,7 @@ def packed(window):
 def test_all_blocks_of_any_number_together_are_the_scan_of_the_same_lines(window, parts):
     solids, cutoffs = packed(window), [0.0, 0.3]
     # about a quarter of a period across, so that there are places in every block
-    cells = Blocks(np.eye(3) / 4.3, np.full(3, 0.1), parts)
+    cells = Blocks(np.full(3, -0.43), 4.3 * np.eye(3), parts, ENDLESS)
     words = {"spacing": 0.1, "replicates": range(2)}
     gaps = scan_gaps(solids, RULE, cutoffs=cutoffs, blocks=(cells, cells), **words)
     assert gaps.number.shape[3] == len(cells) == np.prod(parts)
@@ -116,18 +117,19 @@ def test_blocks_are_those_of_the_naive_twin():
     random = np.random.default_rng(8)
     places = random.uniform(-5, 5, (300, 3))
     for parts in [(3, 1, 4), (2, 2, 2), (6, 5, 1)]:
-        blocks = Blocks(rotation(random) / 3.0, random.random(3), parts)
+        blocks = Blocks(random.random(3), 3.0 * rotation(random), parts, ENDLESS)
         assert blocks.of(places).tolist() == [naive.block(place, blocks) for place in places]
 
 
 def test_a_place_just_below_a_period_lies_in_the_last_block():
-    blocks = Blocks(np.eye(3), np.zeros(3), (3, 1, 4))
+    blocks = Blocks(np.zeros(3), np.eye(3), (3, 1, 4), ENDLESS)
     assert blocks.of(np.full((1, 3), -1e-20)).tolist() == [11]
 
 
 def test_whole_and_window_may_have_blocks_of_their_own():
     solids = packed(sphere(2.0))
-    blocks = Blocks(np.eye(3) / 9, np.full(3, 0.5), (3, 1, 1)), Blocks.about(np.zeros(3), 3.0)
+    cells = Blocks(np.full(3, -4.5), 9.0 * np.eye(3), (3, 1, 1), ENDLESS)
+    blocks = cells, Blocks.about(np.zeros(3), 3.0)
     gaps = scan_gaps(solids, RULE, spacing=0.1, cutoffs=[0.0], blocks=blocks, replicates=[0])
     found = gaps.number.sum(axis=(0, 2, 4)) > 0
     assert found[0].tolist() == [True] * 3 + [False] * 5

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from typing import Any
 
-from scanfab.base.option import options_of, refuse_unknown
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.frames import Source
 from scanfab.pipeline.maps.settings import MapSettings
@@ -75,7 +74,5 @@ def fabric_map(
     >>> table["z"].tolist(), int(table["grains"].sum())
     ([3.0, 9.0], 400)
     """
-    given = {**options, "grid": grid, "slices": slices, "shells": shells}
-    refuse_unknown("fabric_map", given, [one.name for one in options_of(MapSettings)])
-    settings = MapSettings(**given)
+    settings = MapSettings(grid=grid, slices=slices, shells=shells, **options)
     return Table(compute_rows(source, settings, executor=executor), settings.columns)

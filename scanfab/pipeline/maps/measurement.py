@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from scanfab.base.arrays import concatenated
 from scanfab.base.errors import Note
-from scanfab.base.typing import FloatArray, IntArray
-from scanfab.fabric.blocks import BlockFabrics, WithoutParts
+from scanfab.base.typing import FloatArray
+from scanfab.fabric.blocks import BlockFabrics, block_fabrics
 from scanfab.packing.sample import Sample
-from scanfab.pipeline.maps.blocks import splits_of
 from scanfab.pipeline.measurement import coarse_spacing, solids_of
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.tolerance import Errors, Goal, scan_to_tolerance
@@ -30,38 +29,41 @@ from scanfab.scan.solids import Solids
 PART_REPLICATES, PART_AXES = 4, 96
 # chords that it may cut: lines are set further apart where there would be more
 MOST_CHORDS = 1e9
-# numbers that a scan may hold at a time
-MOST_NUMBERS = 3e7
 
 
 @dataclass(frozen=True, eq=False)
-class MapSums:
-    """What the scan of a map adds up."""
+class MapSums(ScanSums):
+    """What the scan of a map adds up: beside the sums of all blocks the fabric of each."""
 
     fabrics: dict[str, BlockFabrics]
     """Of each variant."""
-    scan: ScanSums
-    """Of the same lines: how many there are, and what they took."""
 
-    @property
-    def replicates(self) -> int:
-        """Number of replicates R."""
-        return self.scan.replicates
 
-    @property
-    def chords(self) -> FloatArray:
-        """As of ScanSums."""
-        return np.asarray(self.scan.chords)
+@dataclass(frozen=True, eq=False)
+class PartSums:
+    """Of one variant what the scan of the eight parts of the blocks tells."""
 
-    @property
-    def steps(self) -> FloatArray:
-        """As of ScanSums."""
-        return np.asarray(self.scan.steps)
+    rest: BlockFabrics
+    """The fabrics without each part, shape (R, B, 8)."""
+    segments: FloatArray
+    """Kept segments in each part, shape (R, B, 8)."""
+    void: FloatArray
+    """Volume of the void with its middle in each part, by each replicate, shape (R, B, 8)."""
 
-    @property
-    def work(self) -> FloatArray:
-        """As of ScanSums."""
-        return np.asarray(self.scan.work)
+
+class MapMeasurement(NamedTuple):
+    """What the scans of one frame say of its blocks."""
+
+    plan: Plan
+    """With the rule and the spacing as they were in the end."""
+    solids: Solids
+    blocks: tuple[Blocks, Blocks]
+    """Of the whole sample and of the window, in the dump's coordinates."""
+    sums: MapSums
+    parts: dict[str, PartSums]
+    """Of each variant."""
+    notes: list[Note]
+    """What the scan did not reach."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,58 +76,31 @@ class MedianBlock(Goal):
     def scan(
         self, solids: Solids, plan: Plan, replicates: range, most_steps: float = math.inf
     ) -> MapSums:
-        """As planned, a few replicates at a time."""
+        """As planned; replicate by replicate, as the sums of all their axes would be too many."""
         parts = []
-        for some in _chunks(replicates, len(plan.rule), plan, self.blocks, 1):
-            sums = _scan(
-                solids, plan, plan.rule, plan.spacing, some, (plan.cutoff,), self.blocks, most_steps
-            )
-            parts.append(_reduced(sums, plan))
-        return self.concatenate(parts)
-
-    def concatenate(self, parts: Sequence[MapSums]) -> MapSums:
-        """All replicates."""
-        fabrics = {
-            name: concatenated([one.fabrics[name] for one in parts]) for name in parts[0].fabrics
-        }
-        return MapSums(fabrics, ScanSums.concatenate([one.scan for one in parts]))
+        for replicate in replicates:
+            words = plan, self.blocks, plan.rule, plan.spacing, replicate, (plan.cutoff,)
+            sums = _scan(solids, *words, most_steps)
+            most_steps -= float(sums.scan.steps.sum())
+            fabrics = {
+                name: block_fabrics(
+                    sums.axes, plan.rule.weights, *sums.in_blocks(name, 0, plan.moment)
+                )
+                for name in plan.variants
+            }
+            parts.append(MapSums(**vars(sums.scan), fabrics=fabrics))
+        whole: MapSums = concatenated(parts)
+        return whole
 
     def errors(self, sums: MapSums, plan: Plan, variant: str) -> Errors:
         """The median of the blocks that hold any segment: of many, it is sure enough to plan by."""
         found = sums.fabrics[variant]
-        if not found.is_met.any():
+        is_met = found.is_met
+        if not is_met.any():
             return Errors(math.inf, math.inf, 1.0)
         errors = np.where(found.exists, found.axial_errors(np.asarray(plan.axis)), np.inf)
-        median = float(np.median(errors[found.is_met]))
-        return Errors(median, median, float(np.median(found.filled.mean(axis=0)[found.is_met])))
-
-
-@dataclass(frozen=True, eq=False)
-class PartSums:
-    """Of one variant what the scan of the parts of the blocks tells."""
-
-    without: WithoutParts
-    void: FloatArray
-    """Volume of the void with its middle in each part, by each replicate, shape (R, B, P)."""
-
-
-@dataclass(frozen=True, eq=False)
-class MapMeasurement:
-    """What the scans of one frame say of its blocks."""
-
-    sample: Sample
-    plan: Plan
-    """With the rule and the spacing as they were in the end."""
-    blocks: tuple[Blocks, Blocks]
-    """Of the whole sample and of the window, in the dump's coordinates."""
-    splits: tuple[tuple[int, int, int], tuple[int, int, int]]
-    """In how many parts along each axis these are split."""
-    sums: MapSums
-    parts: dict[str, PartSums]
-    """Of each variant."""
-    solids: Solids
-    notes: tuple[Note, ...] = ()
-    """What the scan did not reach."""
+        median = float(np.median(errors[is_met]))
+        return Errors(median, median, float(np.median(found.filled.mean(axis=0)[is_met])))
 
 
 def measure_map(sample: Sample, plan: Plan, where: str = "the frame") -> MapMeasurement:
@@ -136,96 +111,53 @@ def measure_map(sample: Sample, plan: Plan, where: str = "the frame") -> MapMeas
     window = whole if plan.window is None else plan.map_blocks.of_window(plan.window)
     placed = whole.moved(solids.origin), window.moved(solids.origin)
     sums, plan, notes = scan_to_tolerance(solids, plan, where, MedianBlock(placed))
-    splits = splits_of(whole), splits_of(window)
-    parts = _part_sums(solids, plan, placed, splits, sums.scan)
-    return MapMeasurement(sample, plan, (whole, window), splits, sums, parts, solids, tuple(notes))
+    parts = _part_sums(solids, plan, placed, sums)
+    return MapMeasurement(plan, solids, (whole, window), sums, parts, notes)
 
 
 def _part_sums(
-    solids: Solids,
-    plan: Plan,
-    blocks: tuple[Blocks, Blocks],
-    splits: tuple[tuple[int, int, int], tuple[int, int, int]],
-    before: ScanSums,
+    solids: Solids, plan: Plan, blocks: tuple[Blocks, Blocks], before: ScanSums
 ) -> dict[str, PartSums]:
     """Along fewer lines, each block in eight parts, for the sample's scatter and for its void."""
-    finer = blocks[0].finer(splits[0]), blocks[1].finer(splits[1])
-    rule = design_of(PART_AXES)
+    rule, finer = design_of(PART_AXES), (blocks[0].finer(), blocks[1].finer())
     most = min(MOST_CHORDS, plan.max_chords)
     spacing = coarse_spacing(solids, PART_REPLICATES * len(rule), before, plan, most)
-    found: dict[str, list[PartSums]] = {name: [] for name in plan.variants}
-    # by the rule start, segments count with what is outside the window, too
-    clipped = replace(solids, edge=CLIP) if solids.edge == START else None
-    for some in _chunks(range(PART_REPLICATES), len(rule), plan, finer, 2):
-        words = plan, rule, spacing, some, (0.0, plan.cutoff), finer
-        sums = _scan(solids, *words)
-        voids = sums if clipped is None else _scan(clipped, *words)
+    parts: list[dict[str, PartSums]] = []
+    for replicate in range(PART_REPLICATES):
+        words = plan, finer, rule, spacing, replicate, (0.0, plan.cutoff)
+        voids = sums = _scan(solids, *words)
+        if solids.edge == START:
+            # by this rule, segments count with what is outside the window, too
+            voids = _scan(replace(solids, edge=CLIP), *words)
+        parts.append({})
         for name in plan.variants:
-            kind = int(name in "cd")
-            number = len(blocks[kind])
-            order = _order(blocks[kind], splits[kind])
-            over, under = (
-                one[:, :, order].reshape(*one.shape[:2], number, -1)
-                for one in sums.in_blocks(name, 1, plan.moment)
+            by_part = blocks[name in "cd"].by_part
+            length, number = map(by_part, sums.in_blocks(name, 1, plan.moment))
+            rest = length.sum(axis=-1, keepdims=True) - length
+            # what rounding leaves of nothing is none
+            left = np.maximum(number.sum(axis=-1, keepdims=True) - number, 0.0)
+            void = np.einsum("d,rdbp->rbp", rule.weights, by_part(voids.in_blocks(name)[0]))
+            parts[-1][name] = PartSums(
+                block_fabrics(sums.axes, rule.weights, rest, left),
+                number.sum(axis=1),
+                spacing**2 / rule.weights.sum() * void,
             )
-            void = voids.in_blocks(name)[0][:, :, order].reshape(*over.shape)
-            void = spacing**2 * np.einsum("d,rdbp->rbp", rule.weights, void)
-            axis = np.asarray(plan.axis)
-            without = WithoutParts.of(sums.axes, rule.weights, over, under, axis)
-            found[name].append(PartSums(without, void / rule.weights.sum()))
-    return {
-        name: PartSums(
-            concatenated([one.without for one in parts]),
-            np.concatenate([one.void for one in parts]),
-        )
-        for name, parts in found.items()
-    }
-
-
-def _order(blocks: Blocks, splits: tuple[int, int, int]) -> IntArray:
-    """The finer blocks in the order of their blocks, and of the parts of these."""
-    block, part = blocks.of_finer(splits)
-    return np.asarray(np.lexsort((part, block)), np.int64)
-
-
-def _chunks(
-    replicates: range, axes: int, plan: Plan, blocks: tuple[Blocks, Blocks], cutoffs: int
-) -> Iterator[range]:
-    """So many replicates at a time that what they add up fits into memory."""
-    each = 3 * axes * len(plan.variants) * cutoffs * max(map(len, blocks))
-    some = max(int(MOST_NUMBERS / each), 1)
-    for first in range(replicates.start, replicates.stop, some):
-        yield range(first, min(first + some, replicates.stop))
+    whole: dict[str, PartSums] = concatenated(parts)
+    return whole
 
 
 def _scan(
     solids: Solids,
     plan: Plan,
+    blocks: tuple[Blocks, Blocks],
     rule: DirectionRule,
     spacing: float,
-    replicates: range,
+    replicate: int,
     cutoffs: tuple[float, ...],
-    blocks: tuple[Blocks, Blocks],
     most_steps: float = math.inf,
 ) -> GapSums:
     return scan_gaps(
-        solids,
-        rule,
-        spacing=spacing,
-        cutoffs=cutoffs,
-        blocks=blocks,
-        variants=plan.variants,
-        replicates=replicates,
-        seed=plan.seed,
-        workers=plan.workers,
-        most_steps=most_steps,
-    )
-
-
-def _reduced(sums: GapSums, plan: Plan) -> MapSums:
-    """What is kept of each replicate: of many, the sums of all axes and blocks are too many."""
-    fabrics = {
-        name: BlockFabrics.of(sums.axes, plan.rule.weights, *sums.in_blocks(name, 0, plan.moment))
-        for name in plan.variants
-    }
-    return MapSums(fabrics, sums.scan)
+        solids, rule,
+        spacing=spacing, cutoffs=cutoffs, blocks=blocks, variants=plan.variants,
+        replicates=[replicate], seed=plan.seed, workers=plan.workers, most_steps=most_steps,
+    )  # fmt: skip

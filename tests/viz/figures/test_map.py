@@ -44,7 +44,7 @@ def test_a_value_that_one_block_alone_has_is_of_one_colour_in_all_planes(packing
 
 def test_a_cell_that_leans_more_than_it_is_high_has_all_its_blocks():
     edges = np.array([[20.0, 0, 0], [0, 8.0, 0], [9.0, 0, 8.0]])
-    middles = Blocks.of_edges(edges, np.zeros(3), (2, 2, 2)).middles
+    middles = Blocks(np.zeros(3), edges, (2, 2, 2)).middles
     assert _Lattice(middles).counts == [2, 2, 2]
 
 
