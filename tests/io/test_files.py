@@ -80,12 +80,6 @@ def test_a_bomb_is_refused_unless_more_is_allowed(tmp_path, monkeypatch, suffix)
         scanfab.read(path, max_unpacked=1e6)
 
 
-@pytest.mark.parametrize("wrong", [0, -1, "many"])
-def test_a_bound_that_is_none(wrong):
-    with pytest.raises(scanfab.SettingsError, match="max_unpacked: expected a number above 0"):
-        scanfab.read_series("nowhere", max_unpacked=wrong)
-
-
 def test_a_file_is_decompressed_once_until_it_changes(tmp_path):
     path = tmp_path / "dump.txt.gz"
     path.write_bytes(gzip.compress(TEXT))

@@ -25,9 +25,15 @@ def series(tmp_path):
     return scanfab.read_series(tmp_path)
 
 
-@pytest.fixture
-def packings(monkeypatch):
-    """Weak references to the packings that frames were read into."""
+def test_ten_thousand_files_open_within_seconds(tmp_path):
+    for step in range(10_000):
+        write(tmp_path / f"dump_{step}.txt", dump_text())
+    start = time.perf_counter()
+    assert len(next(iter(scanfab.read_series(tmp_path))).read()) == 3
+    assert time.perf_counter() - start < 4
+
+
+def test_memory_holds_one_frame_a_worker_and_all_give_the_same_rows(series, monkeypatch):
     found = []
 
     class Watched(scanfab.Packing):
@@ -36,31 +42,15 @@ def packings(monkeypatch):
             found.append(weakref.ref(self))
 
     monkeypatch.setattr(frame_module, "Packing", Watched)
-    return found
-
-
-def alive(packings):
-    return sum(reference() is not None for reference in packings)
-
-
-def test_ten_thousand_files_open_within_seconds(tmp_path):
-    text = dump_text()
-    for step in range(10_000):
-        write(tmp_path / f"dump_{step}.txt", text)
-    start = time.perf_counter()
-    packing = next(iter(scanfab.read_series(tmp_path))).read()
-    assert time.perf_counter() - start < 4
-    assert len(packing) == 3
-
-
-@pytest.mark.parametrize("workers", [1, 2, 3])
-def test_memory_holds_one_frame_a_worker(series, packings, workers):
-    # one more for each row that is taken while the next frame is read
-    most = max(alive(packings) for _ in compute_rows(series, Settings(workers=workers, **SCAN)))
-    assert len(packings) == FRAMES
-    assert most <= workers + 2
-
-
-def test_frames_in_parallel_give_the_same_rows(series):
-    tables = [scanfab.compute(series, workers=workers, **SCAN).rows for workers in (1, 2, 3, 16)]
+    tables = []
+    for workers in (1, 2, 3):
+        found.clear()
+        rows, most = [], 0
+        for row in compute_rows(series, Settings(workers=workers, **SCAN)):
+            rows.append(row)
+            most = max(most, sum(reference() is not None for reference in found))
+        # one more for each row that is taken while the next frame is read
+        assert (len(found), most <= workers + 2) == (FRAMES, True)
+        tables.append(rows)
+    tables.append(list(compute_rows(series, Settings(workers=16, **SCAN))))
     assert all(table == tables[0] for table in tables)
