@@ -1,8 +1,8 @@
 """
-From what users name to files, and from their names to families: one for each series.
+The files that users name, sorted by their names into families: one family for each series.
 
-A family is a number of files of one kind whose names differ in the step only. Contact files are
-paired with grain files by their steps and names.
+The files of a family are of one kind, and their names differ in the step only. Contact files are
+paired with grain files by step and name.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ NUMBER = re.compile(r"\d+")
 
 
 def expanded(source: PathLike) -> list[PathLike]:
-    """A source as it is spelt, or what a glob names: shells leave globs in quotes to us."""
+    """What a glob names that stood in quotes, so that no shell expanded it; else the source."""
     if Path(source).exists() or not glob.has_magic(os.fspath(source)):
         return [source]
     found: list[PathLike] = [*sorted(glob.glob(os.fspath(source)))]
@@ -50,7 +50,7 @@ def expanded(source: PathLike) -> list[PathLike]:
 
 
 def named_once(sources: Iterable[PathLike]) -> list[PathLike]:
-    """Sources as they are spelt, each file and folder once; a warning names what comes twice."""
+    """Sources as they are spelt, each file and folder once; a warning names the repeated ones."""
     first: dict[Path, PathLike] = {}
     again = []
     for source in chain.from_iterable(map(expanded, sources)):
@@ -80,14 +80,14 @@ def files_of(path: Path) -> list[Path]:
 
 
 def files_in(folder: Path) -> list[Path]:
-    """The files of a folder that may be dumps: not hidden ones, nor what is left behind."""
+    """The files of a folder that may be dumps: neither hidden nor left behind by an editor."""
     names = [name for name in sorted(os.listdir(folder)) if name != SETTINGS_FILE]
     files = [folder / name for name in names if name[0] != "." and not name.endswith(LEFTOVERS)]
     return [file for file in files if file.is_file()]
 
 
 def files_around(files: Iterable[Path]) -> list[Path]:
-    """All files in the folders of some, as far as these can be listed."""
+    """All files in the folders of these; a folder that cannot be listed adds none."""
     found: list[Path] = []
     for folder in {file.parent: None for file in files}:
         with suppress(OSError):
@@ -111,7 +111,7 @@ class Family:
     clash: str | None = None
     """What is wrong with their steps."""
     has_steps: bool = True
-    """Whether the numbers are steps: of a single file in its folder nobody knows."""
+    """Whether the numbers are steps; the number in the name of a single file may mean anything."""
 
     @property
     def largest(self) -> Path:
@@ -120,17 +120,17 @@ class Family:
 
     @property
     def is_table(self) -> bool:
-        """Whether a reader of tables reads them, which may hold anything."""
+        """Whether they are tables, which may hold anything."""
         return bool(getattr(self.reader, "is_table", False))
 
     @property
     def stems(self) -> set[str]:
-        """The names of the files as ``STEM.contacts.csv`` has them."""
+        """The STEM of each file, by which ``STEM.contacts.csv`` would name it."""
         return set(map(_own_stem, self.files.values()))
 
     @property
     def owners(self) -> set[str | None]:
-        """Of each ``STEM.contacts.csv`` the stem of the grains; None of files with other names."""
+        """The STEM of each file called ``STEM.contacts.csv``; None for files with other names."""
         return set(map(_owner, self.files.values()))
 
 
@@ -201,7 +201,7 @@ def numbers_in(file: Path) -> tuple[int, ...]:
 def _family_of(
     members: Numbered, among: Collection[Path], options: ReadOptions, has_steps: bool
 ) -> Family:
-    """The family of some files; its pattern matches no other file ``among`` which they were."""
+    """The family of some files; its pattern matches none of the others ``among`` which they are."""
     files: dict[int | None, Path] = {}
     clash = problem = reader = None
     for step, file in members:
@@ -238,14 +238,14 @@ def _glob(members: list[Path], among: Iterable[Path]) -> str:
 
 
 def _own_stem(file: Path) -> str:
-    """The stem by which contacts name a file; dumps called dump.100 and dump.200 share no stem."""
+    """The name without its ending; dumps called dump.100 and dump.200 share no stem."""
     name = bare_name(file)
     stem, _, ending = name.rpartition(".")
     return name if ending.isdigit() else stem or name
 
 
 def _owner(file: Path) -> str | None:
-    """The stem of the file whose contacts these are by their name; None if it does not say so."""
+    """STEM of a file called ``STEM.contacts.csv``; None for any other name."""
     stem, ending, _ = bare_name(file).rpartition(".contacts.")
     return stem if ending else None
 
@@ -272,11 +272,12 @@ def without_tables(
     families: Sequence[Family], named: Collection[Path] = (), grains: Family | None = None
 ) -> list[Family]:
     """
-    The families, with ``other`` as the kind of tables that lie beside dumps.
+    The families; tables that are neither grains nor contacts get ``other`` as their kind.
 
-    A table may be anything, such as results. Beside grains of a program's own format it counts if
-    it is one of the files that users have ``named``, or ``STEM.contacts.csv`` of grains, such as
-    those beside which the families lie. One without names counts only if none has names.
+    A table beside dumps in a program's own format may hold anything, such as results. It counts if
+    the user has ``named`` it, or if it is ``STEM.contacts.csv`` of some grains. Where all are
+    tables, one without names of columns counts only if no other table has names. ``grains`` are
+    those beside which the families lie.
     """
     chosen = [] if grains is None else [grains]
     frames = [one for one in [*families, *chosen] if one.kind in ("grains", "index")]

@@ -35,7 +35,7 @@ DECOMPRESSORS = {
 }
 """The module that opens a file, by the first bytes of the file."""
 MAGIC_BYTES = max(map(len, DECOMPRESSORS))
-# how many times its compressed size a file may grow to, and bytes that any file may grow to
+# how many times its compressed size a file may grow to; up to ANYWAY bytes, any file may
 MOST_TIMES = 1000.0
 ANYWAY = 64 << 20
 # decompressed copies that are kept although nobody is reading them
@@ -45,7 +45,7 @@ PART = 4 << 20
 # of the name of the folder that holds the copies of a process
 PREFIX = "scanfab-"
 Stamp = tuple[str, int, int, int]
-"""What tells a file from others, and from itself after it was changed."""
+"""Tells a file from other files, and from itself after it was changed."""
 _grows: ContextVar[bool] = ContextVar("grows", default=False)
 _times: ContextVar[float] = ContextVar("times", default=MOST_TIMES)
 Value = TypeVar("Value")
@@ -76,8 +76,8 @@ def plain(path: Path) -> Path:
     """
     The file itself, or a decompressed temporary copy that keeps its bare name.
 
-    The copy is there as long as somebody holds this path, and the last few copies stay longer, so
-    that a file is decompressed once for all questions to its reader.
+    The copy exists as long as somebody holds this path. The last few copies stay longer, so that a
+    file is decompressed once for all questions to its reader.
     """
     if _decompressor(_head(path, MAGIC_BYTES)) is None:
         return path

@@ -53,7 +53,7 @@ class Frame:
     told : FrameData or None
         What the frame file beside the dump says, as :func:`scanfab.convert` leaves one.
     problem : ReadError or None
-        Why not even the frames of the file can be told.
+        Why the file cannot even be searched for its frames.
 
     Examples
     --------
@@ -216,10 +216,9 @@ class Frame:
                     ) from None
                 note(f"skipped {error}")
         if series.contacts and not files:
-            step, time = self.name_step if self.step is None else self.step, self.snapshot.time
-            moment = f"frame {self.number}" if step is None else f"step {step}"
-            if self.step is None and time is not None:
-                moment = f"time {time:g}"
+            moment = f"frame {self.number}" if self.step is None else f"step {self.step}"
+            if self.step is None and self.snapshot.time is not None:
+                moment = f"time {self.snapshot.time:g}"
             patterns = ", ".join(family.pattern for family in series.contacts)
             message = f"{self.snapshot.path}: no contact file for {moment} among {patterns}"
             if series.contacts_from == "path":
@@ -229,7 +228,7 @@ class Frame:
 
     @property
     def step(self) -> int | None:
-        """That of the dump, else the one in the file's name, unless the dump says it has none."""
+        """The step in the dump, else in the file's name, unless the dump says that it has none."""
         if self.snapshot.step is not None:
             return self.snapshot.step
         is_named = self.series.grains.has_steps and not self.snapshot.stepless
@@ -237,7 +236,7 @@ class Frame:
 
     @property
     def carries(self) -> Carries:
-        """What the dump or its user say of a cell."""
+        """What the dump, its frame file or the user say of a cell."""
         ask = getattr(self.reader, "carries", None)
         options = self.series.options
         told = self.told or self.series.cells or options.cell or options.periodic is not None
@@ -269,7 +268,7 @@ class Frame:
 
 
 def _of_steps(family: Family, steps: tuple[int | None, ...]) -> Family:
-    """The files of some steps, and one more: a file that is the only one may be of any step."""
+    """The files of some steps, and one more: a family's only file may be of any step."""
     wanted = {None, *steps}
     wanted.add(next((step for step in family.files if step not in wanted), None))
     files = {step: path.absolute() for step, path in family.files.items() if step in wanted}
@@ -277,7 +276,7 @@ def _of_steps(family: Family, steps: tuple[int | None, ...]) -> Family:
 
 
 def _wall_forces(walls: list[JoinedContacts]) -> ListedWallForces | None:
-    """Of all files that list contacts with walls; None if one of them does not say the forces."""
+    """The forces of all contacts with walls; None if a file lists such contacts without forces."""
     parts = [one.wall_forces for one in walls if one.wall_contacts.any()]
     known = [part for part in parts if part is not None]
     if not known or len(known) < len(parts):

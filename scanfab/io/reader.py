@@ -189,13 +189,18 @@ def installed_readers() -> dict[str, Offer]:
     ScanfabError
         If two packages offer a reader of the same name.
     """
+    return installed(GROUP, "reader", "recognises", "kind", "snapshots", "read_grains")
+
+
+def installed(group: str, what: str, *methods: str) -> dict[str, Offer]:
+    """The readers or writers that packages offer, each an object of the class that is offered."""
     make = having(
-        "a class of objects with the members of scanfab.io.reader.Reader",
+        f"a class of objects with the members of scanfab.io.{what.title()}",
         **dict.fromkeys(("name", "description"), str),
         extensions=tuple,
-        **dict.fromkeys(("recognises", "kind", "snapshots", "read_grains"), Callable),
+        **dict.fromkeys(methods, Callable),
     )
-    return load_plugins(GROUP, "reader", lambda reader: make(reader()))
+    return load_plugins(group, what, lambda plugin: make(plugin()))
 
 
 def lacking(plugin: object) -> str | None:

@@ -7,6 +7,7 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from itertools import chain, islice
+from operator import index
 from pathlib import Path
 from typing import Any, Literal, SupportsIndex, overload
 
@@ -39,9 +40,9 @@ class Known:
     """What has been found out of the files of a series and all its parts."""
 
     snapshots: dict[Path, tuple[Stamp | None, list[Snapshot]]] = field(default_factory=dict)
-    """Of the files that were looked into, and how these files were then."""
+    """The snapshots of each file that was looked into, and the state of the file then."""
     space: Space | None = None
-    """That of the first frame that has particles."""
+    """The space in which the particles of the first frame that has any lie."""
 
 
 @dataclass
@@ -60,23 +61,23 @@ class Series:
     grains : Family
         The files of grains, by step.
     contacts : tuple of Family
-        The files of contacts, likewise.
+        The families of contact files, by step.
     contacts_from : str
         Where contacts come from.
     options : ReadOptions
         What the user tells of the dump.
     cells : FrameFile or None
-        The cell of each frame, in the place of one for all in the options.
+        A file with the cell of each frame, if the options hold no cell for all frames.
     sources : tuple of str
-        What :func:`scanfab.read_series` was given.
+        The sources that :func:`scanfab.read_series` was given.
     reading : mapping
-        Its options, as a manifest lists them.
+        The options of :func:`scanfab.read_series`, as a manifest lists them.
     numbers : range
-        Which frames of the whole series these are; there may be fewer.
+        Which frames of the whole series these are; the series may have fewer.
     dim : str or int
-        2 of discs, 3, or ``auto``: as the first frame that has particles has them.
+        2 for discs, 3 for spheres, or ``auto``: the first frame that has particles decides.
     known : Known
-        What has been found out of the files, for the series and its parts.
+        What has been found out about the files, shared with all parts of the series.
 
     Examples
     --------
@@ -133,16 +134,14 @@ class Series:
                     "0: list(series)[::-1] goes backwards"
                 )
             return self._with(numbers)
-        if not hasattr(key, "__index__"):
-            raise TypeError(f"a frame of a series is named by a number or a slice, not by {key!r}")
-        place = key.__index__()
+        place = index(key)
         found = list(islice(self, place, place + 1) if place >= 0 else deque(self, -place))
         if not found or len(found) < -place:
             raise NoFrameError(f"{self.name}: has {len(self)} frames, there is no frame {place}")
         return found[0]
 
     def _with(self, numbers: range) -> Series:
-        """Other frames of the same series."""
+        """The same series with other frames."""
         own = {one.name: getattr(self, one.name) for one in fields(Series)}
         return Series(**{**own, "numbers": numbers})
 
@@ -208,7 +207,7 @@ class Series:
         return decided
 
     def _centres_before(self, number: int) -> Iterator[FloatArray]:
-        """Of the frames before one, as far as they can be read."""
+        """The centres of each frame before one; frames that cannot be read are passed over."""
         for frame in islice(self._every(), number):
             with suppress(ReadError):
                 yield frame.read_grains().position
@@ -249,9 +248,10 @@ class Series:
 
     def frames_expected(self) -> int:
         """
-        About how many frames there are, without looking for them.
+        About how many frames there are, without searching the files for them.
 
-        Files that nobody has looked into yet count as many as the last one that was, at first one.
+        A file that was not looked into yet is taken to hold as many frames as the last one that
+        was; before the first one, one frame.
 
         Returns
         -------
@@ -296,7 +296,7 @@ class Series:
 
     def beside(self, path: Path) -> list[Path]:
         """
-        What is read with a file of grains: its cell, or the dumps that an index names.
+        The files that are read together with a file of grains: its cell, or dumps that it lists.
 
         Parameters
         ----------

@@ -7,7 +7,7 @@ All writers take the arrays from here, so that readers find the same names in ev
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from itertools import chain
 from pathlib import Path
@@ -17,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError, UnknownFormatError
-from scanfab.base.plugins import Offer, having, load_plugins
+from scanfab.base.plugins import Offer
 from scanfab.io.columns import DIAMETER_NAMES, first_of, other_size
-from scanfab.io.reader import BODIES, WALLS, plugin_named
+from scanfab.io.reader import BODIES, WALLS, installed, plugin_named
 from scanfab.packing.bodies import CLUMP_COLUMNS
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList
@@ -73,13 +73,7 @@ class Writer(Protocol):
 @cache
 def installed_writers() -> dict[str, Offer]:
     """All writers by name, with the package of each."""
-    make = having(
-        "a class of objects with the members of scanfab.io.writer.Writer",
-        **dict.fromkeys(("name", "description"), str),
-        extensions=tuple,
-        write=Callable,
-    )
-    return load_plugins(GROUP, "writer", lambda writer: make(writer()))
+    return installed(GROUP, "writer", "write")
 
 
 def writer_named(name: str) -> Writer:

@@ -20,7 +20,6 @@ from scanfab.cli.main import run
 from scanfab.io.writer import installed_writers
 from scanfab.testing import differences, made_up_packings
 from tests.helpers.dumps import dump_text, pairs_text, write
-from tests.helpers.truth import SAMPLE_DATA
 
 ENDINGS = {name: one.plugin.extensions[0] for name, one in installed_writers().items()}
 PACKINGS = made_up_packings()
@@ -43,15 +42,6 @@ def test_every_format_gives_the_same_packing_and_finds_its_companions(tmp_path, 
     assert differences(EVERYTHING, scanfab.read(tmp_path / "again.npz")) == []
     for contacts in ("auto", "file", *path.parent.glob("*.contacts.csv")):
         assert differences(EVERYTHING, scanfab.read(path, contacts=contacts)) == []
-
-
-@pytest.mark.parametrize("order", [1, -1])
-def test_from_format_to_format_nothing_gets_lost(tmp_path, order):
-    for source in (EVERYTHING, scanfab.read(SAMPLE_DATA / "liggghts_periodic/dump_30000.txt.gz")):
-        packing = source
-        for name in list(ENDINGS)[::order]:
-            packing = scanfab.read(written(packing, tmp_path, name))
-        assert differences(source, packing) == []
 
 
 @pytest.mark.parametrize("name", ENDINGS)
