@@ -256,16 +256,17 @@ def _words(family: Family) -> list[str]:
     return re.findall(r"[^\W_]+", name)
 
 
-def _common_words(one: Family, two: Family) -> int:
-    """How many words two names begin with in common."""
-    pairs = zip(_words(one), _words(two), strict=False)
-    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
+def _kinship(one: Family, two: Family) -> tuple[int, bool]:
+    """How many words two names begin with in common, and whether they have the same ending."""
+    common = takewhile(lambda pair: pair[0] == pair[1], zip(_words(one), _words(two), strict=False))
+    endings = {Path(bare_name(Path(family.pattern))).suffix for family in (one, two)}
+    return len(list(common)), len(endings) == 1
 
 
 def are_tied(grains: Family, contacts: Family) -> bool:
     """Whether step or name tell that contacts belong to grains: a number or the first word."""
     shared = set(grains.files) & set(contacts.files) - {None}
-    return _common_words(grains, contacts) > 0 or (bool(shared) and not any(contacts.owners))
+    return _kinship(grains, contacts)[0] > 0 or (bool(shared) and not any(contacts.owners))
 
 
 def without_tables(
@@ -302,9 +303,10 @@ def contacts_beside(
     """
     The families that lie beside single grain files with their numbers, and those of their contacts.
 
-    ``STEM.contacts.csv`` belongs to STEM. Another contact file belongs to grains of its number if
-    their names begin with more common words than its name and that of any other grains there; of
-    several contact files, those with the most. A note tells which are read, or may be meant.
+    ``STEM.contacts.csv`` belongs to STEM. Another contact file belongs to the grains of its number
+    whose names begin with the most words in common with its name; of those with as many, to the one
+    with the same ending. Of several contact files, those with the most common words are read. A
+    note tells which are, or may be meant.
     """
     if grains.kind == "index":
         return [], []
@@ -313,17 +315,18 @@ def contacts_beside(
     rivals = [one for one in frames if _words(one) != _words(grains)]
     candidates = [one for one in families if one.kind == "contacts" and one.clash is None]
 
-    def lead(contacts: Family) -> int:
-        """By how many common words the grains are nearer to contacts than their rivals are."""
-        nearest = max((_common_words(one, contacts) for one in rivals), default=-1)
-        return _common_words(grains, contacts) - nearest
+    def nearest_rival(contacts: Family) -> tuple[int, bool]:
+        return max((_kinship(one, contacts) for one in rivals), default=(-1, False))
 
     own = [one for one in candidates if one.owners <= grains.stems]
     if not own:
-        near = [one for one in candidates if one.owners == {None} and lead(one) > 0]
-        most = max((_common_words(grains, one) for one in near), default=0)
-        own = [one for one in near if _common_words(grains, one) == most]
-    doubtful = [Path(one.pattern).name for one in candidates if lead(one) >= 0]
+        free = [one for one in candidates if one.owners == {None}]
+        near = [one for one in free if _kinship(grains, one) > nearest_rival(one)]
+        most = max((_kinship(grains, one)[0] for one in near), default=0)
+        own = [one for one in near if _kinship(grains, one)[0] == most]
+    doubtful = [
+        Path(one.pattern).name for one in candidates if _kinship(grains, one) >= nearest_rival(one)
+    ]
     if own:
         note(f"contacts are read from {', '.join(one.pattern for one in own)}, beside the grains")
     elif doubtful:

@@ -51,9 +51,11 @@ def test_every_format_gives_the_same_packing_and_finds_its_companions(tmp_path, 
 @given(data=st.data())
 def test_any_numbers_come_back(tmp_path, name, data):
     count = data.draw(st.integers(1, 4))
+    radius = data.draw(arrays(np.float64, count, elements=st.floats(1e-90, 1e90)))
+    place = data.draw(arrays(np.float64, (count, 3), elements=st.floats(-1e6, 1e6)))
     packing = scanfab.Packing(
-        data.draw(arrays(np.float64, (count, 3), elements=st.floats(-1e99, 1e99))),
-        data.draw(arrays(np.float64, count, elements=st.floats(1e-99, 1e99))),
+        place * radius.max(),
+        radius,
         id=data.draw(arrays(np.int64, count, elements=st.integers(-1, 2**62), unique=True)),
         columns={
             "a": data.draw(arrays(np.float64, count)),
