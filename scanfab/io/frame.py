@@ -216,9 +216,10 @@ class Frame:
                     ) from None
                 note(f"skipped {error}")
         if series.contacts and not files:
-            moment = f"frame {self.number}" if self.step is None else f"step {self.step}"
-            if self.step is None and self.snapshot.time is not None:
-                moment = f"time {self.snapshot.time:g}"
+            step, time = self.name_step if self.step is None else self.step, self.snapshot.time
+            moment = f"frame {self.number}" if step is None else f"step {step}"
+            if self.step is None and time is not None:
+                moment = f"time {time:g}"
             patterns = ", ".join(family.pattern for family in series.contacts)
             message = f"{self.snapshot.path}: no contact file for {moment} among {patterns}"
             if series.contacts_from == "path":
