@@ -24,6 +24,11 @@ from scanfab.pipeline.values import Vector
 from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.directions import DirectionRule, usual_rule
 
+# what a plan takes from the settings as it is
+AS_ASKED = (
+    "variants", "axis", "moment", "seed", "workers", "tolerance", "max_chords", "more_columns",
+    "edge", "lists_gaps",
+)  # fmt: skip
 # replicates of a fixed scan, and at least of an auto scan
 REPLICATES = 16
 # and at most of one whose directions are added until its error, as these tell it, is small enough
@@ -149,23 +154,14 @@ def plan_without_grains(settings: Settings, space: Space = SPACE) -> Plan:
     return Plan(
         samples=sample_rule(settings),
         strains=Strains.of(settings),
-        variants=settings.variants,
-        axis=settings.axis,
-        moment=settings.moment,
-        seed=settings.seed,
-        workers=settings.workers,
-        tolerance=settings.tolerance,
-        max_chords=settings.max_chords,
         rvs=sizes_of(settings),
-        more_columns=settings.more_columns,
         groups=settings.with_,
         cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),
         rule=settings.directions or usual_rule(space),
         rule_is_asked_for=settings.directions is not None,
-        edge=settings.edge,
-        lists_gaps=settings.lists_gaps,
         map_settings=settings if isinstance(settings, MapSettings) else None,
         space=space,
+        **{name: getattr(settings, name) for name in AS_ASKED},
     )
 
 
@@ -201,10 +197,8 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
         blocks = MapBlocks.of(settings, sample)
         notes += blocks.doubts(sample, next(iter(windows), None), r_mean)
     if plan.rule.bias > 0.1 * settings.tolerance:
-        text = (
-            f"directions {plan.rule.name}: an isotropic sample would get "
-            f"alpha = {plan.rule.bias:.2g}"
-        )
+        name, bias = plan.rule.name, plan.rule.bias
+        text = f"directions {name}: an isotropic sample would get alpha = {bias:.2g}"
         notes.append(Note("biased_directions", text))
     deformation = None
     if settings.rv_follows != "none" and settings.needs_window:

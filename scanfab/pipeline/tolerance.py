@@ -6,7 +6,7 @@ import logging
 import math
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -154,17 +154,20 @@ def scan_to_tolerance(
     return scan.sums, scan.plan, notes
 
 
+@dataclass
 class _AutoScan:
     """A scan that goes on round by round."""
 
-    def __init__(self, solids: Solids, plan: Plan, goal: Goal) -> None:
-        self.solids, self.plan, self.goal = solids, plan, goal
-        self.sums: Any = None
-        self.errors: dict[str, Errors] = {}
-        self.spent = 0.0
-        """Chords; a line costs as much as a chord, also if it meets nothing."""
-        self.left = 0.0
-        """As many replicates as the budget allows."""
+    solids: Solids
+    plan: Plan
+    goal: Goal
+    sums: Any = None
+    errors: dict[str, Errors] = field(default_factory=dict)
+    """Of each variant."""
+    spent: float = 0.0
+    """Chords; a line costs as much as a chord, also if it meets nothing."""
+    left: float = 0.0
+    """As many replicates as the budget allows."""
 
     def run(self, where: str) -> list[Note]:
         """Scan until the tolerance holds or nothing can be added; tell what was not reached."""
@@ -177,7 +180,8 @@ class _AutoScan:
             rest = min(missing, self.plan.max_chords / self.spent) - 1.0
             if rest > 0.0:
                 seconds = spelt_time(rest * (time.perf_counter() - begun))
-                reached, tolerance = self._reached(counted)
+                worst = max(self.errors[name].reported for name in counted)
+                reached, tolerance = spelt_apart(worst, self.plan.tolerance)
                 LOGGER.info("%s: error %s of %s, about %s", where, reached, tolerance, seconds)
             # not if the lines of this round had to be wider than planned
             if start == 0 and self.plan.spacing <= planned:
@@ -275,12 +279,6 @@ class _AutoScan:
         affordable = affordable and is_affordable(self.solids, better.spacing)
         return better if growth > 1.0 and affordable else None
 
-    def _reached(self, variants: str) -> tuple[str, str]:
-        """The largest error of some variants, and the tolerance, as messages tell them apart."""
-        errors = [self.errors[name].reported for name in variants]
-        worst = max(filter(math.isfinite, errors), default=math.inf)
-        return spelt_apart(worst, self.plan.tolerance)
-
     def _missed(self, factor: float) -> Note:
         steps, why = self.sums.steps.sum(), ""
         if steps > self.sums.chords.sum():
@@ -302,11 +300,9 @@ class _AutoScan:
         for name, errors in self.errors.items():
             if name in counted or errors.reported <= self.plan.tolerance:
                 continue
-            said = "there is no void fabric yet"
-            if math.isfinite(errors.reported):
-                said = "alpha_vs_axial_se is {}, above the tolerance {}".format(
-                    *self._reached(name)
-                )
+            reached, tolerance = spelt_apart(errors.reported, self.plan.tolerance)
+            above = f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}"
+            said = above if math.isfinite(errors.reported) else "there is no void fabric yet"
             text = (
                 f"{said}: it keeps few grains, or would need far more lines than the others "
                 f'(`variants="{name}"` scans it alone)'

@@ -101,7 +101,7 @@ class VariantColumns:
             weights=plan.rule.weights,
             length=length,
             segments=segments,
-            meets_solids=not self._no_solid,
+            meets_solids=bool(sample.solids(self.variant, self.window).any()),
             blocked=BlockedSums(
                 found.blocked.axes,
                 found.block_rule.weights,
@@ -151,18 +151,6 @@ class VariantColumns:
             return None
         return window_alpha(self.window.shape, fabric, self.cutoff, self.measured.axis)
 
-    @cached_property
-    def _no_solid(self) -> str:
-        """Why the variant's lines meet no grain at all; empty if they do."""
-        if self.sample.solids(self.variant, self.window).any():
-            return ""
-        with_rattlers = replace(self.variant, without_rattlers=False)
-        rattlers = self.sample.number(self.sample.solids(with_rattlers, self.window))
-        if rattlers:
-            there = " that reach into the RV" if self.variant.in_window else ""
-            return f"no grain is left, all {rattlers}{there} are rattlers"
-        return f"no grain reaches into the {self.window}"
-
     def notes(self) -> Iterator[Note]:
         """Whether there is no void fabric, or a doubtful one, or lines without a grain."""
         texts = doubts_of_lines(self.sums, self.variant, self.left_out) | self._doubts_of_void()
@@ -175,8 +163,12 @@ class VariantColumns:
 
     def _doubts_of_void(self) -> dict[str, str]:
         void = self.measured.void
-        if self._no_solid:
-            return {"no_solid": self._no_solid}
+        if not self.measured.meets_solids:
+            with_rattlers = replace(self.variant, without_rattlers=False)
+            rattlers = self.sample.number(self.sample.solids(with_rattlers, self.window))
+            there = " that reach into the RV" if self.variant.in_window else ""
+            left = f"no grain is left, all {rattlers}{there} are rattlers"
+            return {"no_solid": left if rattlers else f"no grain reaches into the {self.window}"}
         if self.edge == ENDS and self.window is None and self.measurement.solids.inner is None:
             return {"no_inner_window": NO_INNER_WINDOW}
         if self.measured.segment_count == 0:
