@@ -1,7 +1,6 @@
 """Calibration: ladders, from where on they are steady, and recommended settings that hold."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +8,6 @@ from matplotlib.figure import Figure
 
 from scanfab import (
     Packing,
-    PackingError,
     ScanfabWarning,
     SettingsError,
     calibrate,
@@ -19,7 +17,7 @@ from scanfab import (
 from scanfab.base.column import columns_of_fields
 from scanfab.pipeline.calibration import StepRow, first_steady, judged
 from scanfab.viz.figures.calibration import Ladders
-from scanfab.viz.figures.page import drawn_page, save_figures
+from scanfab.viz.figures.page import drawn_page
 from tests.helpers.lattices import shaken_cubic, simple_cubic
 
 QUICK = {"tolerance": 2e-3, "variants": "cd", "rv": 0.6, "workers": 1}
@@ -78,12 +76,6 @@ def test_each_ladder_and_the_settings_have_a_sentence(found):
     assert "the paper's 1 r_min" in found.findings[2]
 
 
-def test_whole_sample_has_no_ladder_of_rvs(packing):
-    found = calibrate(packing, **{**QUICK, "variants": "a", "tolerance": 0.02})
-    assert {row.ladder for row in found.rows} == {"spacing", "directions", "cutoff", "recommended"}
-    assert {row.rv_radius for row in found.rows} == {None}
-
-
 def step(value, alpha, error, **more):
     words = {"value": value, "variant": "c", "alpha_vs_axial": alpha, "alpha_vs_axial_se": error}
     return StepRow(
@@ -102,14 +94,6 @@ def test_steady_is_what_differs_from_later_steps_by_no_more_than_chance():
     assert [row.steady for row in judged(steps)] == [0, 1, 1, 1, 1]
     far = [step(9, 0.0129, 0.001), *steps[:2], steps[4]]
     assert [row.steady for row in judged(far)] == [0, 0, 1, 1]
-
-
-def test_sample_error_counts_where_the_sample_changes():
-    words = {"alpha_vs_axial_sample_se": 0.005}
-    steps = [step(k, a, 0.001, **words) for k, a in enumerate([0.02, 0.01])]
-    rvs = [replace(one, ladder="rv", rv_radius=1.0 + k) for k, one in enumerate(steps)]
-    assert first_steady(judged(rvs)) == 0
-    assert first_steady(judged(steps)) is None
 
 
 def test_an_rv_within_another_differs_from_it_by_less_than_two_samples_do():
@@ -152,16 +136,6 @@ def test_a_doubtful_step_is_not_steady(doubt):
     assert first_steady(found) is None  # there is nothing that the last one agrees with
 
 
-def test_one_grain_is_refused():
-    with pytest.raises(SettingsError, match="fabric in variant c"):
-        calibrate(Packing([[0.0, 0, 0]], [1.0]))
-
-
-def test_no_grain_is_refused():
-    with pytest.raises(PackingError, match="no frame has any grains"):
-        calibrate(Packing(np.zeros((0, 3)), np.zeros(0)))
-
-
 @pytest.mark.parametrize("frame", [1, 7, -2])
 def test_a_frame_that_is_not_there_is_refused(packing, frame):
     with pytest.raises(SettingsError, match=f"frames: the series has no frame in {frame}:"):
@@ -188,15 +162,6 @@ def test_steps_beyond_the_budget_are_left_out_with_a_word(packing):
     assert any("spacing 0.1 left out: it would cut" in str(one.message) for one in told)
 
 
-def test_figure_has_four_panels_with_labels(found, tmp_path):
-    for suffix, start in ((".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")):
-        save_figures(tmp_path / f"ladders{suffix}", [Ladders(found.rows)])
-        assert (tmp_path / f"ladders{suffix}").read_bytes().startswith(start)
-    with pytest.raises(SettingsError, match=r"figures can be written as \.png"):
-        save_figures(tmp_path / "ladders.doc", [Ladders(found.rows)])
-    assert math.isfinite(found.rows[-1].seconds)
-
-
 def test_figure_has_letters_total_errors_and_words(found):
     with drawn_page([Ladders(found.rows)]) as page:
         panels = page.axes
@@ -215,25 +180,6 @@ def test_figure_has_letters_total_errors_and_words(found):
     assert any(height == pytest.approx(2 * half) for height in heights)
 
 
-def test_steps_of_one_replicate_have_no_band(found, monkeypatch):
-    """Of the sample's part alone it claimed to be of both, about a value that was far off."""
-    bands = []
-    monkeypatch.setattr("scanfab.viz.figures.calibration.band", lambda *asked: bands.append(asked))
-    rows = [
-        replace(row, alpha_vs_axial_se=None) if (row.ladder, row.value) == ("spacing", 4) else row
-        for row in found.rows
-    ]
-    assert any(row.alpha_vs_axial_sample_se for row in rows if row.alpha_vs_axial_se is None)
-    with drawn_page([Ladders(rows)]) as page:
-        pass
-    for panel, values, _, errors, _ in bands[:2]:
-        assert panel is page.axes[0]
-        assert np.isnan(errors[values == 4]).all()
-        assert np.isfinite(errors[values < 2]).all()
-    note = page.legends[0].get_title().get_text()
-    assert "\nno band where either part is not known\n" in note
-
-
 def test_one_ladder_is_drawn_on_the_axes_that_it_gets(found):
     ax = Figure().subplots()
     assert found.plot.calibration(ax=ax, ladder="cutoff") is ax
@@ -243,20 +189,6 @@ def test_one_ladder_is_drawn_on_the_axes_that_it_gets(found):
         found.plot.calibration(ax=ax, ladder="lines")
 
 
-def test_what_looks_wrong_in_the_frame_is_told_here_too(packing):
-    """A grain that flew away, and a column that may number clumps."""
-    count = len(packing) + 1
-    position = np.vstack([packing.position, [90.0, 3.0, 3.0]])
-    radius = np.append(packing.radius, 0.5)
-    bodies = np.repeat(np.arange(count), 2)[:count] + 1
-    flown = find_contacts(Packing(position, radius, columns={"clump": bodies}))
-    with pytest.warns(ScanfabWarning) as told:
-        calibrate(flown, **{**QUICK, "tolerance": 0.02})
-    texts = [str(one.message) for one in told]
-    assert any("away from all others" in text for text in texts)
-    assert any("but each sphere counts as a grain" in text for text in texts)
-
-
 @pytest.mark.parametrize("many", [list, iter])
 def test_packings_from_anywhere_are_calibrated(many):
     packing = Packing(simple_cubic(4).position, 0.5)
@@ -264,8 +196,3 @@ def test_packings_from_anywhere_are_calibrated(many):
     found = calibrate(many([packing, packing]), **options)
     assert {row.frame for row in found.rows} == {1}
     assert found.options == calibrate(packing, **options).options
-
-
-def test_a_frame_that_is_no_number_is_told():
-    with pytest.raises(SettingsError, match="frame: expected"):
-        calibrate(Packing([[0, 0, 0]], 1.0), frame="x")

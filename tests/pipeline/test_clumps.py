@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 
 import numpy as np
@@ -10,10 +9,6 @@ import pytest
 
 import scanfab
 from scanfab import Cell, Packing, Settings, find_contacts
-from scanfab.cli.main import run
-from scanfab.packing.groupings import Grouping, Groupings
-from scanfab.packing.sample import Sample
-from scanfab.pipeline.calibration import calibrate
 from scanfab.pipeline.inspection import inspect_series
 from tests.helpers.dumps import NAMES, dump_text, write
 from tests.helpers.lattices import shaken_cubic
@@ -66,20 +61,6 @@ def test_bodies_of_one_sphere_each_give_the_same_rows(periodic):
     assert tables[0] == tables[1] == tables[2]
 
 
-def test_bodies_of_one_sphere_each_give_the_same_bytes(tmp_path):
-    series_of(tmp_path, np.arange(64))
-    words = ["--directions", "9", "--spacing", "1rmin", "--rv", "0.6", "--seed", "3"]
-    found = []
-    for name, more in [("one", []), ("two", ["--bodies", "id"]), ("three", ["--bodies", "id"])]:
-        folder = tmp_path / name
-        out = str(tmp_path / f"{name}.csv")
-        vtk = ["--vtk", str(folder)]
-        assert run(["compute", str(tmp_path / "dump.txt"), *words, *more, *vtk, "-o", out]) == 0
-        files = sorted(p for p in folder.rglob("*") if p.is_file())
-        found.append(((tmp_path / f"{name}.csv").read_bytes(), [p.read_bytes() for p in files]))
-    assert found[0] == found[1] == found[2]
-
-
 def test_the_void_fabric_is_that_of_the_spheres():
     """The lines know nothing of bodies: a union of spheres is a solid."""
     clumps, spheres = (
@@ -114,32 +95,6 @@ def test_boundary_bodies_are_no_grains(tmp_path):
     assert (report.grains, report.boundary, report.clumps, report.spheres) == (30, 2, 30, 60)
 
 
-def test_inspect_and_calibrate_count_bodies(tmp_path):
-    series = series_of(tmp_path, pillars())
-    (report,) = inspect_series(series, Settings())
-    assert (report.grains, report.clumps, report.spheres) == (32, 32, 64)
-    assert not report.warnings
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        found = calibrate(series, variants="c", tolerance=0.1, cutoff="0.2rmin", max_chords=1e5)
-    assert found.rows
-
-
-def test_manifest_and_resume_know_the_column(tmp_path):
-    series_of(tmp_path, pillars(), pillars(), column="c_b")
-    out = tmp_path / "table.csv"
-    words = ["compute", str(tmp_path / "dump.txt"), "--directions", "9", "--spacing", "1rmin"]
-    words += ["--variants", "ab", "-o", str(out)]
-    assert run([*words, "--bodies", "c_b"]) == 0
-    manifest = json.loads((tmp_path / "table.csv.manifest.json").read_text())
-    assert manifest["settings"]["bodies"] == "c_b"
-    before = out.read_bytes()
-    assert run([*words, "--bodies", "c_b", "--resume"]) == 0
-    assert out.read_bytes() == before
-    assert run([*words, "--resume"]) != 0
-    assert out.read_bytes() == before
-
-
 def test_other_numbers_of_the_same_bodies_are_nothing_to_tell(tmp_path):
     series = series_of(tmp_path, pillars(), pillars(shift=7))
     with warnings.catch_warnings():
@@ -162,61 +117,3 @@ def test_spheres_that_change_their_body_are_told(tmp_path):
     series = series_of(tmp_path, pillars(), np.roll(pillars(), 1))
     with pytest.warns(scanfab.ScanfabWarning, match="frame 1: other spheres are one body"):
         scanfab.compute(series, variants="a", **SCAN)
-
-
-def test_groupings_are_told_apart_by_who_is_with_whom():
-    ids = np.array([4, 9, 2, 7])
-    one = Grouping(ids, np.array([4, 4, 2, 2]))
-    other_order = Grouping(ids[::-1], np.array([7, 7, 9, 9]))
-    split = Grouping(ids, np.array([4, 9, 4, 9]))
-    groupings = Groupings()
-    assert groupings.notes(0, one) == []
-    assert groupings.notes(1, other_order) == []
-    assert groupings.notes(2, None) == []
-    assert [note.code for note in groupings.notes(3, split)] == ["other_bodies"]
-    assert groupings.notes(4, split) == []
-
-
-def test_a_sample_in_other_processes_gives_the_same_rows(tmp_path):
-    from concurrent.futures import ProcessPoolExecutor
-
-    series = series_of(tmp_path, pillars(), np.roll(pillars(), 1))
-    with (
-        ProcessPoolExecutor(1) as pool,
-        pytest.warns(scanfab.ScanfabWarning, match="other spheres"),
-    ):
-        there = scanfab.compute(series, variants="a", executor=pool, workers=1, **SCAN)
-    with pytest.warns(scanfab.ScanfabWarning, match="other spheres"):
-        assert there.rows == scanfab.compute(series, variants="a", **SCAN).rows
-
-
-def test_rattlers_by_force_come_from_the_dump():
-    """LIGGGHTS' own forces: which clumps are pressed by fewer than two others, walls counted."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        series = scanfab.read_series(POURED)
-        options = {"variants": "a", "frames": -1, "directions": 9, "spacing": "3rmin"}
-        tables = {
-            limit: scanfab.compute(series, rattlers="force", min_force=limit, **options)[0]
-            for limit in (0.0, 0.5, 2.0)
-        }
-        count = scanfab.compute(series, **options)[0]
-    found = [tables[limit].rattlers for limit in (0.0, 0.5, 2.0)]
-    assert count.rattlers <= found[0] < found[1] < found[2]
-    packing = series[-1].read()
-    sample = Sample(packing, np.zeros(len(packing), bool))
-    for limit, expected in zip((0.0, 0.5, 2.0), found, strict=True):
-        assert loose_by_force(sample, limit) == expected
-
-
-def loose_by_force(sample, limit):
-    """One contact after the other."""
-    contacts, head = sample.contacts, sample.packing.bodies.head
-    mean = sum(contacts.force_n.tolist()) / len(contacts)
-    others = {int(one): set() for one in head}
-    for (one, two), force in zip(head[contacts.pairs].tolist(), contacts.force_n, strict=True):
-        if force > limit * mean:
-            others[one].add(two)
-            others[two].add(one)
-    walls = np.bincount(head, sample.packing.wall_contacts, len(head))
-    return sum(len(held) + walls[one] < 2 for one, held in others.items())

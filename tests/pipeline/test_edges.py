@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import Cell, Packing, ScanfabWarning, SettingsError, compute, load
+from scanfab import Cell, Packing, ScanfabWarning, SettingsError, compute
 from tests.helpers.lattices import ball_points
 
 OPTIONS = {"spacing": "0.5rmin", "directions": "lebedev:5", "workers": 1, "cutoff": "0.5rmin"}
@@ -96,21 +96,6 @@ def test_a_whole_without_an_ellipsoid_has_no_void_fabric():
     with pytest.warns(ScanfabWarning, match="flat or too small: by the rule `edge=ends`"):
         table = compute(packing, variants="a", edge="ends", **OPTIONS)
     assert table[0].mean_length is None
-
-
-@pytest.mark.parametrize("suffix", [".csv", ".json", ".jsonl", ".parquet"])
-def test_its_columns_are_written_read_back_and_resumed(ball, suffix, tmp_path):
-    table = compute(ball, variants="ac", edge="start", rv=0.35, **OPTIONS)
-    path = tmp_path / f"table{suffix}"
-    table.save(path)
-    again = load(path)
-    assert list(again.names) == list(table.names)
-    assert columns(again, "edge", "left_out") == columns(table, "edge", "left_out")
-
-
-def test_another_word_is_refused():
-    with pytest.raises(SettingsError, match="edge"):
-        scanfab.Settings(edge="cut")
 
 
 @pytest.mark.parametrize("shape", ["box", "cylinder", "ellipsoid"])

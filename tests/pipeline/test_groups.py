@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import csv
-import json
-
 import numpy as np
 import pytest
 
 import scanfab
 from scanfab import Cell, ContactList, Packing
 from scanfab.base.errors import PackingError, SettingsError
-from scanfab.fabric.measured import SampleState
 from scanfab.fabric.registry import GROUPS
-from scanfab.fabric.state import State
 from scanfab.pipeline.values import GROUP_NAMES
 from scanfab.table.columns import COLUMNS
-from tests.helpers.measured import measured_of
 from tests.helpers.truth import CELL, SAMPLE_DATA, TRIAXIAL
 
 FAST = {"directions": 13, "spacing": "3rmin", "workers": 1}
@@ -49,12 +43,6 @@ def test_several_groups_stand_behind_the_others_in_one_order(yade, asked):
     assert missing == []
 
 
-def test_without_them_nothing_changes(yade):
-    rows = [scanfab.compute(yade, variants="ac", with_=one, **FAST) for one in ((), "harmonics")]
-    for plain, more in zip(*rows, strict=True):
-        assert dict(plain) == {name: more[name] for name in plain}
-
-
 @pytest.mark.parametrize("wrong", ["force", "forces,stress", 3])
 def test_an_unknown_group_is_named(yade, wrong):
     with pytest.raises(SettingsError, match="with_: expected groups of columns out of invariants"):
@@ -65,14 +53,6 @@ def test_forces_that_nobody_has_are_an_error():
     packing = scanfab.read(YADE, contacts="geometric")
     with pytest.raises(PackingError, match=r"forces of contacts, but these are found by geometry"):
         scanfab.compute(packing, with_="forces", **FAST)
-
-
-def test_a_frame_without_forces_can_be_skipped(yade):
-    bare = scanfab.find_contacts(yade.with_contacts(ContactList(np.zeros((0, 2)))))
-    bare = bare.with_contacts(ContactList(bare.contacts.pairs, bare.contacts.image))
-    with pytest.warns(scanfab.ScanfabWarning, match="forces of contacts, but these have none"):
-        found = scanfab.compute([yade, bare], with_="forces", variants="a", on_error="skip", **FAST)
-    assert found["frame"].tolist() == [0]
 
 
 def test_stress_without_forces_is_empty_with_one_note():
@@ -134,17 +114,6 @@ def test_no_contacts_are_no_error():
     assert row.void_ratio > 0
 
 
-def test_boundary_and_rattlers(yade):
-    """Rattlers are solid in the void ratio, and not in the contacts of b."""
-    found = scanfab.compute(yade, with_="forces,state", variants="abcd", rv=0.6, **FAST)
-    a, b, c, d = found
-    assert a.void_ratio == b.void_ratio
-    assert c.void_ratio == d.void_ratio
-    assert a.p == b.p
-    assert b.coordination_mechanical >= a.coordination_mechanical
-    assert c.p == pytest.approx(a.p, rel=0.3)
-
-
 def test_strain_and_directions_of_a_series():
     fine = {**FAST, "spacing": "1rmin"}
     found = scanfab.compute(scanfab.read_series(CELL), with_="state", variants="a", **fine)
@@ -161,19 +130,6 @@ def test_strain_and_directions_of_a_series():
             7.5 * (found.tensor("gc")[-1] - np.eye(3) / 3) * _direction(found.tensor("stress")[-1])
         )
     )
-
-
-def test_a_stress_without_direction_has_no_angle():
-    state = SampleState(0.6, 5.0, np.diag([1.0, 1.0, 1.018]))
-    assert state.direction is None
-    found = State().values(measured_of(np.eye(3), state=state))
-    assert found["acst_c"] is None
-    assert found["angle_c_stress"] is None
-    assert found["q"] == pytest.approx(0.018)
-    state = SampleState(0.6, 5.0, np.diag([1.0, 1.0, 1.022]))
-    found = State().values(measured_of(np.array([[0, 0, 1.0], [0, 0, 1.0]]), state=state))
-    assert found["acst_c"] == pytest.approx(15 / np.sqrt(6))
-    assert found["angle_c_stress"] == pytest.approx(0.0, abs=1e-6)
 
 
 def _direction(stress):
@@ -203,37 +159,3 @@ def test_lists_of_numbers_are_where_cells_may_be_lists(tmp_path, yade, suffix):
         assert len(again.c_tensor4) == 81
         fourth = np.array(again.c_tensor4).reshape(3, 3, 3, 3)
         np.testing.assert_allclose(np.einsum("ijkk->ij", fourth), found.tensor("gc")[0], atol=1e-12)
-
-
-@pytest.mark.parametrize("suffix", [".csv", ".json"])
-def test_a_table_with_groups_is_gone_on_with(tmp_path, suffix):
-    series, path = scanfab.read_series(CELL), tmp_path / f"table{suffix}"
-    options = {"with_": "harmonics,state,forces,invariants", "variants": "a", **FAST}
-    whole = tmp_path / f"whole{suffix}"
-    scanfab.compute_file(series, whole, **options)
-    scanfab.compute_file(series, path, frames=":2", **options)
-    scanfab.compute_file(series, path, resume=True, **options)
-    assert path.read_bytes() == whole.read_bytes()
-    manifest = json.loads(path.with_name(path.name + ".manifest.json").read_text())
-    assert manifest["settings"]["with_"] == ["invariants", "state", "forces", "harmonics"]
-    with pytest.raises(SettingsError, match="with_"):
-        scanfab.compute_file(series, path, resume=True, **{**options, "with_": "state"})
-
-
-def test_the_command_line_says_with(tmp_path):
-    from click.testing import CliRunner
-
-    from scanfab.cli.group import cli
-
-    out = tmp_path / "a.csv"
-    run = CliRunner().invoke(
-        cli,
-        ["compute", str(YADE), "--with", "forces,invariants", "--variants", "a", "--directions",
-         "13", "--spacing", "3rmin", "--workers", "1", "-o", str(out)],
-    )  # fmt: skip
-    assert run.exit_code == 0, run.output
-    header = next(csv.reader(out.open()))
-    assert header[len(COLUMNS) :] == names("invariants", "forces")
-    run = CliRunner().invoke(cli, ["compute", str(YADE), "--with", "nothing"])
-    assert run.exit_code == 2
-    assert "--with: expected groups of columns" in run.output

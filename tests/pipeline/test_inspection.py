@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
 import warnings
 
 import pytest
 
 import scanfab
 from scanfab.base.errors import ScanfabNote, ScanfabWarning
-from scanfab.pipeline.inspection import FrameReport, inspect_series
+from scanfab.pipeline.inspection import inspect_series
 from scanfab.pipeline.settings import Settings
 from tests.helpers.dumps import ROWS, dump_text, pairs_text, write, yade_spheres
-from tests.helpers.truth import FLOOR, SAMPLE_DATA
+from tests.helpers.truth import SAMPLE_DATA
 
 
 def reports(folder, texts, **options):
@@ -70,23 +69,6 @@ def test_a_format_without_a_cell_is_always_told(tmp_path):
         assert next(inspect_series(with_cell, Settings())).warnings == []
 
 
-def test_a_box_that_may_be_periodic_is_told():
-    series = scanfab.read_series(FLOOR / "grains_30000.vtk", contacts="geometric")
-    (report,) = inspect_series(series, Settings())
-    (text,) = report.warnings
-    assert "does not say whether it repeats" in text
-    assert '`periodic="xyz"`' in text
-
-
-def test_a_sheet_of_discs_is_told_in_full():
-    sheet = SAMPLE_DATA / "lammps_discs" / "sheet.3000.lammpstrj"
-    (report,) = inspect_series(scanfab.read_series(sheet, dim=3), Settings())
-    assert [text.partition(",")[0].partition("(")[0].strip() for text in report.warnings] == [
-        "all 300 centres lie in the plane x-y",
-        "300 grains touch themselves",
-    ]
-
-
 def test_a_sheet_of_discs_is_no_doubt():
     sheet = SAMPLE_DATA / "lammps_discs" / "sheet.3000.lammpstrj"
     with pytest.warns(scanfab.ScanfabNote, match="read as discs"):
@@ -107,19 +89,6 @@ def test_an_empty_frame_has_no_radii(tmp_path):
 def test_chosen_frames_keep_their_numbers(tmp_path):
     texts = [dump_text(step=step) for step in range(5)]
     assert [report.frame for report in reports(tmp_path, texts, frames="1:4:2")] == [1, 3]
-
-
-def test_every_value_is_plain(tmp_path):
-    (report,) = reports(tmp_path, [dump_text(flags=" pp pp pp")])
-    assert isinstance(report, FrameReport)
-    allowed = (int, float, str, list, bool, type(None))
-    for name, value in dataclasses.asdict(report).items():
-        assert type(value) in allowed, name
-
-
-def test_frames_that_do_not_exist_are_an_error(tmp_path):
-    with pytest.raises(scanfab.SettingsError, match="no frame in 99:100"):
-        reports(tmp_path, [dump_text()], frames="99")
 
 
 def test_a_part_of_a_series_is_reported_as_its_frames_among_all(tmp_path):

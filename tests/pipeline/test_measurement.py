@@ -1,31 +1,23 @@
 """The sample's own scatter in the table: contacts without each octant, and what it is empty for."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
 from scanfab import (
     Cell,
     Packing,
     ScanfabWarning,
     Settings,
-    Solids,
-    box,
     compute,
     find_contacts,
-    scan_lines,
 )
 from scanfab.packing.sample import VARIANTS, Sample
-from scanfab.packing.window import Window
 from scanfab.pipeline.measurement import measure
 from scanfab.pipeline.plan import make_plan
-from scanfab.pipeline.rv import RV
-from scanfab.scan.blocks import Blocks
 from tests.helpers import naive
-from tests.helpers.lattices import rotation, shaken_cubic
+from tests.helpers.lattices import shaken_cubic
 
 LINES = {"directions": "lebedev:5", "spacing": 0.15}
 
@@ -107,23 +99,6 @@ def test_turned_with_its_axis_the_sample_has_the_same_octants(packing):
     assert theirs == pytest.approx(ours, abs=1e-12)
 
 
-def test_octants_about_an_oblique_axis_are_parted_along_it(packing):
-    axis = np.array([0.6, 0.0, 0.8])
-    row = compute(packing, **LINES, variants="c", axis=tuple(axis))[0]
-    sample = Sample(packing, np.zeros(len(packing), bool))
-    plan = make_plan(Settings(**LINES), sample)
-    chosen = sample.fabric_contacts(VARIANTS["c"], plan.window)
-    normals = packing.contacts.normal[chosen]
-    side = (packing.contacts.point[chosen] - plan.window.center) @ axis >= 0
-    # the contacts of each half are those of four octants: what they add to the sum agrees
-    along = 1.5 * (normals @ axis) ** 2 - 0.5
-    values = without(row, "alpha_c_axial")
-    octants = Blocks.about(plan.window.center, 20.0, axis).of(packing.contacts.point[chosen])
-    for block in range(8):
-        assert np.all(side[octants == block] == (block >= 4))
-        assert values[block] == pytest.approx(along[octants != block].mean())
-
-
 def test_cut_offs_whose_errors_are_above_the_tolerance_are_told(packing):
     """Few segments reach the larger one, along lines that suffice for the other."""
     words = {"variants": "c", "tolerance": 2e-3, "cutoff": 0.2}
@@ -144,53 +119,10 @@ def test_two_grains_have_no_scatter():
     assert without(row, "alpha_c_axial").tolist() == [None] * 8
 
 
-def test_frame_without_a_void_fabric_has_no_columns_of_octants():
-    with pytest.warns(match="no void segment reaches the cut-off"):
-        row = compute(
-            find_contacts(Packing([[0.0, 0, 0]], [1.0])), **LINES, variants="c", contact_tolerance=0
-        )[0]
-    assert row.alpha_vs_axial_sample_se is None
-    assert set(without(row, "alpha_vs_axial").tolist()) == {None}
-
-
-def test_a_window_made_up_of_half_spaces_is_measured_like_any_other(packing):
-    """All that a next window needs is its data: frame, solids, scan and blocks take it as it is."""
-    sample, settings = Sample(packing, np.zeros(len(packing), bool)), Settings(**LINES)
-    plan = make_plan(settings, sample)
-    window = Window(plan.window.center, box([2.0, 3.0, 4.0], rotation(np.random.default_rng(1))))
-    (found,) = measure(sample, replace(plan, rvs=(RV(window=window),), auto=""))
-    position = packing.position - window.center
-    removed = sample.rattlers
-    solids = Solids(position, packing.radius, removed, window.shape)
-    lines = {"spacing": plan.spacing, "cutoff": plan.cutoff, "replicates": range(plan.replicates)}
-    expected = scan_lines(solids, plan.rule, **lines)
-    for variant in "abcd":
-        assert np.array_equal(found.sums.kept(variant)[1], expected.kept(variant)[1])
-        assert found.kept(variant)[0] == pytest.approx(expected.kept(variant)[0])
-        assert found.blocked.number[:, "abcd".index(variant)].sum(axis=(0, 1, 3)).all()
-    along, across = found.sums.line_length[:, 2].mean(), plan.spacing**2
-    assert along * across == pytest.approx(8 * 1.0 * 1.5 * 2.0, rel=0.01)
-    assert sample.counted(VARIANTS["c"], window).sum() == window.shape.contains(position).sum()
-
-
 def measured(packing, **words):
     sample, settings = Sample(packing, np.zeros(len(packing), bool)), Settings(**words)
     (found,) = measure(sample, make_plan(settings, sample))
     return found
-
-
-@pytest.mark.parametrize("variants", ["ab", "abcd"])
-def test_the_origin_leads_back_to_the_coordinates_of_the_dump(packing, variants):
-    """Of the positions of the solids; where there is no RV it is the middle of the grains."""
-    found = measured(packing, **LINES, variants=variants, rv_center=(1.5, 1.0, 1.25))
-    center = packing.position.mean(axis=0) if variants == "ab" else (1.5, 1.0, 1.25)
-    assert found.solids.origin == pytest.approx(center)
-    for variant in variants:
-        position, radius, _ = found.spheres_of(VARIANTS[variant])
-        placed = np.column_stack([position + found.solids.origin, radius])
-        rows = np.column_stack([packing.position, packing.radius])
-        near = cKDTree(rows).query(placed)[0]
-        assert near == pytest.approx(np.zeros(len(placed)), abs=1e-12)
 
 
 def test_other_cut_offs_of_the_same_lines_are_those_of_a_scan_with_all_of_them(packing):

@@ -1,13 +1,11 @@
 """The plan: settings turned into lengths, lines and replicates by the first frame."""
 
 import math
-import re
 
 import numpy as np
 import pytest
 
 from scanfab import (
-    Cell,
     Packing,
     ScanfabWarning,
     Settings,
@@ -23,7 +21,6 @@ from scanfab.pipeline.plan import (
     WIDE,
     make_plan,
 )
-from scanfab.scan.directions import AUTO_RULE
 from tests.helpers.lattices import shaken_cubic
 
 
@@ -107,18 +104,6 @@ def test_filled_directions_of_a_replicate_are_warned_of(packing):
     assert row.alpha_vs_axial_se > 0
 
 
-def test_auto_spacing_adds_replicates_and_keeps_the_rule(packing):
-    plan = plan_of(packing, directions="lebedev:11")
-    assert (plan.auto, plan.rule.name, plan.replicates) == ("replicates", "lebedev:11", 16)
-    assert plan_of(packing).rule.name == AUTO_RULE
-
-
-def test_auto_directions_adds_axes_and_keeps_the_spacing(packing):
-    plan = plan_of(packing, spacing=0.1)
-    assert (plan.auto, plan.rule.name) == ("directions", AUTO_RULE)
-    assert plan.spacing / math.sqrt(plan.replicates) == pytest.approx(0.1)
-
-
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-2])
 def test_auto_spacing_never_makes_too_few_lines(packing, tolerance):
     plan = plan_of(packing, tolerance=tolerance)
@@ -144,51 +129,12 @@ def test_auto_spacing_is_wider_where_less_is_asked_for():
     assert widest / wider == pytest.approx(1.2)
 
 
-def test_window_is_for_the_variants_that_have_one(packing):
-    assert plan_of(packing, variants="ab").window is None
-    assert plan_of(packing, variants="bd").window is not None
-
-
 def test_default_window_is_a_fraction_of_half_the_smallest_extent_of_the_surfaces():
     position = [[0, 0, 0], [10, 0, 0], [0, 8, 0], [0, 0, 9], [5, 4, 4]]
     window = plan_of(Packing(position, [1.0, 0.5, 0.5, 0.5, 0.5]), rv=0.6).window
     # surfaces from -1 to 10.5, 8.5 and 9.5
     assert window.radius == pytest.approx(0.6 * 9.5 / 2)
     assert window.center == pytest.approx([4.75, 3.75, 4.25])
-
-
-def test_window_may_be_given_in_lengths(packing):
-    window = plan_of(packing, rv_radius=1.25, rv_center=(1.0, 2.0, 3.0)).window
-    assert window.radius == 1.25
-    assert window.center.tolist() == [1.0, 2.0, 3.0]
-
-
-def test_rule_with_a_bias_warns_of_it(packing):
-    (coarse,) = plan_of(packing, directions="equal-angle:10").notes
-    assert coarse.text.endswith("an isotropic sample would get alpha = 0.43")
-    (fine,) = plan_of(packing, directions="fibonacci:100").notes
-    assert re.search(r"fibonacci:100: .* alpha = 0\.007", fine.text)
-    assert coarse.code == fine.code == "biased_directions"
-
-
-def test_what_a_plan_says_is_told_once(packing):
-    with pytest.warns(ScanfabWarning, match=r"fibonacci:100: .* alpha = 0\.007") as told:
-        compute(packing, directions="fibonacci:100", spacing=0.3, variants="a")
-    assert len(told) == 1
-
-
-def test_rv_of_a_periodic_cell_is_a_fraction_of_its_height(packing):
-    periodic = Packing(packing.position, packing.radius, cell=Cell([6.0, 6, 6]))
-    assert plan_of(periodic, variants="ac").window.radius == pytest.approx(0.7 * 3)
-
-
-def test_cell_that_does_not_repeat_is_no_obstacle(packing):
-    walls = Packing(
-        packing.position, packing.radius, cell=Cell([6.0, 6, 6], periodic=(False, False, False))
-    )
-    plan = plan_of(walls)
-    assert plan.window.center == pytest.approx(plan_of(packing).window.center)
-    assert plan.window.radius == pytest.approx(plan_of(packing).window.radius)
 
 
 @pytest.mark.parametrize("variants", ["a", "cd"])
@@ -207,17 +153,7 @@ def test_bias_of_a_rule_counts_over_a_tenth_of_the_tolerance(packing, tolerance,
     assert any("isotropic" in note.text for note in notes) == warns
 
 
-def test_exact_rules_have_no_bias_to_warn_of(packing):
-    for rule in ("7", "lebedev:11", "design:9", "icosahedral:9", "product:5"):
-        assert plan_of(packing, directions=rule, tolerance=1e-12).rule.bias < 1e-13
-
-
 def test_a_cutoff_of_hundreds_of_radii_asks_for_rmin(packing):
     options = {"spacing": 0.8, "directions": 9, "variants": "c", "cutoff": 1000.0}
     with pytest.warns(ScanfabWarning, match="no void segment reaches .*did you mean 1rmin?"):
         compute(packing, **options)
-
-
-def test_an_absurd_spacing_asks_for_rmin(packing):
-    with pytest.raises(SettingsError, match=r"spacing: .*did you mean 1rmin"):
-        plan_of(packing, spacing=1000.0, directions=9)

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import warnings
-
 import numpy as np
 import pytest
 
 import scanfab
 from scanfab import Settings, SettingsError
-from scanfab.cli.main import run
 from scanfab.packing import rattlers
-from scanfab.pipeline.calibration import calibrate
 from scanfab.pipeline.inspection import inspect_series
-from scanfab.table.formats import read_rows
 from scanfab.viz.frame_view import look_at
 from tests.helpers.dumps import dump_text, write
 from tests.helpers.lattices import simple_cubic
@@ -83,35 +77,6 @@ def test_inspect_and_views_take_the_rule_too(series, rule, expected):
 
 
 @pytest.mark.usefixtures("made_up")
-def test_calibrate_takes_the_rule_too(series):
-    lines = {"variants": "b", "tolerance": 0.1, "cutoff": "0.1rmin", "max_chords": 1e5}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of a sample as small as this
-        found = [calibrate(series, rattlers=rule, **lines) for rule, _ in EXPECTED]
-    lengths = [[row.mean_length for row in one.rows if row.ladder == "cutoff"] for one in found]
-    assert len({steps[0] for steps in lengths} - {None}) == len(EXPECTED)
-
-
-@pytest.mark.usefixtures("made_up")
-@pytest.mark.parametrize(("rule", "expected"), EXPECTED)
-def test_the_command_line_takes_it_by_name_and_the_manifest_keeps_it(
-    dump, tmp_path, rule, expected
-):
-    table = tmp_path / "table.csv"
-    assert run(["compute", str(dump), *WORDS, "--rattlers", rule, "-o", str(table)]) == 0
-    assert [row["rattlers"] for row in read_rows(table)] == [expected, expected]
-    manifest = json.loads((tmp_path / "table.csv.manifest.json").read_text())
-    assert manifest["settings"]["rattlers"] == rule
-
-
-@pytest.mark.usefixtures("made_up")
 def test_a_rule_that_there_is_not_is_told_with_those_that_there_are():
     with pytest.raises(SettingsError, match="expected count, force, recursive or untouched, f"):
         Settings(rattlers="pressed")
-
-
-def test_the_made_up_one_is_gone_without_its_package():
-    with pytest.raises(
-        SettingsError, match="expected count, force or recursive, found 'untouched'"
-    ):
-        Settings(rattlers="untouched")

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from scanfab import Packing, ScanfabWarning, Settings, SettingsError, compute, find_contacts
-from scanfab.pipeline.plan import make_plan
 from tests.helpers.lattices import ball_points
 
 FIXED = {"spacing": "0.3rmin", "directions": "lebedev:5", "workers": 1, "cutoff": "0.5rmin"}
@@ -113,20 +112,6 @@ def test_the_profile_is_less_noisy_than_each(ball):
     assert np.std(together) < 0.65 * np.std(apart)
 
 
-def test_the_budget_is_that_of_all_together(ball):
-    plan = make_plan(Settings(rv=FRACTIONS, variants="c", max_chords=1e8), compute_sample(ball))
-    volumes = np.array(FRACTIONS) ** 3
-    assert plan.max_chords == pytest.approx(1e8 * volumes[0] / volumes.sum())
-    plan = make_plan(Settings(rv=FRACTIONS, max_chords=1e8), compute_sample(ball))
-    assert plan.max_chords == pytest.approx(1e8 / 3)
-
-
-def compute_sample(packing):
-    from scanfab import Sample
-
-    return Sample(packing, np.zeros(len(packing), bool))
-
-
 def test_doubts_name_the_rv(ball):
     """No void segment of the smallest RV can be as long as it is wide."""
     smallest = 0.4 * 6.5
@@ -156,8 +141,3 @@ def test_doubts_name_the_rv(ball):
 def test_sizes_that_cannot_be(options, message):
     with pytest.raises(SettingsError, match=message):
         Settings(**options)
-
-
-def test_one_that_is_too_large_is_refused(ball):
-    with pytest.raises(SettingsError, match=r"reaches .* beyond the sample"):
-        compute(ball, rv="0.5,1.6", **FIXED)

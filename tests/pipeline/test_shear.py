@@ -8,7 +8,7 @@ import pytest
 import scanfab
 from scanfab.base.errors import ScanfabWarning
 from scanfab.packing.cell import Cell
-from scanfab.pipeline.strain import is_flipped, shear_strain
+from scanfab.pipeline.strain import shear_strain
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.lattices import rotation
 from tests.helpers.truth import SHEAR
@@ -69,28 +69,6 @@ def test_the_sample_has_the_strain_of_its_deck():
 
 
 # flipping
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "flips"),
-    [
-        (0.45, -0.48, True),
-        (-0.45, 0.5, True),
-        (0.1, 0.3, False),
-        (-0.2, 0.25, False),
-        (0.55, 1.1, False),
-        (0.8, 0.1, False),
-    ],
-)
-def test_a_flip_is_seen_where_programs_flip(before, after, flips):
-    """xy/lx before and after: programs that lean further do not flip."""
-    early, late = (Cell(np.array([[2.0, 0, 0], [2 * t, 3, 0], [0, 0, 4]])) for t in (before, after))
-    assert is_flipped(late, early) == flips
-
-
-def test_cells_that_do_not_repeat_do_not_flip():
-    assert not is_flipped(None, FIRST)
-    assert not is_flipped(FIRST, sheared(0.0, (True, False, True)))
 
 
 def tilted_series(folder, tilts):

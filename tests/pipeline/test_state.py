@@ -13,8 +13,7 @@ from scanfab import Cell, ContactList, Packing, Sample, Window, sphere
 from scanfab.base.shapes import box, cylinder, ellipsoid
 from scanfab.packing.contacts import ListedWallForces
 from scanfab.packing.sample import VARIANTS
-from scanfab.pipeline.state import cut_volumes, sample_state, surely_inside
-from tests.fabric.test_forces import directions
+from scanfab.pipeline.state import cut_volumes, sample_state
 from tests.helpers.lattices import simple_cubic
 from tests.helpers.truth import CELL, SAMPLE_DATA, csv_rows
 
@@ -149,15 +148,6 @@ def test_walls_press_on_clumps_through_a_periodic_face():
         np.testing.assert_allclose(whole(packing).stress, 0.5 * (expected + expected.T))
 
 
-def test_wall_forces_that_cannot_be_are_refused():
-    walls = ListedWallForces([2], [[0, 0, 0.0]], [[0, 0, 1.0]])
-    with pytest.raises(scanfab.PackingError, match="a row that is none of 2 grains"):
-        Packing([[0, 0, 0], [3, 0, 0]], 1.0, wall_forces=walls)
-    walls = ListedWallForces([1], [[0, 0, np.nan]], [[0, 0, 1.0]])
-    with pytest.raises(scanfab.PackingError, match="finite"):
-        Packing([[0, 0, 0], [3, 0, 0]], 1.0, wall_forces=walls)
-
-
 def test_without_a_volume_there_is_no_stress():
     state = whole(cubic(3, periodic=False))
     assert state.stress is None
@@ -172,32 +162,6 @@ def test_lenses_and_points_agree():
     points = cut_volumes(places, radius, ellipsoid((1.5, 1.5, 1.5 + 1e-9)))
     assert np.max(np.abs(exact - points) / radius**3) < 0.06
     assert points.sum() == pytest.approx(exact.sum(), rel=3e-4)
-
-
-@pytest.mark.parametrize(
-    ("apart", "radius", "expected"),
-    [
-        (0.0, 1.0, 4 / 3 * np.pi),
-        (0.0, 3.0, 4 / 3 * np.pi * 8),
-        (3.0, 1.0, 0.0),
-        (2.0, 2.0, 2 * np.pi * 5 / 3),
-    ],
-)
-def test_lens_of_two_balls(apart, radius, expected):
-    """Of two of radius 2 at distance 2: 2 caps of height 1, π h² (3 R - h)/3 each."""
-    found = cut_volumes(np.array([[apart, 0, 0]]), np.array([radius]), sphere(2.0))[0]
-    assert found == pytest.approx(expected, abs=1e-12)
-
-
-@pytest.mark.parametrize("shape", [box((3.0, 4.0, 5.0)), cylinder(2.0, 3.0), sphere(2.0)])
-def test_what_is_said_to_lie_inside_does(shape):
-    rng = np.random.default_rng(3)
-    places, radius = rng.uniform(-2, 2, (500, 3)), rng.uniform(0.1, 1.0, 500)
-    surely = surely_inside(shape, places, radius)
-    assert 5 < surely.sum() < 500
-    for place, size in zip(places[surely], radius[surely], strict=True):
-        far = directions(200, rng) * size + place
-        assert shape.contains(far).all()
 
 
 def test_a_box_cuts_a_sphere_in_half():
@@ -236,18 +200,6 @@ def test_fabric_and_forces_are_those_of_lammps_compute_fabric(lammps, frame):
     np.testing.assert_allclose(six(fabric), told[0], rtol=0, atol=1e-13)
     np.testing.assert_allclose(six(found.tensor("bn")[0]), told[1], rtol=0, atol=1e-13)
     np.testing.assert_allclose(six(found.tensor("fn")[0]), told[2], rtol=0, atol=1e-13)
-
-
-def test_lammps_tangential_tensor_is_of_the_sizes_of_forces(lammps):
-    """Another quantity than `ft`, which is of the vectors; from the same forces."""
-    contacts = lammps[1].contacts
-    n, told = contacts.normal, np.loadtxt(LAMMPS / "fabric.txt")[1, 19:]
-    deviator = 7.5 * (n.T @ n / len(n) - np.eye(3) / 3)
-    weights = 1 / (1 + np.einsum("ci,ij,cj->c", n, deviator, n))
-    size = np.linalg.norm(contacts.force - contacts.force_n[:, None] * n, axis=1)
-    mean = ((weights * size)[:, None] * n).T @ n
-    mean -= np.trace(mean) / 3 * np.eye(3)
-    np.testing.assert_allclose(six(5 * mean / (weights @ contacts.force_n)), told, atol=1e-13)
 
 
 @pytest.mark.parametrize("frame", [0, 1])
