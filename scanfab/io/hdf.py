@@ -21,8 +21,9 @@ class HdfFile(NamedTuple):
     attributes: dict[str, dict[str, Any]]
 
     def below(self, group: str) -> dict[str, npt.NDArray[Any]]:
-        """The arrays that stand directly in a group, by their names."""
-        found = ((name.rpartition("/"), values) for name, values in self.arrays.items())
+        """The arrays that stand directly in a group, by their names; single numbers are none."""
+        named = ((name, values) for name, values in self.arrays.items() if values.ndim)
+        found = ((name.rpartition("/"), values) for name, values in named)
         return {name: values for (place, _, name), values in found if place == group}
 
     def groups(self, group: str) -> list[str]:

@@ -2,11 +2,10 @@
 One mesh from any file of VTK: points, lines between them, and the arrays of both.
 
 VTK's own readers do the work, in the worker process of `fence`, because a damaged header may crash
-them. They raise no errors: they write into VTK's output window, which is a string here, and any
-text in it is an error. Two faults are not told even there. VTK fills the arrays of a legacy file
-that was cut off with zeros: so an array is appended to the file, and must be found behind all
-others. VTK drops the values of an XML array that are more than its piece counts: so they are
-counted before VTK reads the file.
+them. They raise no errors, but write into VTK's output window: any text there is an error. Two
+faults are not told even there. VTK fills the arrays of a legacy file that was cut off with zeros:
+so an array is appended to the file, and must be found behind all others. VTK drops the values of an
+XML array that are more than its piece counts: so they are counted before VTK reads the file.
 """
 
 from __future__ import annotations
@@ -46,6 +45,9 @@ FORM = re.compile(
 )
 TEXT = re.compile(rb"# vtk DataFile[^\n]*\n[^\n]*\n\s*ASCII\s", re.IGNORECASE)
 NO_POINTS = re.compile(rb"# vtk.*^POINTS\s+0\s", re.MULTILINE | re.DOTALL)
+# the sections of XML whose arrays all have a row for each point, or for each cell
+COUNTED = ("Points", "PointData", "CellData")
+BASE64 = re.compile(r"[A-Za-z0-9+/=]*")
 # what is appended to a legacy file: an array without values
 END = "scanfab_end"
 APPENDED = f"FIELD scanfab 1\n{END} 1 0 int\n".encode()
@@ -277,15 +279,17 @@ def _check_counts(content: bytes) -> None:
         # behind the elements may stand bytes
         root = ElementTree.fromstring(content if end < 0 else content[:end] + b"</VTKFile>")
         for piece in root.iter("Piece"):
-            counts = {name: int(word) for name, word in piece.items() if name[:8] == "NumberOf"}
-            points = counts.pop("NumberOfPoints", 0)
-            rows = {"Points": points, "PointData": points, "CellData": sum(counts.values())}
+            counts = {name[8:]: int(word) for name, word in piece.items() if name[:8] == "NumberOf"}
+            points, every = counts.get("Points", 0), sum(counts.values())
+            rows = {**counts, "Points": points, "PointData": points, "CellData": every - points}
             for section, array in ((one.tag, array) for one in piece for array in one):
-                if section not in rows or array.get("type") == "String":
+                name = array.get("Name", section)
+                # of the arrays that describe cells, one has a row for each point of each cell
+                is_counted = section in COUNTED or name in ("offsets", "types")
+                if section not in rows or not is_counted or array.get("type") == "String":
                     continue
                 expected = rows[section] * int(array.get("NumberOfComponents") or 1)
                 stored = _stored(content, array, root, end)
-                name = array.get("Name", section)
                 if section == "CellData" and stored > expected:
                     # VTK would give the values to other lines than theirs
                     raise ValueError(
@@ -309,12 +313,14 @@ def _stored(content: bytes, array: ElementTree.Element, root: ElementTree.Elemen
     if array.get("format") == "appended":
         start = content.index(b"_", end) + 1 + int(array.attrib["offset"])
         head = content[start : start + 4 * width]
+    elif not BASE64.fullmatch(text):
+        # VTK passes over all letters that are no base64, and so shifts the values behind them
+        raise ValueError("an array is not as base64 writes it")
     if array.get("format") != "appended" or b"raw" not in content[end : end + 100]:
         digits = head.split(b"=")[0]
         head = base64.b64decode(digits + b"=" * (-len(digits) % 4))
-    order = ">" if root.get("byte_order") == "BigEndian" else "<"
-    head = head.ljust(3 * width, b"\0")
-    size, full, last = np.frombuffer(head, f"{order}u{width}", 3).tolist()
+    kind = f"{'>' if root.get('byte_order') == 'BigEndian' else '<'}u{width}"
+    size, full, last = np.frombuffer(head.ljust(3 * width, b"\0"), kind, 3).tolist()
     if root.get("compressor"):
         # there are so many blocks, which are all full but perhaps the last one
         size = size * full - (full - last if size and last else 0)

@@ -21,11 +21,11 @@ from tests.helpers.truth import FLOOR, YADE
 POINTS = "POINTS 2 double\n0 0 0 2 0 0\n"
 
 
-def legacy(path, body, version="3.0", dataset="POLYDATA"):
+def legacy(path, body, dataset="POLYDATA", version="3.0"):
     return write(path, f"# vtk DataFile Version {version}\n\nASCII\nDATASET {dataset}\n{body}")
 
 
-def xml(path, piece, content="", more=""):
+def xml(path, piece, content, more=""):
     return write(
         path,
         f'<VTKFile type="PolyData" version="0.1" byte_order="LittleEndian"{more}><PolyData>'
@@ -103,7 +103,7 @@ def test_lines_of_several_points_and_beside_other_cells_join_their_ends(tmp_path
     mesh.save(tmp_path / "a.vtp")
     assert read_mesh(tmp_path / "a.vtp").lines.tolist() == [[0, 1], [1, 2]]
     body = POINTS + "CELLS 3 9\n1 0\n2 0 1\n3 1 0 1\nCELL_TYPES 3\n1\n3\n5\n"
-    mesh = read_mesh(legacy(tmp_path / "a.vtk", body, dataset="UNSTRUCTURED_GRID"))
+    mesh = read_mesh(legacy(tmp_path / "a.vtk", body, "UNSTRUCTURED_GRID"))
     assert mesh.lines.tolist() == [[0, 1]]
     assert mesh.has_faces
 
@@ -139,44 +139,38 @@ def test_a_last_number_without_a_line_end_is_doubted(tmp_path):
         read_mesh(path)
 
 
-@pytest.mark.parametrize(
-    "body",
-    [
-        POINTS.replace("2", "9" * 5000, 1),
-        POINTS + "LINES 1 1\n7\n",
-        POINTS + "LINES 1 3\n2 0 x\n",
-        POINTS + "LINES 1 3\n2 0 10000000000\n",
-        POINTS + "POINT_DATA 2\nSCALARS radius double\nLOOKUP_TABLE default\n1\n",
-        POINTS + "POINT_DATA 2\nFIELD FieldData 1\nradius 1 1 double\n1\n",
-        POINTS + "POINT_DATA 2\n",
-        "",
-    ],
+GRID, CELLS_51 = (
+    "UNSTRUCTURED_GRID",
+    "CELLS 3 2\nOFFSETS vtktypeint64\n{}\nCONNECTIVITY vtktypeint64\n",
 )
-def test_legacy_texts_that_are_damaged_are_refused(tmp_path, body):
-    refuses(legacy(tmp_path / "a.vtk", body))
-
-
-CELLS_51 = "CELLS 3 2\nOFFSETS vtktypeint64\n{}\nCONNECTIVITY vtktypeint64\n{}\n"
+ONES = "CELL_TYPES 2\n1\n1\n"
 
 
 @pytest.mark.parametrize(
-    ("version", "cells", "types"),
+    ("body", "how"),
     [
-        ("3.0", CELLS_51.format("0 1 2", "0 1"), "1\n1"),
-        ("5.1", CELLS_51.format("0 1 2", "0 one"), "1\n1"),
-        ("5.1", CELLS_51.format("0 3 2", "0 1"), "1\n1"),
-        ("3.0", "CELLS 2 6\n3 0 1 1 1 0\n", "3 3"),
-        ("3.0", "CELLS 2 3\n1 0 0\n", "3 3"),
+        (POINTS.replace("2", "9" * 5000, 1), ()),
+        (POINTS + "LINES 1 1\n7\n", ()),
+        (POINTS + "LINES 1 3\n2 0 x\n", ()),
+        (POINTS + "LINES 1 3\n2 0 10000000000\n", ()),
+        (POINTS + "POINT_DATA 2\nSCALARS radius double\nLOOKUP_TABLE default\n1\n", ()),
+        (POINTS + "POINT_DATA 2\nFIELD FieldData 1\nradius 1 1 double\n1\n", ()),
+        (POINTS + "POINT_DATA 2\n", ()),
+        ("", ()),
+        (POINTS + CELLS_51.format("0 1 2") + "0 1\n" + ONES, (GRID,)),
+        (POINTS + CELLS_51.format("0 1 2") + "0 one\n" + ONES, (GRID, "5.1")),
+        (POINTS + CELLS_51.format("0 3 2") + "0 1\n" + ONES, (GRID, "5.1")),
+        (POINTS + "CELLS 2 6\n3 0 1 1 1 0\nCELL_TYPES 2\n3 3\n", (GRID,)),
+        (POINTS + "CELLS 2 3\n1 0 0\nCELL_TYPES 2\n3 3\n", (GRID,)),
     ],
 )
-def test_cells_of_legacy_grids_that_are_damaged_are_refused(tmp_path, version, cells, types):
-    body = f"{POINTS}{cells}CELL_TYPES 2\n{types}\n"
-    refuses(legacy(tmp_path / "a.vtk", body, version, "UNSTRUCTURED_GRID"))
+def test_legacy_texts_that_are_damaged_are_refused(tmp_path, body, how):
+    refuses(legacy(tmp_path / "a.vtk", body, *how))
 
 
 @pytest.mark.parametrize("dataset", ["STRUCTURED_POINTS", "TABLE"])
 def test_data_that_are_no_mesh_are_refused(tmp_path, dataset):
-    refuses(legacy(tmp_path / "a.vtk", "", dataset=dataset), f"with points, found {dataset}")
+    refuses(legacy(tmp_path / "a.vtk", "", dataset), f"with points, found {dataset}")
     refuses(write(tmp_path / "a.vtk", "hello"), "expected a VTK file with points")
 
 
@@ -203,22 +197,19 @@ def sizes(*numbers, type="<u4"):
         array(type="Complex"),
         array("!!!!!!!!"),
         array(sizes(24)),
+        array(sizes(1, 2**31, 2**31, 16)),
+        array(sizes(2**32 - 1, 24, 0, 0)),
+        array(sizes(1, 24, 0, 99)),
         array(format="appended"),
         array(format="appended", offset="2.5"),
         array(format="anything"),
     ],
 )
-@pytest.mark.parametrize("count", ["1", "many"])
-def test_arrays_of_xml_that_are_damaged_are_refused(tmp_path, points, count):
-    refuses(xml(tmp_path / "a.vtp", f'NumberOfPoints="{count}"', f"<Points>{points}</Points>"))
-
-
-@pytest.mark.parametrize("blocks", [(1, 2**31, 2**31, 16), (2**32 - 1, 24, 0, 0), (1, 24, 0, 99)])
-@pytest.mark.parametrize("compressor", ["ZLib", "LZ4", "LZMA", "RAR"])
-def test_packed_arrays_that_are_damaged_are_refused(tmp_path, blocks, compressor):
-    points = f"<Points>{array(sizes(*blocks))}</Points>"
-    more = f' compressor="vtk{compressor}DataCompressor"'
-    refuses(xml(tmp_path / "a.vtp", 'NumberOfPoints="1"', points, more))
+@pytest.mark.parametrize("packing", ["", *(f"vtk{name}Data" for name in ("ZLib", "LZ4", "RAR"))])
+def test_arrays_of_xml_that_are_damaged_are_refused(tmp_path, points, packing):
+    more = f' compressor="{packing}Compressor"' if packing else ""
+    refuses(xml(tmp_path / "a.vtp", 'NumberOfPoints="1"', f"<Points>{points}</Points>", more))
+    refuses(xml(tmp_path / "a.vtp", 'NumberOfPoints="many"', f"<Points>{points}</Points>", more))
 
 
 @pytest.mark.parametrize("offset", ["1", "-2", "99999999999", "x"])

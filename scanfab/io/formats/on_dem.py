@@ -64,10 +64,8 @@ class OnDemReader(GrainsOnly):
         """The bodies with a radius, and the interactions between them."""
         path, file = snapshot.path, read_hdf_file(snapshot.path)
         scene = file.attributes.get(SCENE, {})
-        cell = cell_of(
-            path, {name: scene[own] for name, own in SCENE_NAMES.items() if own in scene}
-        )
-        grains = grain_table(path, _spheres(path, file), cell, options)
+        arrays = {name: scene[own] for name, own in SCENE_NAMES.items() if own in scene}
+        grains = grain_table(path, _spheres(path, file), cell_of(path, arrays), options)
         return grains if INTERACTIONS not in file.attributes else _joined(path, file, grains)
 
 
@@ -81,7 +79,7 @@ def _spheres(path: Path, file: HdfFile) -> Arrays:
     for block in ["VTKHDF", *(f"VTKHDF/{name}" for name in file.groups("VTKHDF"))]:
         if f"{block}/Steps" in file.attributes:
             raise ReadError(f"{path}: {block} holds steps in time: write one file for each")
-        if (points := file.arrays.get(f"{block}/Points")) is not None:
+        if (points := file.below(block).get("Points")) is not None:
             parts.append({**file.below(f"{block}/PointData"), "position": points})
     columns = joined_arrays(parts or [{}])
     shapes = {name: one.shape for name, one in columns.items()}
@@ -107,7 +105,7 @@ def _joined(path: Path, file: HdfFile, grains: GrainTable) -> GrainTable:
     """The grains with their contacts: interactions with bodies that are no spheres are walls'."""
     # draft 0.2 has a group for each type
     groups = [INTERACTIONS, *(f"{INTERACTIONS}/{one}" for one in file.groups(INTERACTIONS))]
-    parts = [file.below(one) for one in groups if f"{one}/id1" in file.arrays] or [NONE]
+    parts = [own for one in groups if "id1" in (own := file.below(one))] or [NONE]
     parts = [{"virtual": np.zeros(len(one["id1"])), **one} for one in parts]
     table = {name: one for name, one in joined_arrays(parts).items() if name in COLUMNS}
     for name in {"id2", *table}:

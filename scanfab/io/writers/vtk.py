@@ -148,12 +148,8 @@ def write_on_dem(packing: Packing, path: Path) -> Left:
         group.attrs.update(Type=np.bytes_("PolyData"), Version=np.array([2, 0]))
         group["NumberOfPoints"] = np.array([count])
         group["Points"] = packing.position
-        for cells, filled in {
-            "Vertices": count,
-            "Lines": 0,
-            "Polygons": 0,
-            "Strips": 0,
-        }.items():
+        for cells in ("Vertices", "Lines", "Polygons", "Strips"):
+            filled = count if cells == "Vertices" else 0
             group[f"{cells}/NumberOfCells"] = np.array([filled])
             group[f"{cells}/NumberOfConnectivityIds"] = np.array([filled])
             group[f"{cells}/Connectivity"] = np.arange(filled)

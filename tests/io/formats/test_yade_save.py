@@ -52,12 +52,7 @@ def test_cell_walls_step_time_and_mask():
     np.testing.assert_array_equal(packing.wall_contacts, expected)
     assert (packing.step, packing.time) == (30000, pytest.approx(1.58959062636740689))
     assert set(packing.columns["mask"].tolist()) <= {1, 5}
-
-
-def test_contacts_by_geometry_and_from_the_file_itself():
-    assert scanfab.read(PERIODIC, contacts="geometric").contacts is None
     assert scanfab.read(BOX, contacts="geometric").wall_contacts.sum() == 0
-    assert len(scanfab.read(PERIODIC, contacts="file").contacts) == 261
 
 
 def test_the_small_save_in_a_tilted_cell(tmp_path):
