@@ -335,14 +335,13 @@ def _with_ids(path: Path, grains: GrainTable, ids: IntArray) -> GrainTable:
 def _vectors(path: Path, grains: GrainTable, found: Columns, names: str) -> FloatArray | None:
     """One vector a contact; what has no column is 0 where all grains lie at one place along it."""
     wanted = names.split()
-    there = [name for name in wanted if name in found]
-    if not there:
+    lacking = [name for name in wanted if name not in found]
+    if len(lacking) == len(wanted):
         return None
     flat = (grains.position == grains.position[:1]).all(axis=0)
-    lacking = [name for name in wanted if name not in found]
     if not all(flat[wanted.index(name)] for name in lacking):
-        told = f"{path}: {', '.join(there)} are left out"
-        warn(f"{told}, since there is no {' and no '.join(lacking)}")
+        there = ", ".join(name for name in wanted if name in found)
+        warn(f"{path}: {there} are left out, since there is no {' and no '.join(lacking)}")
         return None
     columns = [found.get(name, np.zeros(len(found["id1"]))) for name in wanted]
     if any(column.dtype.kind not in "biuf" for column in columns):

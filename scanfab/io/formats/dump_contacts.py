@@ -53,8 +53,8 @@ def join_places(
     first, second = places.ids
     where = f", columns {first + 1} and {second + 1}"
     ids = np.column_stack([whole_numbers(path, values[:, k], where) for k in places.ids])
-    triples = [values[:, triple] for triple in places.force]
-    force = -np.sum(triples, axis=0) if triples else None
+    parts = [values[:, triple] for triple in places.force]
+    force = -np.sum(parts, axis=0) if parts else None
     normal = None if places.normal is None else -values[:, places.normal]
     if not places.touch:
         rows = rows_of_ids(grains, ids)

@@ -59,12 +59,13 @@ class GsdReader(GrainsOnly):
                 f"{where}: expected positions of shape {(*count, 3)} and six numbers as box, found "
                 f"{position.shape} and {box}"
             )
-        columns: Columns = {"position": position.astype(np.float64)}
-        for name, values in arrays.items():
-            # the first frame may have had another number of particles; types are texts
-            is_column = PARTICLES in name and name != "particles/types"
-            if is_column and len(values) == len(position):
-                columns[name.removeprefix("log/").removeprefix(PARTICLES)] = values
+        # the first frame may have had another number of particles; types are texts
+        columns: Columns = {
+            name.removeprefix("log/").removeprefix(PARTICLES): values
+            for name, values in arrays.items()
+            if PARTICLES in name and name != "particles/types" and len(values) == len(position)
+        }
+        columns["position"] = position.astype(np.float64)
         if not box:
             return columns, None
         # edges and tilt factors (of the second and third edge), about the origin

@@ -24,41 +24,41 @@ Names = Mapping[str, tuple[str, ...]]
 
 # columns that tell frames of one file apart
 FRAME_NAMES = ("step", "timestep", "time.step", "frame", "time", "time.s", "time.ms")
+# names of a coordinate (an axis and its number), of a grain of a contact, and of its force along an
+# axis; PFC's and EDEM's are among them
+CENTRE = (
+    "{0} pos.{0} pos{0} position.{0} points.{1} ball.pos.{0} ball.position.{0} ball.{0} "
+    "particle.position.{0}"
+)
+END = (
+    "id{0} id.{0} grain{0} particle{0} particle.{0} body{0} contact.end{0}.id contact.end{0} "
+    "end{0}.id end{0} contact.id{0}"
+)
+FORCE = "f{0} force.{0} f.{0} contact.force.global.{0} force.global.{0}"
 # of contacts: the force on either grain, the image of the second, the force on the first or second,
-# the normal and the tangential part; names behind the first ones are PFC's and EDEM's
+# the normal and the tangential part
 FORCES: Names = {
-    **{
-        f"f{axis}": (
-            *(f"f{axis}", f"force.{axis}", f"f.{axis}"),
-            *(f"contact.force.global.{axis}", f"force.global.{axis}"),
-        )
-        for axis in "xyz"
-    },
-    **{f"i{axis}": (f"i{axis}", f"image.{axis}") for axis in "xyz"},
-    **{name: (name,) for axis in "xyz" for name in (f"f{axis}1", f"f{axis}2")},
-    **{f"fn{axis}": (f"fn{axis}", f"contact.normal.force.{axis}") for axis in "xyz"},
-    **{f"ft{axis}": (f"ft{axis}", f"contact.tangential.force.{axis}") for axis in "xyz"},
+    what.format(axis): tuple(words.format(axis).split())
+    for axis in "xyz"
+    for what, words in (
+        ("f{0}", FORCE),
+        ("i{0}", "i{0} image.{0}"),
+        ("f{0}1", "f{0}1"),
+        ("f{0}2", "f{0}2"),
+        ("fn{0}", "fn{0} contact.normal.force.{0}"),
+        ("ft{0}", "ft{0} contact.tangential.force.{0}"),
+    )
+} | {
     "fn": ("fn", "force.n", "normal.force", "contact.force.normal", "force.normal"),
     "kind": ("contact.type", "kind"),
 }
-ENDS = (
-    *("id{}", "id.{}", "grain{}", "particle{}", "particle.{}", "body{}"),
-    *("contact.end{}.id", "contact.end{}", "end{}.id", "end{}", "contact.id{}"),
-)
 TABLE: Names = {
-    **{
-        axis: (
-            *(axis, f"pos.{axis}", f"pos{axis}", f"position.{axis}", f"points.{number}"),
-            *(f"ball.pos.{axis}", f"ball.position.{axis}", f"ball.{axis}"),
-            f"particle.position.{axis}",
-        )
-        for number, axis in enumerate("xyz")
-    },
+    **{axis: tuple(CENTRE.format(axis, number).split()) for number, axis in enumerate("xyz")},
     "radius": (*RADIUS_NAMES, "f.radius", "ball.radius", "particle.radius"),
     "diameter": (*DIAMETER_NAMES, "ball.diameter", "particle.diameter"),
     "id": (*ID_NAMES, "particle.id", "body.id", "ball.id"),
-    "id1": (*(end.format(1) for end in ENDS), "geoa", "i", "contact.idfirst", "contact.id.first"),
-    "id2": (*(end.format(2) for end in ENDS), "geob", "j", "contact.idsecond", "contact.id.second"),
+    "id1": (*END.format(1).split(), "geoa", "i", "contact.idfirst", "contact.id.first"),
+    "id2": (*END.format(2).split(), "geob", "j", "contact.idsecond", "contact.id.second"),
     **FORCES,
 }
 PFC: Names = {**TABLE, "kind": ("contact.type", "type")}
