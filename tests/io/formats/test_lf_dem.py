@@ -87,14 +87,6 @@ def test_a_plane_is_not_periodic_across(tmp_path):
     assert scanfab.read_series(path)[0].read().cell.periodic == (True, False, True)
 
 
-def test_a_count_that_no_frame_has(tmp_path):
-    path = write(tmp_path / "par_a.dat", grains_text().replace("# np 3", "# np 4"))
-    with pytest.warns(ScanfabWarning, match="is left out: the header counts 4 particles, found 3"):
-        first = scanfab.read_series(path)[0]
-    with pytest.raises(scanfab.ScanfabError, match="the header counts 4 particles, found 3"):
-        first.read()
-
-
 @pytest.mark.parametrize("lost", [3, len(grains_text().splitlines()[-1]) + 1])
 def test_a_last_frame_that_is_cut_is_left_out(tmp_path, lost):
     """In a row, and between two."""
