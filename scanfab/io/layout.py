@@ -199,8 +199,8 @@ class FrameFile:
             expected = f"expected the columns step or frame, and {', '.join(wanted)}"
             raise ReadError(f"{path}: {expected}, found {', '.join(known)}")
         columns = read_text(path, table, [self.key, *wanted], [self.key])
-        rows = np.zeros((len(columns[self.key]), len(names) + len(optional)))
-        rows[:, : len(wanted)] = np.column_stack([columns[name] for name in wanted])
+        blank = np.zeros(len(columns[self.key]))
+        rows = np.column_stack([columns.get(name, blank) for name in (*names, *optional)])
         self._rows: dict[int, tuple[float, ...]] = {}
         pairs = zip(columns[self.key].tolist(), map(tuple, rows.tolist()), strict=True)
         for line, (number, row) in enumerate(pairs, table.layout.line):

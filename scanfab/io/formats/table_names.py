@@ -64,6 +64,7 @@ TABLE: Names = {
 PFC: Names = {**TABLE, "kind": ("contact.type", "type")}
 EDEM: Names = {**TABLE, "volume": ("particle.volume", "volume")}
 
+LENGTHS = ("x", "y", "z", "radius", "diameter", "volume")
 # EDEM numbers its queries: "Q05 : Particle Position X:"
 QUERY = re.compile(r"^q[0-9]+[\s:.]+")
 CUBE = re.compile(r"^cu |(\^|\*\*)?3$")
@@ -107,32 +108,29 @@ def find_columns(
         matters.
     """
     names, plain = table.own, [plain_name(name) for name in table.own]
-
-    def key(standard: str, places: list[int]) -> str:
+    found: dict[str, str] = {}
+    for standard in (*named, *(one for one in known if one not in named)):
+        own = f"{named.get(standard, '')}"
+        if standard in named:
+            places = [place for place, name in enumerate(names) if name == own]
+            if not places and re.fullmatch(r"[0-9]{1,6}", own) and 1 <= int(own) <= len(names):
+                places = [int(own) - 1]
+            if not places:
+                told = f"there is no column {own!r} to serve as {standard}"
+                raise ReadError(f"{path}: {told}; the columns are {', '.join(names)}")
+        else:
+            word = next((one for one in known[standard] if one in plain), None)
+            places = [place for place, name in enumerate(plain) if name == word]
         if len(places) > 1:
             listed = ", ".join(f"{names[place]!r} (column {place + 1})" for place in places)
             raise ReadError(
                 f"{path}: several columns may be {standard}: {listed}: choose one by its number: "
                 f'`{option}={{"{standard}": {places[0] + 1}}}`'
             )
-        return table.layout.names[places[0]]
-
-    found: dict[str, str] = {}
-    for standard, given in named.items():
-        own = str(given)
-        places = [place for place, name in enumerate(names) if name == own]
-        if not places and re.fullmatch(r"[0-9]{1,6}", own) and 1 <= int(own) <= len(names):
-            places = [int(own) - 1]
-        if not places:
-            told = f"there is no column {own!r} to serve as {standard}"
-            raise ReadError(f"{path}: {told}; the columns are {', '.join(names)}")
-        found[standard] = key(standard, places)
-    refuse_named_twice(path, found, option)
-    for standard in [one for one in known if one not in found]:
-        word = next((one for one in known[standard] if one in plain), None)
-        places = [place for place, name in enumerate(plain) if name == word]
-        if places and (own := key(standard, places)) not in found.values():
-            found[standard] = own
+        keys = [table.layout.names[place] for place in places]
+        if standard in named or not {*keys} <= {*found.values()}:
+            found[standard] = keys[0]
+    refuse_named_twice(path, {standard: found[standard] for standard in named}, option)
     return found
 
 
@@ -145,18 +143,15 @@ def check_units(path: Path, found: Mapping[str, str], contacts: bool = False) ->
     ReadError
         If the names of the columns say two units.
     """
-    lengths = ("x", "y", "z", "radius", "diameter", "volume")
     units: dict[str, str] = {}
     for what, name in found.items():
-        if what.startswith("f") if contacts else what in lengths:
-            # micro has two letters that look alike, and a cube many spellings
-            unit = UNIT.search(unicodedata.normalize("NFKC", name))
-            text = unit[1].strip() if unit else ""
-            units[name] = CUBE.sub("", text) if what == "volume" else text
-    named = [name for name, unit in units.items() if unit]
-    if len({units[name] for name in named}) > 1:
-        what = "forces" if contacts else "lengths (and volumes in its cube)"
-        raise ReadError(f"{path}: expected {what} of one unit, found {', '.join(named)}")
+        # micro has two letters that look alike, and a cube many spellings
+        unit = UNIT.search(unicodedata.normalize("NFKC", name))
+        if unit and unit[1].strip() and (what.startswith("f") if contacts else what in LENGTHS):
+            units[name] = CUBE.sub("", unit[1].strip())
+    if len({*units.values()}) > 1:
+        kind = "forces" if contacts else "lengths (and volumes in its cube)"
+        raise ReadError(f"{path}: expected {kind} of one unit, found {', '.join(units)}")
 
 
 def refuse_frames(path: Path, columns: Columns) -> None:

@@ -47,12 +47,6 @@ class Header(NamedTuple):
     line: int = 1
     """Number of the first row's line."""
 
-    @property
-    def row_count(self) -> int | None:
-        """How many rows there are; None if the header does not say it."""
-        number = self.sections.get(f"NUMBER OF {''.join(self.words[:1])}", "")
-        return int(number) if re.fullmatch(r"\d{1,18}", number) else None
-
 
 class TextDump(shared.GrainsOnly):
     """What DumpReader needs of dumps of text."""
@@ -65,7 +59,8 @@ class TextDump(shared.GrainsOnly):
 
     def kind(self, path: Path) -> FileKind:
         """Atoms are grains if they have a radius; whatever else is counted are contacts."""
-        what, *names = _whole_header(f"{path}", first_bytes(path, shared.HEADER_BYTES)).words
+        header, _ = _whole_header(f"{path}", first_bytes(path, shared.HEADER_BYTES))
+        what, *names = header.words
         return "contacts" if what != "ATOMS" else "grains" if has_radius(names) else "points"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
@@ -83,14 +78,14 @@ class TextDump(shared.GrainsOnly):
             If the header or a line is not as it should be; names the line.
         """
         data, where = text_of(snapshot), f"{snapshot.path}, step {snapshot.step}"
-        header = _whole_header(where, data)
+        header, count = _whole_header(where, data)
         what, *names = header.words
         # LAMMPS called ids tags until 2008
         names = ["id" if name == "tag" else name for name in names]
         names = names or shared.numbered(len(header.rows.partition(b"\n")[0].split()))
         text = WORDS if what == "ATOMS" else ()
         layout = Layout(tuple(names), line=header.line, whole=("id",), text=text)
-        columns = read_rows(snapshot, header.rows, layout, count=header.row_count)
+        columns = read_rows(snapshot, header.rows, layout, count=count)
         return columns, _cell(where, header.sections)
 
 
@@ -107,15 +102,16 @@ def _header(data: bytes) -> Header:
     return Header(sections)
 
 
-def _whole_header(where: str, data: bytes) -> Header:
-    """ReadError if the header does not count the rows; CutError if it ends above them."""
+def _whole_header(where: str, data: bytes) -> tuple[Header, int]:
+    """With the number of rows; ReadError without it, CutError if the header ends above the rows."""
     header = _header(data)
-    if header.row_count is None:
+    number = header.sections.get(f"NUMBER OF {''.join(header.words[:1])}", "")
+    if not re.fullmatch(r"\d{1,18}", number):
         raise (ReadError if header.words else CutError)(
             f"{where}: the header is incomplete: expected a whole number after ITEM: NUMBER OF "
             f"ATOMS (or ENTRIES), and the names of the columns behind it"
         )
-    return header
+    return header, int(number)
 
 
 def _yaml_header(data: bytes) -> Header:
