@@ -32,8 +32,9 @@ POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("x
 # axes are its radius and the exponents 2, within the rounding of six digits
 HALF_AXES, EXPONENTS = ("shapex", "shapey", "shapez"), ("blockiness1", "blockiness2")
 OLD_EXPONENTS, SIX_DIGITS = ("roundness1", "roundness2"), 1e-5
-# no grain is so many radii of the largest one from the origin: rounding would leave nothing of it
-FAR = 1e12
+# no grain is so many periodic cells, or times as far as the others where there are some, from the
+# origin: rounding would leave nothing of its place
+FAR, FEW = 1e12, 10
 # a diameter that differs from twice the radius by more than this share of it is another size:
 # numbers of few digits are rounded
 ROUNDED = 0.05
@@ -77,12 +78,7 @@ def grain_table(
     cell = user_cell(path, cell, options)
     position = _position(here, rest, options, cell)
     radius = _radius(here, rest, options, len(position))
-    away = np.abs(position).max(axis=1, initial=0.0)
-    # what cannot be a length is the packing's to refuse
-    far = np.flatnonzero((away < MOST) & (away > FAR * radius.max(initial=0.0)))
-    if len(far) and np.all(radius > 0):
-        found = f"grain {far[0] + 1} has a coordinate of {away[far[0]]:g}"
-        raise ReadError(f"{here}: {found}, too far away for its radius: is the number damaged?")
+    _refuse_far(here, position, radius, cell)
     _refuse_superquadrics(here, rest, radius)
     position.flags.writeable = False  # so that the packing need not copy it
     id, bodies, walls = (
@@ -178,6 +174,20 @@ def _position(
         f"{where}: no coordinates: expected the columns x y z (or xu yu zu, xs ys zs), found "
         f'{", ".join(rest) or "none"}; name them with `columns={{"x": ..., "y": ..., "z": ...}}`'
     )
+
+
+def _refuse_far(where: str, position: FloatArray, radius: FloatArray, cell: Cell | None) -> None:
+    """ReadError if a grain is so far away that rounding leaves nothing of its place or size."""
+    is_periodic = cell is not None and cell.is_periodic
+    if len(radius) < (1 if is_periodic else FEW):
+        return
+    away = np.abs(position).max(axis=1)
+    size = np.abs(cell.vectors).max() if cell is not None and is_periodic else np.median(away)
+    # what cannot be a length is the packing's to refuse
+    far = np.flatnonzero((away < MOST) & (away > FAR * max(radius.max(), size)))
+    if len(far):
+        found = f"grain {far[0] + 1} has a coordinate of {away[far[0]]:g}"
+        raise ReadError(f"{where}: {found}, too far away from all others: is the number damaged?")
 
 
 def _radius(where: str, rest: dict[str, Any], options: ReadOptions, count: int) -> FloatArray:
