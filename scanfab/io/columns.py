@@ -176,6 +176,7 @@ def _position(
     )
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def _refuse_far(where: str, position: FloatArray, radius: FloatArray, cell: Cell | None) -> None:
     """ReadError if a grain is so far away that rounding leaves nothing of its place or size."""
     is_periodic = cell is not None and cell.is_periodic
