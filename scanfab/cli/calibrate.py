@@ -9,15 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.options import (
-    EXCERPT,
-    READING,
-    SAMPLE,
-    WINDOW,
-    check_plot,
-    options,
-    usage_errors,
-)
+from scanfab.cli.console import is_readable, print_csv, print_rows, target
+from scanfab.cli.options import EXCERPT, READING, SAMPLE, WINDOW, check_plot, options
 from scanfab.cli.sources import SourceCommand, checked, open_one, source_argument
 from scanfab.cli.talk import announce_compiling, talk_options, tell_inputs, working
 from scanfab.pipeline.options import as_options
@@ -28,25 +21,18 @@ if TYPE_CHECKING:
 
 # what is changed in each ladder
 CHANGED = {
-    "spacing": "spacing / r_min",
+    "spacing": "spacing / rmin",
     "directions": "directions",
-    "cutoff": "cut-off / r_min",
+    "cutoff": "cut-off / rmin",
     "rv": "RV / half extent",
     "recommended": "recommended",
 }
-TITLES = {
-    "variant": "variant",
-    "rule": "rule",
-    "rule_bias": "bias",
-    "segments": "segments",
-    "time": "time",
-    "alpha_vs_axial": "α_vs axial",
-    "alpha_vs_axial_se": "± scan",
-    "alpha_vs_axial_sample_se": "± sample",
-    "is_steady": "steady",
-}
-# columns that are left out where there is no room, the least telling first
-OPTIONAL = ("rule_bias", "segments", "rule", "time")
+# further columns on a terminal, of which the first ones always stay
+SHOWN = (
+    "variant", "alpha_vs_axial", "alpha_vs_axial_se", "alpha_vs_axial_sample_se", "is_steady",
+    "time", "rule", "segments", "rule_bias",
+)  # fmt: skip
+STAY = 6
 
 
 @click.command(cls=SourceCommand)
@@ -85,21 +71,17 @@ def calibrate(
     On a terminal a readable table; else the steps as CSV, and what they show on standard error.
     """
     from scanfab.base.column import columns_of_fields
-    from scanfab.cli.console import is_readable, print_csv
     from scanfab.pipeline.calibration import StepRow
     from scanfab.pipeline.calibration import calibrate as calibrate_series
     from scanfab.pipeline.record import asked_for
     from scanfab.pipeline.repeat import repeat_command
     from scanfab.pipeline.settings import Settings
-    from scanfab.table.writing import Excerpt, ResultFile
     from scanfab.viz.figures.page import make_figures, save_figures
 
     check_plot(plot, None)
     columns = columns_of_fields(StepRow)
     reading, settings = checked(chosen, Settings)
-    with usage_errors():
-        excerpt = Excerpt.make(columns, fields, digits)
-        result = None if output is None else ResultFile(output, columns, excerpt)
+    excerpt, result = target(output, columns, fields, digits)
     announce_compiling()
     series = open_one((source,), reading, "calibrated")
     tell_inputs([series], settings.workers)
@@ -126,18 +108,17 @@ def calibrate(
 
 def _print(rows: list[StepRow]) -> None:
     """One table for each ladder."""
-    from scanfab.cli.console import print_rows
-
     steady = {None: "", 0: "no", 1: "yes"}
     for ladder, steps in groupby(rows, key=lambda row: row.ladder):
         shown = [
             {
                 **asdict(row),
+                CHANGED[ladder]: row.value,
                 "rule_bias": row.rule_bias if row.rule_bias > 1e-12 else 0,
                 "time": f"{row.seconds:.2g} s",
                 "is_steady": steady[row.steady] + (" (!)" if row.note else ""),
             }
             for row in steps
         ]
-        print_rows(shown, {"value": CHANGED[ladder], **TITLES}, OPTIONAL)
+        print_rows(shown, (CHANGED[ladder], *SHOWN), STAY)
         click.echo()

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.console import Command
-from scanfab.cli.options import (
-    EXCERPT,
-    OF_SEVERAL,
-    check_labels,
-    check_plot,
-    options,
-    usage_errors,
-)
+from scanfab.cli.console import Command, is_readable, print_csv, print_rows, target
+from scanfab.cli.options import EXCERPT, OF_SEVERAL, check_labels, check_plot, options
 from scanfab.cli.talk import talk_options
 
 if TYPE_CHECKING:
@@ -25,32 +18,14 @@ if TYPE_CHECKING:
 
 
 # columns on a terminal; where there is no room, those that come last are left out
-SUMMARY_TITLES = {
-    "source": "source",
-    "variant": "variant",
-    "slope": "slope",
-    "slope_se": "±",
-    "r2": "R²",
-    "peak": "peak",
-    "final": "final",
-    "frames": "frames",
-    "void_curve": "α_vs",
-    "contact_curve": "α_c",
-}
-FRAME_TITLES = {
-    "source": "source",
-    "frame": "frame",
-    "strain": "strain",
-    "shear_strain": "shear strain",
-    "variant": "variant",
-    "alpha_vs_axial": "α_vs axial",
-    "alpha_vs_axial_total_se": "± total",
-    "alpha_c_axial": "α_c axial",
-    "alpha_c_axial_sample_se": "± sample",
-    "alpha_vs_axial_se": "scan",
-    "alpha_vs_axial_norm": "α_vs/max",
-    "alpha_c_axial_norm": "α_c/max",
-}
+SUMMARY = (
+    "source", "variant", "slope", "slope_se", "r2", "peak", "final", "frames", "α_vs", "α_c"
+)  # fmt: skip
+FRAMES = (
+    "source", "frame", "strain", "shear_strain", "variant", "alpha_vs_axial",
+    "alpha_vs_axial_total_se", "alpha_c_axial", "alpha_c_axial_sample_se", "alpha_vs_axial_se",
+    "alpha_vs_axial_norm", "alpha_c_axial_norm",
+)  # fmt: skip
 BARS = " ▁▂▃▄▅▆▇█"
 MOST_BARS = 15
 
@@ -97,20 +72,16 @@ def compare(
     --summary, per source and variant: the slope of void on contact fabric. On a terminal both.
     """
     from scanfab.base.errors import SettingsError
-    from scanfab.cli.console import is_readable, print_csv
     from scanfab.table.compare import compare_tables
-    from scanfab.table.formats import format_of, read_rows
+    from scanfab.table.formats import read_rows
     from scanfab.table.selection import choose_rows
-    from scanfab.table.writing import ALL, Excerpt, ResultFile
+    from scanfab.table.writing import ALL
     from scanfab.viz.figures.page import make_figures, save_figures
 
     check_plot(plot, figure, "table")
     if summary and differences:
         raise click.UsageError("--summary and --differences are two tables: ask for one of them")
     check_labels(labels, tables)
-    with usage_errors():
-        if output is not None:
-            format_of(output)
     read = [(table, read_rows(table)) for table in tables]
     rows = [row for one in choose_rows(read, cutoff, labels) for row in one]
     comparison = compare_tables(rows, strain_max=strain_max)
@@ -120,10 +91,9 @@ def compare(
     if not chosen:
         lacking = "two variants of one frame" if comparison.frames else "frames"
         raise SettingsError(f"there is nothing to compare: the tables hold no {lacking}")
-    with usage_errors():
-        excerpt = Excerpt.make(chosen.columns, fields, digits)
-    if output is not None:
-        ResultFile(output, chosen.columns, excerpt).save(chosen)
+    excerpt, result = target(output, chosen.columns, fields, digits)
+    if result is not None:
+        result.save(chosen)
     elif is_readable() and not differences and excerpt == ALL:
         print_comparison(comparison)
     else:
@@ -136,57 +106,35 @@ def compare(
 def print_comparison(comparison: Comparison) -> None:
     """The summary, with the curves of both anisotropies as bars, then the frames."""
     from scanfab.table.curves import short_names, strain_column
+    from scanfab.table.row import variant_of
 
     names = short_names((row.source for row in comparison.summary), 20)
+    left_out = {"strain", "shear_strain"} - {strain_column(comparison.frames)}
     if len(names) == 1:
         click.echo(next(iter(names.values())))
-    curves: dict[tuple[str, str], list[Row]] = {}
-    for row in comparison.frames:
-        curves.setdefault(_group(row), []).append(row)
-    bars = [
-        {
-            "void_curve": _bars(one.alpha_vs_axial_norm for one in curves[_group(row)]),
-            "contact_curve": _bars(one.alpha_c_axial_norm for one in curves[_group(row)]),
-        }
-        for row in comparison.summary
-    ]
-    _print(comparison.summary, SUMMARY_TITLES, names, bars)
-    click.echo()
-    other = "strain" if strain_column(comparison.frames) == "shear_strain" else "shear_strain"
-    titles = {name: title for name, title in FRAME_TITLES.items() if name != other}
-    _print(comparison.frames, titles, names)
+        left_out.add("source")
+
+    def shown(rows: Iterable[Row]) -> list[dict[str, Any]]:
+        return [{**row, "source": names[row.source], "variant": variant_of(row)} for row in rows]
+
+    summary, frames = shown(comparison.summary), shown(comparison.frames)
+    for row in summary:
+        own = [one for one in frames if all(one[k] == row[k] for k in ("source", "variant"))]
+        row["α_vs"] = _bars([one["alpha_vs_axial_norm"] for one in own])
+        row["α_c"] = _bars([one["alpha_c_axial_norm"] for one in own])
+    for rows, columns in ((summary, SUMMARY), (frames, FRAMES)):
+        kept = [name for name in columns if name not in left_out]
+        print_rows(rows, kept, 1)
+        click.echo()
     click.echo(
-        "± total: standard error, of α_vs by scan and sample together; ± sample: that of α_c, by "
-        "the sample; scan: its part of α_vs"
+        "± total: standard error, of α_vs by scan and sample together, of α_c by the sample\n"
+        "± scan: its part of α_vs"
     )
 
 
-def _group(row: Row) -> tuple[str, str]:
-    from scanfab.table.row import variant_of
-
-    return row.source, variant_of(row)
-
-
-def _print(
-    rows: Sequence[Row],
-    titles: dict[str, str],
-    names: dict[str, str],
-    more: Sequence[dict[str, Any]] = (),
-) -> None:
-    from scanfab.cli.console import print_rows
-
-    shown = [{**row, "source": names[row.source], "variant": _group(row)[1]} for row in rows]
-    for row, bars in zip(shown, more, strict=False):
-        row.update(bars)
-    if len(names) == 1:
-        titles = {name: title for name, title in titles.items() if name != "source"}
-    print_rows(shown, titles, tuple(titles)[:0:-1])
-
-
-def _bars(values: Iterable[float | None]) -> str:
+def _bars(values: list[float | None]) -> str:
     """A curve of numbers up to ±1 as a line of bars, by size: in extension all are negative."""
-    every = list(values)
     return "".join(
         "·" if value is None else BARS[round(abs(value) * (len(BARS) - 1))]
-        for value in every[:: -(-len(every) // MOST_BARS) or 1]
+        for value in values[:: -(-len(values) // MOST_BARS) or 1]
     )

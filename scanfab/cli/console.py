@@ -6,12 +6,13 @@ import sys
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from scanfab.base.errors import ScanfabNote, ScanfabWarning
-from scanfab.cli.options import AS_CSV
+from scanfab.cli.options import AS_CSV, usage_errors
 from scanfab.cli.talk import QUIET, level
 from scanfab.pipeline.options import as_options
 from scanfab.pipeline.told import Told
@@ -19,41 +20,27 @@ from scanfab.pipeline.told import Told
 if TYPE_CHECKING:
     from scanfab.base.column import Column
     from scanfab.table.row import Row
-    from scanfab.table.writing import Excerpt
-
-Rows = Sequence[Mapping[str, Any]]
+    from scanfab.table.writing import Excerpt, ResultFile
 
 # characters between columns
 GAP = 2
-# the columns of a fabric table on a terminal, in their order
+# heads of columns, where their names say less
 TITLES = {
-    "frame": "frame",
-    "strain": "strain",
-    "block": "block",
-    "x": "x",
-    "y": "y",
-    "z": "z",
-    "r_inner": "from r",
-    "r_outer": "to r",
-    "variant": "variant",
-    "grains": "grains",
-    "contacts": "contacts",
-    "coordination": "coordination",
-    "solid_fraction": "solid fraction",
-    "mean_length": "mean length",
-    "alpha_vs": "α_vs",
-    "alpha_vs_axial": "α_vs axial",
     "total": "± total",
+    "alpha_vs_axial_total_se": "± total",
+    "alpha_c_axial_sample_se": "± total",
     "alpha_vs_axial_se": "± scan",
     "alpha_vs_axial_sample_se": "± sample",
-    "alpha_c_axial": "α_c axial",
-    "at_surface": "at surface",
+    "slope_se": "±",
+    "r2": "R²",
 }
-# those that are left out where there is no room, the least telling first
-OPTIONAL = (
-    "z", "y", "x", "r_outer", "r_inner", "solid_fraction", "coordination", "mean_length",
-    "alpha_vs", "alpha_vs_axial_sample_se", "alpha_vs_axial_se", "at_surface",
+# the columns of a fabric table on a terminal, of which the first ones always stay
+SHOWN = (
+    "frame", "strain", "block", "variant", "grains", "contacts", "alpha_vs_axial", "total",
+    "alpha_c_axial", "at_surface", "alpha_vs_axial_se", "alpha_vs_axial_sample_se", "alpha_vs",
+    "mean_length", "coordination", "solid_fraction", "r_inner", "r_outer", "x", "y", "z",
 )  # fmt: skip
+STAY = 9
 
 
 @contextmanager
@@ -89,6 +76,17 @@ def is_readable() -> bool:
     return sys.stdout.isatty() and not click.get_current_context().meta.get(AS_CSV)
 
 
+def target(
+    output: Path | None, columns: Sequence[Column], fields: str | None, digits: int
+) -> tuple[Excerpt, ResultFile | None]:
+    """Which columns and digits are asked for, and the file that they go to, if there is one."""
+    from scanfab.table.writing import Excerpt, ResultFile
+
+    with usage_errors():
+        excerpt = Excerpt.make(columns, fields, digits)
+        return excerpt, None if output is None else ResultFile(output, columns, excerpt)
+
+
 def print_csv(
     rows: Iterable[Mapping[str, Any]], excerpt: Excerpt, columns: Sequence[Column]
 ) -> None:
@@ -108,31 +106,31 @@ def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:
     # three digits say enough on a terminal, unless others were asked for
     digits = 3 if excerpt.digits == DEFAULT_DIGITS else excerpt.digits
     if excerpt.fields:
-        print_rows(shown, {name: name for name in excerpt.fields}, digits=digits)
+        print_rows(shown, excerpt.fields, len(excerpt.fields), digits)
     else:
-        print_rows(shown, TITLES, OPTIONAL, digits)
+        print_rows(shown, SHOWN, STAY, digits)
 
 
 def print_rows(
-    rows: Rows, titles: Mapping[str, str], optional: Sequence[str] = (), digits: int = 3
+    rows: Sequence[Mapping[str, Any]], columns: Sequence[str], stay: int, digits: int = 3
 ) -> None:
     """
-    Rows as a table on standard output; no column is cut.
+    Some columns of rows as a table on standard output; none is cut.
 
-    ``titles`` are those of the columns, by their names and in their order; columns that the rows do
-    not have are left out, and so are the ``optional`` ones, in this order, where there is no room.
+    Columns that the rows do not have are left out; where there is no room, those on the right are
+    left out too, but for the first ones, which ``stay``.
     """
     from rich.console import Console
     from rich.table import Table
 
-    cells = {
-        name: [spelt(row[name], digits) for row in rows]
-        for name in titles
-        if not rows or name in rows[0]
-    }
-    widths = {name: max(map(len, [titles[name], *cells[name]])) + GAP for name in cells}
+    texts = {}
+    for name in columns:
+        if not rows or name in rows[0]:
+            head = TITLES.get(name, name.replace("_", " ").replace("alpha ", "α_"))
+            texts[name] = [head, *(spelt(row[name], digits) for row in rows)]
+    widths = {name: max(map(len, column)) + GAP for name, column in texts.items()}
     room = Console().width + GAP
-    for name in optional:
+    for name in columns[: stay - 1 : -1]:
         if sum(widths.values()) > room:
             widths.pop(name, None)
     # a terminal that is too narrow for the columns that stay wraps their lines
@@ -140,9 +138,9 @@ def print_rows(
     table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, GAP, 0, 0))
     for name in widths:
         is_text = any(isinstance(row[name], str) for row in rows)
-        table.add_column(titles[name], justify="left" if is_text else "right", no_wrap=True)
-    for number in range(len(rows)):
-        table.add_row(*(cells[name][number] for name in widths))
+        table.add_column(texts[name][0], justify="left" if is_text else "right", no_wrap=True)
+    for line in zip(*(texts[name][1:] for name in widths), strict=True):
+        table.add_row(*line)
     console.print(table)
 
 

@@ -6,13 +6,12 @@ from typing import Any
 
 import click
 
-from scanfab.cli.console import Command
+from scanfab.cli.console import Command, print_rows
 
 
 @click.command(cls=Command)
 def formats() -> None:
     """List every reader and writer, its extensions, and the package it comes from."""
-    from scanfab.cli.console import print_rows
     from scanfab.io.reader import installed_readers
     from scanfab.io.writer import installed_writers
     from scanfab.table.formats import known_formats
@@ -34,7 +33,7 @@ def formats() -> None:
     ]
     titles = ("kind", "name", "extensions", "package", "description")
     rows = [dict(zip(titles, line, strict=True)) for line in lines]
-    print_rows(rows, {title: title for title in titles})
+    print_rows(rows, titles, len(titles))
 
 
 def _described(plugin: Any) -> str:

@@ -22,13 +22,8 @@ COMMANDS = {
 }
 
 
-# bytes of addresses that the libraries need before anything is read
-LEAST_SPACE = 1_000_000_000
-# to compile the scan with four workers took 1.4e9; VTK's pictures took 1.8e9
-LEAST_OF_COMMAND = dict.fromkeys(
-    ("compute", "calibrate", "inspect", "report", "map"), 1_500_000_000
-)
-LEAST_OF_COMMAND["view"] = 2_000_000_000
+# bytes of addresses: to compile the scan with four workers takes 1.4e9
+LEAST_SPACE = 1_500_000_000
 
 
 class LazyGroup(click.Group):
@@ -61,19 +56,6 @@ def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> N
         ctx.exit()
 
 
-def _check_limit(command: str | None) -> None:
-    """Some libraries end the process, or wait for ever, where they cannot even be loaded."""
-    from scanfab.base.errors import ScanfabError
-    from scanfab.base.files import address_space
-
-    space, least = address_space(), LEAST_OF_COMMAND.get(str(command), LEAST_SPACE)
-    if space is not None and space < least:
-        raise ScanfabError(
-            f"not enough memory: the limit (ulimit -v) leaves {space / 1e6:.0f} MB, "
-            f"{least / 1e6:.0f} MB are needed at least"
-        )
-
-
 @click.group(cls=LazyGroup)
 @click.option(
     "--version",
@@ -84,7 +66,15 @@ def _check_limit(command: str | None) -> None:
     help="Show the version and exit.",
 )
 @click.option("--debug", is_flag=True, expose_value=False, help="Show a traceback with an error.")
-@click.pass_context
-def cli(ctx: click.Context) -> None:
+def cli() -> None:
     """The void fabric of granular packings by scan lines, from DEM particle dumps."""
-    _check_limit(ctx.invoked_subcommand)
+    from scanfab.base.errors import ScanfabError
+    from scanfab.base.files import address_space
+
+    space = address_space()
+    # with less, some libraries end the process, or wait for ever, where they are loaded
+    if space is not None and space < LEAST_SPACE:
+        raise ScanfabError(
+            f"not enough memory: the limit (ulimit -v) leaves {space / 1e6:.0f} MB, "
+            f"{LEAST_SPACE / 1e6:.0f} MB are needed at least"
+        )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from scanfab.cli.console import spelt
 from scanfab.cli.options import READING, SAMPLE, WINDOW, options
 from scanfab.cli.sources import SourceCommand, checked, open_series, sources_argument
 from scanfab.cli.talk import announce_compiling, talk_options, tell_inputs, working
@@ -62,8 +63,6 @@ def _print(report: FrameReport) -> None:
 
 
 def _spell(value: Any) -> str:
-    from scanfab.cli.console import spelt
-
     if isinstance(value, list):
         return ", ".join(_spell(item) for item in value)
     return spelt(value, 6)

@@ -11,17 +11,6 @@ import sys
 
 # bytes of addresses: with fewer left, whatever fails does so for them
 LITTLE = 200_000_000
-# bars of a curve become those that a keyboard has
-PLAIN_LETTERS = dict(zip("▁▂▃▄▅▆▇█", "_.-:=+*#", strict=True)) | {
-    "α": "a",
-    "ℓ": "l",
-    "±": "+-",
-    "²": "^2",
-    "·": ".",
-    "…": "~",
-    "→": "->",
-    "≥": ">=",
-}
 
 
 def main(args: list[str] | None = None) -> None:
@@ -32,8 +21,7 @@ def main(args: list[str] | None = None) -> None:
     from scanfab.cli.signals import catch_signals, flush_streams, ignore_signals, leave_at_once
 
     catch_signals()
-    _replace_closed_streams()
-    _replace_foreign_letters()
+    _prepare_streams()
     code = run(sys.argv[1:] if args is None else args)
     ignore_signals()
     if code:
@@ -42,35 +30,18 @@ def main(args: list[str] | None = None) -> None:
     sys.exit(code)
 
 
-def _replace_closed_streams() -> None:
-    """Where the shell closed a standard stream: nothing to read, and an error to write to."""
+def _prepare_streams() -> None:
+    """Replace streams that the shell closed; spell what a terminal has no letter for."""
     import os
 
-    # they stay open as long as the process
-    if sys.stdin is None:
-        sys.stdin = open(os.devnull)  # noqa: SIM115
-    if sys.stdout is None:
-        sys.stdout = open(os.devnull)  # noqa: SIM115
-    if sys.stderr is None:
-        sys.stderr = open(os.devnull, "w")  # noqa: SIM115
-
-
-def _replace_foreign_letters() -> None:
-    """Where a terminal knows no Greek, and for file names that are no text: what it can show."""
-    import codecs
-
-    codecs.register_error("scanfab", _shown)
+    for name, mode in (("stdin", "r"), ("stdout", "r"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            # open as long as the process: nothing to read, and an error to write to
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="scanfab")
-
-
-def _shown(error: UnicodeError) -> tuple[str, int]:
-    """An error handler of codecs: other letters for those that cannot be encoded."""
-    assert isinstance(error, UnicodeEncodeError)
-    letters = error.object[error.start : error.end]
-    known = "".join(PLAIN_LETTERS.get(letter, letter) for letter in letters)
-    return known.encode("ascii", "backslashreplace").decode(), error.end
+            # of Greek, and of file names that are no text
+            stream.reconfigure(errors="backslashreplace")
 
 
 def run(args: list[str]) -> int:
@@ -110,10 +81,12 @@ def _lacks_memory(error: Exception) -> bool:
 
 
 def _describe(error: Exception) -> str:
+    """The message of an error, in the words of the command line."""
     import os
     from io import UnsupportedOperation
 
     from scanfab.base.errors import ScanfabError
+    from scanfab.pipeline.options import as_options
 
     if isinstance(error, UnsupportedOperation):
         return "standard output is closed: name a file with -o"
@@ -125,6 +98,4 @@ def _describe(error: Exception) -> str:
     if isinstance(error, OSError) and error.errno and error.strerror == os.strerror(error.errno):
         # whatever writes to files names them
         return f"{error.filename or 'standard output'}: {error.strerror}"
-    from scanfab.pipeline.options import as_options
-
     return as_options(error) or type(error).__name__

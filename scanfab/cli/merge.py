@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from scanfab.cli.console import Command
+from scanfab.cli.console import Command, is_readable, print_csv, print_table
 from scanfab.cli.options import options, usage_errors
 from scanfab.cli.talk import talk_options
 
@@ -29,7 +29,6 @@ def merge(parts: tuple[Path, ...], output: Path | None, frames: str | None) -> i
     Job I of 8:  scanfab compute dumps/ --frames I::8 -o part_I.csv
     Then:        scanfab merge part_*.csv -o fabric.csv
     """
-    from scanfab.cli.console import is_readable, print_csv, print_table
     from scanfab.io.options import parse_frames
     from scanfab.pipeline.merge import check_output, merged
 

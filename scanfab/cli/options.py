@@ -13,14 +13,12 @@ from click.shell_completion import CompletionItem
 
 from scanfab.base.option import GROUPS, Option
 from scanfab.cli.settings_file import in_file
+from scanfab.io.options import READING_OPTIONS
 from scanfab.pipeline.options import DECLARED, as_options
 
 Command = Callable[..., Any]
 
-READING = (
-    "format", "columns", "contact_columns", "skip", "radius", "cell", "periodic", "bodies",
-    "max_unpacked", "contacts", "dim",
-)  # fmt: skip
+READING = READING_OPTIONS
 SAMPLE = ("boundary", "min_contacts", "rattlers", "min_force", "contact_tolerance")
 WINDOW = ("rv", "rv_radius", "rv_center", "rv_shape", "rv_size", "rv_axis", "rv_follows")
 EXCERPT = ("fields", "digits")

@@ -21,7 +21,7 @@ from scanfab.cli.talk import announce_compiling, talk_options, working
     required=True,
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
 )
-@options("output", required=True, metavar="FILE.html", help="The report.")
+@options("output", callback=None, required=True, metavar="FILE.html", help="The report.")
 @click.option("--title", metavar="TEXT", help="Title (default: the sources' names).")
 @click.option(
     "--author", metavar="TEXT", help="Author (default: your full name, if this computer knows it)."

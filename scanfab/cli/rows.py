@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from scanfab.cli.console import is_readable, print_csv, print_table, target
 from scanfab.cli.options import check_plot, usage_errors
 from scanfab.cli.settings_file import as_listed
 from scanfab.cli.signals import ending_in_order, telling
@@ -33,18 +34,24 @@ def write_table(
 
     ``kind`` are the settings of the table, and ``figures`` the kinds of data that may be drawn.
     """
+    from scanfab.pipeline.cluster import dask_executor
     from scanfab.pipeline.job import Job
-    from scanfab.table.writing import Excerpt, ResultFile
     from scanfab.viz.paraview import vtk_folders
 
     asked = Output(**{name: chosen.pop(name) for name in vars(Output()) if name in chosen})
-    _check_together(asked, chosen, figures)
+    cluster = asked.scheduler or asked.scheduler_file
+    check_plot(asked.plot, asked.figure, *figures)
+    for is_wrong, words in (
+        (asked.plot and chosen.get("cutoffs"), "--plot is of one cut-off: leave out --cutoffs"),
+        (asked.resume and not asked.output, "--resume goes with -o FILE"),
+        (asked.vtk and cluster, "--vtk is written where frames are computed: not with --scheduler"),
+    ):
+        if is_wrong:
+            raise click.UsageError(words)
     reading, settings = checked(chosen, kind)
-    with usage_errors():
-        excerpt = Excerpt.make(settings.columns, asked.fields, asked.digits)
-        path = asked.output
-        result = None if path is None else ResultFile(path, settings.columns, excerpt)
-    series = _opened(asked, sources, reading)
+    excerpt, result = target(asked.output, settings.columns, asked.fields, asked.digits)
+    follows = asked.follow or asked.follow_for is not None
+    series = [_followed(asked, sources, reading)] if follows else open_series(sources, reading)
     drawing = _Drawing(asked, figures)
     if drawing.kind == "frames" and len(series) > 1:
         raise click.UsageError(f"--figure {asked.figure} draws one series: name one source")
@@ -52,14 +59,11 @@ def write_table(
     with ExitStack() as stack:
         with usage_errors():
             executor = None
-            if asked.scheduler or asked.scheduler_file:
-                from scanfab.pipeline.cluster import dask_executor
-
-                cluster = dask_executor(asked.scheduler, scheduler_file=asked.scheduler_file)
-                executor = stack.enter_context(cluster)
+            if cluster:
+                dask = dask_executor(asked.scheduler, scheduler_file=asked.scheduler_file)
+                executor = stack.enter_context(dask)
             announce_compiling()
             vtk, resume = asked.vtk, asked.resume
-            folders = () if vtk is None else vtk_folders(vtk, len(series), settings, resume)
             job = Job(
                 series,
                 settings,
@@ -69,12 +73,12 @@ def write_table(
                 resume=resume,
                 manifest_path=asked.manifest,
                 more={"settings_file": listed} if (listed := as_listed(ctx)) else {},
-                observers=folders,
+                observers=vtk_folders(vtk, len(series), settings, resume) if vtk else (),
                 told=ctx.obj,
                 executor=executor,
             )
             stack.enter_context(job.begun(drawing.needed))
-        if _follows(asked):
+        if follows:
             followed: Any = series[0]
             stack.enter_context(ending_in_order(followed.end))
             followed.idle = lambda: drawing.redraw(job)
@@ -83,31 +87,14 @@ def write_table(
     return 0 if job.is_good else 1
 
 
-def _check_together(asked: Output, chosen: dict[str, Any], figures: tuple[str, ...]) -> None:
-    check_plot(asked.plot, asked.figure, *figures)
-    if asked.plot is not None and chosen.get("cutoffs"):
-        raise click.UsageError("--plot is of one cut-off: leave out --cutoffs")
-    if asked.resume and asked.output is None:
-        raise click.UsageError("--resume goes with -o FILE")
-    if asked.vtk is not None and (asked.scheduler or asked.scheduler_file):
-        raise click.UsageError("--vtk is written where frames are computed: not with --scheduler")
-    if asked.follow_for is not None and not asked.follow_for >= 0:
-        raise click.UsageError(f"--follow-for: expected 0 or more, found {asked.follow_for:g}")
-
-
-def _follows(asked: Output) -> bool:
-    return asked.follow or asked.follow_for is not None
-
-
-def _opened(asked: Output, sources: tuple[str, ...], reading: dict[str, Any]) -> list[Series]:
-    """The series; one that is followed may hold no frames yet."""
-    if not _follows(asked):
-        return open_series(sources, reading)
+def _followed(asked: Output, sources: tuple[str, ...], reading: dict[str, Any]) -> Series:
+    """The series that is still being written; it may hold no frames yet."""
     from scanfab.io.follow import follow_series
 
     if len(sources) > 1 or "-" in sources:
         raise click.UsageError("--follow takes one folder, or one file that grows")
-    return [follow_series(sources[0], seconds=asked.follow_for, **reading)]
+    with usage_errors("--follow-for "):
+        return follow_series(sources[0], seconds=asked.follow_for, **reading)
 
 
 class _Drawing:
@@ -155,13 +142,12 @@ class _Drawing:
 def _write_or_say(job: Job, excerpt: Excerpt) -> None:
     """Write the rows; where that is interrupted or fails, say how far it is and how to go on."""
     from scanfab.base.errors import ScanfabError
-    from scanfab.cli.console import is_readable
 
     # asked for now, as a signal comes at any moment
     as_table = job.result is None and is_readable()
 
     def standing() -> str:
-        return _standing(job, printed=not as_table)
+        return _standing(job, as_table)
 
     try:
         with telling(standing):
@@ -172,29 +158,25 @@ def _write_or_say(job: Job, excerpt: Excerpt) -> None:
         raise
 
 
-def _standing(job: Job, printed: bool) -> str:
+def _standing(job: Job, as_table: bool) -> str:
     """How far a job is, and how to go on."""
-    if job.result is not None and job.done == job.taken_over > 0 and job.result.path.exists():
-        return (
-            f"before the first new frame was finished: {job.result.path} is as it was; the same "
-            f"command goes on"
-        )
+    result = job.result
+    if result is not None and job.done == job.taken_over > 0 and result.path.exists():
+        again = f"{result.path} is as it was; the same command goes on"
+        return f"before the first new frame was finished: {again}"
     if not job.done:
         return "before the first frame was finished: nothing is kept"
     done = f"after {job.done} of {job.frames()} frames"
     if job.is_over:
         done = "after the last frame, before the table was complete"
-    if job.result is None:
-        kept = "the rows printed so far are all" if printed else "nothing is kept"
+    if result is None:
+        kept = "nothing is kept" if as_table else "the rows printed so far are all"
         return f"{done}; {kept}: with -o FILE, --resume could go on"
-    again = "the same command" if job.resume else "the same command with --resume"
-    return f"{done}; {again} goes on"
+    return f"{done}; the same command{'' if job.resume else ' with --resume'} goes on"
 
 
 def _write(job: Job, excerpt: Excerpt, as_table: bool) -> None:
     """Write the rows as they come; on a terminal, all of them as a table."""
-    from scanfab.cli.console import print_csv, print_table
-
     with working(job.frames, job.done) as advance:
         if job.result is not None:
             job.write(advance)

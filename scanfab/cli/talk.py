@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import logging
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from scanfab.io.series import Series
 
 
-# where standard error is no terminal there is a line of progress after so many seconds
+# seconds between lines of progress, where standard error is no terminal
 EVERY = 60.0
 KEY = "scanfab.talk"
 QUIET, USUAL, VERBOSE = "quiet", "", "verbose"
@@ -39,14 +39,10 @@ def _choose(ctx: click.Context, parameter: click.Parameter, value: bool) -> None
 
 def talk_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options --quiet and --verbose."""
-    helps = {
-        "--verbose": "Say which readers, files and versions are used, and how long steps take.",
-        "--quiet": "No progress and no notes; warnings and errors stay.",
-    }
-    for flag, text in helps.items():
-        add = click.option(flag, is_flag=True, expose_value=False, callback=_choose, help=text)
-        command = add(command)
-    return command
+    add = partial(click.option, is_flag=True, expose_value=False, callback=_choose)
+    words = "Say which readers, files and versions are used, and how long steps take."
+    command = add("--verbose", help=words)(command)
+    return add("--quiet", help="No progress and no notes; warnings and errors stay.")(command)
 
 
 def tell_inputs(every: Iterable[Series], workers: int) -> None:
@@ -91,11 +87,9 @@ class Work(logging.Handler):
         super().__init__(logging.INFO)
         self.total = total
         self.before = self.done = done
-        self.begun = time.monotonic()
+        self.begun = self.shown = time.monotonic()
         self.latest = ""
         self.says = level() == VERBOSE
-        self.show: Callable[[], None] = lambda: None
-        """Called whenever there is something new."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """Keep a message of the library, and print it if that is asked for."""
@@ -108,6 +102,12 @@ class Work(logging.Handler):
         """A frame is done."""
         self.done += 1
         self.show()
+
+    def show(self) -> None:
+        """Say how far it is, if that was not said for a minute; a terminal has a bar instead."""
+        if time.monotonic() - self.shown >= EVERY:
+            self.shown = time.monotonic()
+            _say(self.state())
 
     def state(self) -> str:
         """How many frames are done, how long the others will take, and what was said last."""
@@ -128,9 +128,9 @@ def working(
     """
     Show progress while something works; what is yielded is called after each frame.
 
-    On a terminal that is a bar with the time that is left, in a log a line a minute; nothing with
-    --quiet. With --verbose each step is a line. What ``prints`` as it goes shows by itself how far
-    it is on a terminal.
+    On a terminal that is a bar with the time that is left, in a log at most a line a minute;
+    nothing with --quiet. With --verbose each step is a line. What ``prints`` as it goes shows by
+    itself how far it is on a terminal.
     """
     if level() == QUIET:
         yield lambda: None
@@ -141,30 +141,11 @@ def working(
     logger.setLevel(logging.INFO)
     on_terminal = sys.stderr.isatty() and not (prints and sys.stdout.isatty())
     try:
-        with _bar(work) if on_terminal and not work.says else _lines(work):
+        with _bar(work) if on_terminal and not work.says else nullcontext():
             yield work.advance
     finally:
         logger.removeHandler(work)
         logger.setLevel(before)
-
-
-@contextmanager
-def _lines(work: Work) -> Iterator[None]:
-    """A line of progress each minute."""
-    ended = threading.Event()
-
-    def tell() -> None:
-        while not ended.wait(EVERY):
-            _say(work.state() or "at work")
-
-    teller = threading.Thread(target=tell, daemon=True)
-    teller.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        # nothing is said behind the end
-        teller.join()
 
 
 @contextmanager
@@ -181,6 +162,6 @@ def _bar(work: Work) -> Iterator[None]:
         def show() -> None:
             progress.update(task, description=work.state(), completed=work.done, total=work.total())
 
-        work.show = show
+        work.show = show  # type: ignore[method-assign]
         show()
         yield

@@ -7,6 +7,7 @@ Of the plane nothing is known before a frame is read.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -26,58 +27,44 @@ ROUNDING = 1e-9
 
 def check_together(chosen: Settings) -> None:
     """SettingsError if settings do not go together."""
-    shape, sizes = chosen.rv_shape, SHAPES.get(chosen.rv_shape, "")
-    of_file = "its file says how large it is"
-    one_size = (
-        f"`rv` asks for {len(chosen.rvs)} sizes, and this gives one: leave out one of the two"
-    )
-    are_several = len(chosen.rvs) > 1
-    rules = (
-        ("rv_radius", are_several and chosen.rv_radius is not None, one_size),
-        ("rv_size", are_several and chosen.rv_size, one_size),
-        ("rv_shape", are_several and shape not in SHAPES, one_size),
-        (
-            "rv_size",
-            chosen.rv_size and not sizes,
-            f"the shape {shape} takes none: "
-            + ("choose `rv_radius`" if shape == "sphere" else of_file),
-        ),
-        (
-            "rv_radius",
-            chosen.rv_radius is not None and shape != "sphere",
-            f"is that of a sphere, but `rv_shape` is {shape}: "
-            + (f"choose `rv_size` ({sizes})" if sizes else of_file),
-        ),
-        (
-            "rv_axis",
-            chosen.rv_axis is not None and shape != "cylinder",
-            f"is that of a cylinder, but `rv_shape` is {shape}: leave it out, or choose "
-            f'`rv_shape="cylinder"`',
-        ),
-        (
-            "rv_follows",
-            chosen.rv_follows == "strain" and chosen.strain not in STRAIN_MODES,
-            f"a file of strains ({chosen.strain}) does not say how the sample deforms along all "
-            f"axes: choose another `strain`, or leave out `rv_follows`",
-        ),
-        (
-            "moment",
-            chosen.edge == ENDS and chosen.moment != 1,
-            "from what lies inside the window alone, as `edge=ends` takes it, the second moment of "
-            "the full lengths is not known: choose `edge=start`, or `moment=1`",
-        ),
-        (
-            "min_force",
-            chosen.min_force and chosen.rattlers != "force",
-            f'is that of the rule `rattlers="force"`, but `rattlers` is {chosen.rattlers}: choose '
-            f"that rule, or leave out `min_force`",
-        ),
-    )
-    for name, is_wrong, words in rules:
-        if is_wrong:
-            raise SettingsError(f"{name}: {words}")
-    if shape == "cylinder":
+    for problem in _clashes(chosen):
+        raise SettingsError(problem)
+    if chosen.rv_shape == "cylinder":
         check_sizes(chosen, 3)
+
+
+def _clashes(chosen: Settings) -> Iterator[str]:
+    """What does not go together, each with what to do."""
+    shape, takes = chosen.rv_shape, SHAPES.get(chosen.rv_shape, "")
+    given = {"rv_radius": chosen.rv_radius, "rv_size": chosen.rv_size}
+    for name, one in {**given, "rv_shape": shape not in SHAPES}.items():
+        if one and len(chosen.rvs) > 1:
+            several = f"`rv` asks for {len(chosen.rvs)}"
+            yield f"{name}: gives the RV one size, but {several}: leave out one of the two"
+    instead = "choose `rv_radius`" if shape == "sphere" else "its file says how large it is"
+    if chosen.rv_size and not takes:
+        yield f"rv_size: the shape {shape} takes none: {instead}"
+    instead = f"choose `rv_size` ({takes})" if takes else instead
+    if chosen.rv_radius is not None and shape != "sphere":
+        yield f"rv_radius: is that of a sphere, but `rv_shape` is {shape}: {instead}"
+    if chosen.rv_axis is not None and shape != "cylinder":
+        instead = 'leave it out, or choose `rv_shape="cylinder"`'
+        yield f"rv_axis: is that of a cylinder, but `rv_shape` is {shape}: {instead}"
+    if chosen.rv_follows == "strain" and chosen.strain not in STRAIN_MODES:
+        yield (
+            f"rv_follows: a file of strains ({chosen.strain}) does not say how the sample deforms "
+            f"along all axes: choose another `strain`, or leave out `rv_follows`"
+        )
+    if chosen.edge == ENDS and chosen.moment != 1:
+        yield (
+            "moment: `edge=ends` counts only what lies inside the window, which does not give the "
+            "second moment of the full lengths: choose `edge=start`, or `moment=1`"
+        )
+    if chosen.min_force and chosen.rattlers != "force":
+        yield (
+            f'min_force: is that of the rule `rattlers="force"`, but `rattlers` is '
+            f"{chosen.rattlers}: choose that rule, or leave out `min_force`"
+        )
 
 
 def check_sizes(chosen: Settings, dimension: int) -> None:
