@@ -1,4 +1,4 @@
-"""A table for people: key columns always, others where there is room, and no head is ever cut."""
+"""Tables for people: the columns that matter most always, and no head or cell is ever cut."""
 
 from __future__ import annotations
 
@@ -6,101 +6,120 @@ import re
 
 import pytest
 
-from scanfab.cli.console import KEYS, MORE, print_table
+from scanfab.cli.compare import print_comparison
+from scanfab.cli.console import SHOWN, STAY, print_table
+from scanfab.io.reader import installed_readers
 from scanfab.table.columns import table_columns
+from scanfab.table.compare import compare_tables
 from scanfab.table.row import Row
 from scanfab.table.writing import Excerpt
+from tests.helpers.tables import curve, sheared
 from tests.table.test_table import a_row
 
-ROWS = [
-    a_row(
-        frame=frame,
-        strain=0.0123456,
-        variant="d",
-        grains=123456,
-        contacts=1234567,
-        coordination=4.98765,
-        solid_fraction=0.61234,
-        mean_length=0.00123456,
-        alpha_vs=0.0123456,
-        alpha_vs_axial=-0.0123456,
-        alpha_vs_axial_se=3e-4,
-        alpha_vs_axial_sample_se=4e-4,
-        alpha_c_axial=-0.0876543,
-    )
-    for frame in range(3)
-]
-
-
-# those that only maps have are left out
-OWN_KEYS, OWN_MORE = (
-    {name: title for name, title in every.items() if name in ROWS[0] or name == "total"}
-    for every in (KEYS, MORE)
-)
+VALUES = {
+    "variant": "d", "strain": 0.0123456, "grains": 123456, "contacts": 1234567,
+    "coordination": 4.98765, "solid_fraction": 0.61234, "mean_length": 0.00123456,
+    "alpha_vs": 0.0123456, "alpha_vs_axial": -0.0123456, "alpha_vs_axial_se": 3e-4,
+    "alpha_vs_axial_sample_se": 4e-4, "alpha_c_axial": -0.0876543,
+}  # fmt: skip
+ROWS = [a_row(frame=frame, **VALUES) for frame in range(3)]
+ERRORS = {
+    "alpha_vs_axial_se": 1.23456e-4,
+    "alpha_vs_axial_sample_se": 1.34567e-3,
+    "alpha_c_axial_sample_se": 2.34567e-3,
+}
 
 
 @pytest.fixture
-def shown(capsys, monkeypatch):
-    """The lines of a table on a terminal of some columns."""
+def lines(capsys, monkeypatch):
+    """What is printed on a terminal of some width."""
 
-    def show(width: int, excerpt: Excerpt | None = None) -> list[str]:
+    def show(width, function, *arguments):
         monkeypatch.setenv("COLUMNS", str(width))
-        print_table(ROWS, excerpt or Excerpt())
+        function(*arguments)
         return capsys.readouterr().out.splitlines()
 
     return show
 
 
-def titles(head: str) -> list[str]:
-    return re.split(" {2,}", head.strip())
+def heads(line: str) -> list[str]:
+    return re.split(" {2,}", line.strip())
 
 
-@pytest.mark.parametrize("width", [40, 60, 80, 100, 119, 120, 121, 200])
-def test_heads_are_whole_in_every_width(shown, width):
-    head, *rows = shown(width)
-    assert "…" not in head + "".join(rows)
-    columns = titles(head)
-    assert set(OWN_KEYS.values()) <= set(columns) <= {*OWN_KEYS.values(), *OWN_MORE.values()}
-    assert len(rows) == 3
-    for row in rows:
-        assert len(row.split()) == len(columns)
-
-
-def test_a_map_says_which_block_a_row_is_of(capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "200")
-    place = {"block": 7, "x": 1.0, "y": 2.0, "z": 3.0, "at_surface": 0}
-    print_table([Row(**ROWS[0], **place)], Excerpt())
-    head, row = capsys.readouterr().out.splitlines()
-    assert dict(zip(titles(head), row.split(), strict=True))["block"] == "7"
-    assert {"x", "y", "z", "at surface"} <= set(titles(head))
-    assert "from r" not in titles(head)
-
-
-def test_what_does_not_fit_is_left_out_least_telling_first(shown):
+def test_what_does_not_fit_is_left_out_least_telling_first(lines):
     counts = []
-    for width in range(60, 201):
-        head = shown(width)[0]
-        present = [title in titles(head) for title in OWN_MORE.values()]
-        assert present == sorted(present, reverse=True)
-        if any(present):
-            assert len(head) <= width
-        counts.append(sum(present))
+    # only maps have blocks
+    always = [name for name in SHOWN[:STAY] if name in ROWS[0] or name == "total"]
+    optional = [name for name in SHOWN[STAY:] if name in ROWS[0]]
+    for width in (40, 60, 80, 100, 119, 120, 121, 140, 160, 200):
+        head, *rows = lines(width, print_table, ROWS, Excerpt())
+        assert "…" not in head + "".join(rows)
+        columns = heads(head)
+        assert {len(row.split()) for row in rows} == {len(columns)}
+        assert width < 80 or len(head) <= width
+        counts.append(len(columns) - len(always))
     assert counts == sorted(counts)
-    assert (counts[0], counts[-1]) == (0, len(OWN_MORE))
+    assert (counts[0], counts[-1]) == (0, len(optional))
+    assert columns[6:8] == ["± total", "α_c axial"]
 
 
-def test_error_is_that_of_scan_and_sample_together(shown):
-    head, row, *_ = shown(200)
-    numbers = row.split()
-    assert numbers[numbers.index("-0.0123") + 1 :][:3] == ["0.0005", "0.0003", "0.0004"]
-    assert [head.index(title) for title in ("± total", "± scan", "± sample")] == sorted(
-        head.index(title) for title in ("± total", "± scan", "± sample")
+def test_error_is_that_of_scan_and_sample_together(lines):
+    head, row, *_ = lines(200, print_table, ROWS, Excerpt())
+    cells = dict(zip(heads(head), row.split(), strict=True))
+    errors = [cells[name] for name in ("± total", "± scan", "± sample")]
+    assert errors == ["0.0005", "0.0003", "0.0004"]
+
+
+def test_a_map_says_which_block_a_row_is_of(lines):
+    place = {"block": 7, "x": 1.0, "y": 2.0, "z": 3.0, "at_surface": 0}
+    head, row = lines(200, print_table, [Row(**ROWS[0], **place)], Excerpt())
+    assert dict(zip(heads(head), row.split(), strict=True))["block"] == "7"
+    assert {"x", "y", "z", "at surface"} <= set(heads(head))
+    assert "r inner" not in heads(head)
+
+
+def test_columns_and_digits_that_were_asked_for_are_shown(lines):
+    excerpt = Excerpt.make(table_columns(), "variant,alpha_vs_axial", 5)
+    head, row, *_ = lines(80, print_table, ROWS, excerpt)
+    assert (heads(head), row.split()) == (["variant", "α_vs axial"], ["d", "-0.012346"])
+
+
+def compared(*sources):
+    every = [row for name in sources for v in "abcd" for row in curve(name, v, 0.0123456)]
+    return compare_tables([{**row, **ERRORS} for row in every])
+
+
+@pytest.mark.parametrize("width", [60, 80, 100, 120])
+@pytest.mark.parametrize("sources", [["one"], ["x" * 70 + "one", "x" * 70 + "two"]])
+def test_no_part_of_a_comparison_is_cut(lines, width, sources):
+    shown = lines(width, print_comparison, compared(*sources))
+    assert max(map(len, shown)) <= width
+    assert "…" not in "".join(shown)
+    assert sum("variant" in line.split() for line in shown) == 2
+    assert any("slope" in line for line in shown)
+
+
+def test_a_comparison_shows_total_errors_and_curves_where_there_is_room(lines):
+    narrow, wide = (lines(width, print_comparison, compared("one")) for width in (80, 140))
+    assert narrow[0] == "one"
+    assert sum("one" in line for line in narrow) == 1
+    assert any("α_c axial  ± total" in line for line in narrow)
+    assert any("0.00135" in line and "0.00235" in line for line in narrow)
+    assert "± scan" in "".join(wide)
+    assert "█" in "".join(wide)
+
+
+@pytest.mark.filterwarnings("ignore:shear_strain stands")
+def test_a_sheared_cell_has_its_shear(lines):
+    assert any(
+        "shear strain" in one for one in lines(80, print_comparison, compare_tables(sheared()))
     )
 
 
-def test_columns_and_digits_that_were_asked_for_are_shown(shown):
-    excerpt = Excerpt.make(table_columns(), "variant,alpha_vs_axial", 5)
-    assert [line.split() for line in shown(80, excerpt)[:2]] == [
-        ["variant", "alpha_vs_axial"],
-        ["d", "-0.012346"],
-    ]
+def test_formats_lists_every_reader_with_its_package_and_the_tables(ask):
+    printed = [line.split() for line in ask("formats").out.splitlines()]
+    for name, installed in installed_readers().items():
+        line = next(line for line in printed if line[:2] == ["reader", name])
+        assert installed.package in line
+        assert set(installed.plugin.extensions[:1]) <= set(line)
+    assert ["writer", "csv"] in [line[:2] for line in printed]

@@ -6,7 +6,6 @@ import json
 
 import pytest
 
-from scanfab.cli.main import run
 from tests.helpers.dumps import cubic_rows, dump_text, pairs_text, write
 
 KEYS = (
@@ -27,67 +26,46 @@ def series(tmp_path):
 
 
 @pytest.fixture
-def inspect(capsys):
-    def ask(*words: object) -> tuple[str, str]:
-        assert run(["inspect", *map(str, words)]) == 0
-        printed = capsys.readouterr()
-        return printed.out, printed.err
+def frames(ask):
+    def frames(*words):
+        return [json.loads(line) for line in ask("inspect", "--json", *words).out.splitlines()]
 
-    return ask
+    return frames
 
 
-def test_json_is_an_object_a_line_with_the_keys_that_scripts_rely_on(series, inspect):
-    out, _ = inspect(series, "--json")
-    frames = [json.loads(line) for line in out.splitlines()]
-    assert [list(frame) for frame in frames] == [KEYS.split()] * 2
-    assert [(frame["frame"], frame["step"]) for frame in frames] == [(0, 0), (1, 10)]
+def test_json_is_an_object_a_line_with_what_the_reader_sees(series, frames):
+    first, second = frames(series, "--boundary", "id>=63")
+    assert list(first) == list(second) == KEYS.split()
+    assert [(one["frame"], one["step"]) for one in (first, second)] == [(0, 0), (1, 10)]
+    assert (first["source"], first["format"]) == (str(series), "liggghts")
+    assert (first["grains"], first["boundary"]) == (62, 2)
+    assert (first["contacts"], first["contacts_from"]) == (2, "file")
+    assert first["cell"] == [[4, 0, 0], [0, 4, 0], [0, 0, 4]]
+    assert first["periodic"] == [True, True, False]
+    assert set(first["columns"]) == {"id", "type", "x", "y", "z", "radius"}
+    assert 0 < first["radius_min"] < first["radius_max"]
+    assert (first["time"], first["warnings"]) == (None, [])
+    assert "no contact file for step 10" in second["warnings"][0]
 
 
-def test_json_says_what_the_reader_sees(series, inspect):
-    out, _ = inspect(series, "--json", "--boundary", "id>=63", "--frames", "0")
-    frame = json.loads(out)
-    assert (frame["source"], frame["format"]) == (str(series), "liggghts")
-    assert (frame["grains"], frame["boundary"]) == (62, 2)
-    assert (frame["contacts"], frame["contacts_from"]) == (2, "file")
-    assert frame["cell"] == [[4, 0, 0], [0, 4, 0], [0, 0, 4]]
-    assert frame["periodic"] == [True, True, False]
-    assert set(frame["columns"]) == {"id", "type", "x", "y", "z", "radius"}
-    assert 0 < frame["radius_min"] < frame["radius_max"]
-    assert frame["time"] is None
-
-
-def test_warnings_of_a_frame_stand_with_it(series, inspect):
-    out, _ = inspect(series, "--json")
-    first, second = (json.loads(line)["warnings"] for line in out.splitlines())
-    assert first == []
-    assert "no contact file for step 10" in second[0]
-
-
-def test_people_get_lines_without_colour(series, inspect):
-    out, _ = inspect(series)
+def test_people_get_lines_without_colour(series, ask):
+    out = ask("inspect", series).out
     assert f"{series}, frame 1" in out
     assert "contacts_from geometric" in out
     assert "\x1b" not in out
 
 
-def test_it_takes_the_reading_options_of_compute(tmp_path, inspect):
+def test_it_takes_the_options_of_compute_also_from_a_settings_file(tmp_path, frames):
     file = write(tmp_path / "dump.txt", dump_text(names="id type x y z mass"))
-    words = ("--radius", "0.2", "--cell", "1", "1", "1", "--periodic", "z", "--format", "liggghts")
-    frame = json.loads(inspect(file, "--json", *words)[0])
+    write(tmp_path / "scanfab.toml", '[compute]\nradius = 0.2\nformat = "liggghts"\n')
+    (frame,) = frames(file, "--cell", "1", "1", "1", "--periodic", "z", "--rv-shape", "cylinder")
     assert frame["radius_max"] == 0.2
     assert frame["periodic"] == [False, False, True]
+    assert frame["rv_shape"].startswith("cylinder of radius ")
 
 
-def test_a_settings_file_is_told(series, inspect):
-    write(series / "scanfab.toml", '[compute]\nboundary = "id>=63"\n')
-    out, err = inspect(series, "--json")
-    assert json.loads(out.splitlines()[0])["boundary"] == 2
-    assert f"options from {series}/scanfab.toml" in err
-
-
-def test_nothing_is_printed_of_a_broken_file(tmp_path, capsys):
+def test_nothing_is_printed_of_a_broken_file(tmp_path, ask):
     file = write(tmp_path / "dump.txt", dump_text()[:-20])
-    assert run(["inspect", str(file), "--json"]) == 1
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    assert str(file) in printed.err
+    answer = ask("inspect", file, "--json", code=1)
+    assert answer.out == ""
+    assert str(file) in answer.err

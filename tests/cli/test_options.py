@@ -34,41 +34,26 @@ def test_every_option_of_compute_is_declared_and_stands_in_a_group():
     assert re.findall(r"^([A-Z][\w ]+):$", text, re.M) == TITLES
     for one in OPTIONS.values():
         assert len(re.findall(rf"^  {one.flag}(?![\w-])", text, re.M)) == 1
-
-
-def test_the_few_that_most_need_come_first():
-    most = help_of(compute).split("\nReading:")[0].split("What most need:")[1]
-    flags = re.findall(r"^  (-[\w-]+)", most, re.M)
-    assert flags == [
+    most = text.split("\nReading:")[0].split("What most need:")[1]
+    assert re.findall(r"^  (-[\w-]+)", most, re.M) == [
         "-o", "--variants", "--boundary", "--frames", "--rv", "--tolerance", "--workers",
     ]  # fmt: skip
 
 
-def test_there_is_an_example_for_a_folder_several_files_and_a_pipe():
+def test_the_help_has_examples_short_defaults_and_80_columns():
     text = help_of(compute)
     for one in ("A folder:", "Several files:", "A pipe:"):
         assert re.search(rf"^  {one} +.*scanfab compute", text, re.M)
-
-
-def test_the_help_fits_80_columns():
-    assert max(map(len, help_of(compute).splitlines())) <= 80
-
-
-def test_defaults_are_spelt_as_short_as_they_are_written():
-    text = " ".join(help_of(compute).split())
+    assert max(map(len, text.splitlines())) <= 80
     for default in ("0.7", "0.0001", "1e10", "0", "1rmin", "abcd", "17"):
-        assert f"[default: {default}]" in text
+        assert f"[default: {default}]" in " ".join(text.split())
 
 
 @dataclass(frozen=True, init=False)
 class Wider(Settings):
     """Settings with one option more, declared as the others are."""
 
-    stray_light: int = option(
-        whole("a number below 9", lambda number: number < 9),
-        default=7,
-        group="fabric",
-    )
+    stray_light: int = option(whole("a number below 9", lambda n: n < 9), default=7, group="fabric")
     """How much of it, as `rv`."""
 
 
@@ -96,6 +81,19 @@ def test_a_made_up_option_takes_one_declaration(monkeypatch):
         """{options}"""
 
     assert function.__doc__.endswith("stray_light : int, optional\n    How much of it, as `rv`.")
+
+
+def test_a_shell_is_offered_words_and_files():
+    from click.shell_completion import ShellComplete
+
+    from scanfab.cli.group import cli
+
+    shell = ShellComplete(cli, {}, "scanfab", "_SCANFAB_COMPLETE")
+    offered = {
+        (flag, text): [one.value for one in shell.get_completions(["compute", flag], text)]
+        for flag, text in (("--variants", "c"), ("--rv-shape", "b"), ("--format", "ya"))
+    }
+    assert list(offered.values()) == [["cd", "c"], ["box", "b"], ["yade"]]
 
 
 def test_the_page_of_the_command_line_shows_what_the_help_has():

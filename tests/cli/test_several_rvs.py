@@ -6,6 +6,7 @@ import json
 import shlex
 
 import pytest
+from matplotlib.figure import Figure
 
 import scanfab
 from scanfab.cli.main import run
@@ -14,6 +15,7 @@ from scanfab.viz.scanned_frames import scan_frames
 from tests.helpers.interruptions import interrupted_at_row, write_series
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")
+OPTIONS = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "ac"}
 RVS = ("--rv", "0.7,0.5")
 
 
@@ -31,41 +33,37 @@ def table(series, tmp_path_factory):
 
 
 def test_the_table_is_that_of_the_library(series, table):
-    options = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "ac"}
-    computed = scanfab.compute(scanfab.read_series(series), rv=(0.5, 0.7), **options)
+    computed = scanfab.compute(scanfab.read_series(series), rv=(0.5, 0.7), **OPTIONS)
     assert scanfab.load(table) == computed
     assert [(row.frame, row.variant, row.rv) for row in computed[:3]] == [
         (0, "a", None), (0, "c", 0.5), (0, "c", 0.7),
     ]  # fmt: skip
 
 
-def test_the_manifest_repeats_it(table):
+def test_the_manifest_repeats_it(table, ask):
     asked = json.loads(table.with_name("table.csv.manifest.json").read_text())["settings"]
     assert asked["rv"] == [0.5, 0.7]
     words = shlex.split(repeat_command(asked, str(table.with_name("again.csv"))))
     assert words[words.index("--rv") + 1] == "0.5,0.7"
-    assert run(words[1:]) == 0
+    ask(*words[1:])
     assert table.with_name("again.csv").read_bytes() == table.read_bytes()
 
 
-def test_a_run_that_was_stopped_goes_on(series, table, tmp_path, monkeypatch):
+def test_a_run_that_was_stopped_goes_on(series, table, tmp_path, monkeypatch, ask):
     """In the middle of a frame, which has three rows."""
     output = tmp_path / "table.csv"
-    command = ["compute", str(series), *FAST, *RVS, "--workers", "1", "-o", str(output)]
+    command = ["compute", series, *FAST, *RVS, "--workers", "1", "-o", output]
     with interrupted_at_row(monkeypatch, 8) as rows:
-        assert run(command) == 130
+        ask(*command, code=130)
     assert len(rows) == 8
-    assert run([*command, "--resume"]) == 0
+    ask(*command, "--resume")
     assert output.read_bytes() == table.read_bytes()
 
 
-def test_curves_are_told_apart_by_their_rv(table, capsys):
-    assert run(["compare", str(table), "--summary"]) == 0
-    header, *lines = capsys.readouterr().out.splitlines()
-    assert header.split(",")[-1] == "rv"
-    assert [(line.split(",")[1], line.split(",")[-1]) for line in lines] == [
-        ("a", ""), ("c", "0.5"), ("c", "0.7"),
-    ]  # fmt: skip
+def test_curves_are_told_apart_by_their_rv(table, series, ask, tmp_path):
+    rows = ask("compare", table, "--summary").rows
+    assert list(rows[0])[-1] == "rv"
+    assert [(row["variant"], row["rv"]) for row in rows] == [("a", ""), ("c", "0.5"), ("c", "0.7")]
     found = scanfab.load(table).compare()
     # each as from a table of its own
     for rv in (0.5, 0.7):
@@ -74,18 +72,12 @@ def test_curves_are_told_apart_by_their_rv(table, capsys):
     assert "variant c RV 0.5: slope" in repr(found)
     pairs = {row.variants for row in found.differences}
     assert pairs == {"a-c RV 0.5", "a-c RV 0.7", "c RV 0.5-c RV 0.7"}
-
-
-def test_a_table_of_one_has_no_column_for_it(series, tmp_path, capsys):
-    output = tmp_path / "one.csv"
-    assert run(["compute", str(series), *FAST, "-o", str(output)]) == 0
-    assert run(["compare", str(output), "--summary"]) == 0
-    assert "rv" not in capsys.readouterr().out.splitlines()[0].split(",")
+    # a table of one has no column for it
+    ask("compute", series, *FAST, "-o", tmp_path / "one.csv")
+    assert "rv" not in ask("compare", tmp_path / "one.csv", "--summary").rows[0]
 
 
 def test_figures_have_a_curve_for_each(table):
-    from matplotlib.figure import Figure
-
     axes = Figure().subplots()
     scanfab.load(table).plot.evolution(ax=axes)
     names = [text.get_text() for text in axes.get_legend().get_texts()]
@@ -96,47 +88,21 @@ def test_figures_have_a_curve_for_each(table):
 
 
 def test_frames_are_drawn_of_the_largest(series):
-    options = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "ac"}
-    frames = scan_frames(scanfab.read_series(series), rv="0.5,0.7", **options)
+    frames = scan_frames(scanfab.read_series(series), rv="0.5,0.7", **OPTIONS)
     assert repr(frames) == f"ScannedFrames(variant c RV 0.7 of {series}, frames 0 and 3)"
     first = frames.frames[0]
-    computed = scanfab.compute(scanfab.read_series(series)[:1], rv="0.5,0.7", **options)
+    computed = scanfab.compute(scanfab.read_series(series)[:1], rv="0.5,0.7", **OPTIONS)
     assert first.row.alpha_vs_axial == pytest.approx(computed[2].alpha_vs_axial)
     assert len(first.normals) == computed[2].contacts
 
 
-def test_paraview_files_are_named_by_it(table):
+def test_paraview_report_and_view_show_all(table, series, tmp_path, ask):
     names = {path.name.rpartition("_")[0] for path in table.with_name("vtk").glob("*.vtp")}
     for kind in ("window", "lines-c", "distribution-c", "tensors-c"):
         assert {f"{kind}-rv0.5", f"{kind}-rv0.7"} <= names
         assert kind not in names
     assert "lines-a" in names
-
-
-def test_a_report_has_a_column_for_each(table, tmp_path):
-    page = tmp_path / "report.html"
-    assert run(["report", str(table), "-o", str(page)]) == 0
-    assert "c RV 0.5" in page.read_text()
-
-
-def test_the_view_shows_all(series, tmp_path):
-    picture = tmp_path / "view.png"
-    assert run(["view", str(series), *RVS, "--screenshot", str(picture)]) == 0
-    assert picture.stat().st_size > 10_000
-
-
-def test_a_calibration_is_of_one(series, capsys):
-    assert run(["calibrate", str(series), *RVS]) == 1
-    assert "nor several rv" in capsys.readouterr().err
-
-
-def test_a_settings_file_may_have_a_list(series, table, tmp_path):
-    import shutil
-
-    folder = tmp_path / "series"
-    shutil.copytree(series, folder)
-    (folder / "scanfab.toml").write_text("[compute]\nrv = [0.7, 0.5]\n")
-    output = tmp_path / "table.csv"
-    assert run(["compute", str(folder), *FAST, "-o", str(output)]) == 0
-    found, expected = scanfab.load(output), scanfab.load(table)
-    assert list(found["alpha_vs_axial"]) == list(expected["alpha_vs_axial"])
+    ask("report", table, "-o", tmp_path / "report.html")
+    assert "c RV 0.5" in (tmp_path / "report.html").read_text()
+    ask("view", series, *RVS, "--screenshot", tmp_path / "view.png")
+    assert (tmp_path / "view.png").stat().st_size > 10_000

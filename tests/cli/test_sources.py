@@ -1,4 +1,4 @@
-"""What comes by standard input is called that in all that is told."""
+"""Sources as users name them: globs, and standard input, which messages call by that name."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import json
 
 import pytest
 
-from scanfab.cli.main import run
+from tests.helpers.dumps import cubic_rows, dump_text, write
 
 CASES = {
     "x,y,z\n1,2,3\n": "scanfab: error: standard input: no radius",
@@ -25,14 +25,13 @@ class Stdin:
 
 
 @pytest.fixture
-def by_stdin(tmp_path, monkeypatch, capsys):
-    def told(data, *words):
+def by_stdin(tmp_path, monkeypatch, ask):
+    def told(data, *words, code=0):
         file = tmp_path / "stdin"
         file.write_bytes(data)
         with open(file, "rb") as stream:
             monkeypatch.setattr("sys.stdin", Stdin(stream))
-            code = run([*words, "-", "--format", "table"])
-        return code, capsys.readouterr()
+            return ask(*words, "-", "--format", "table", code=code)
 
     return told
 
@@ -41,17 +40,36 @@ def by_stdin(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize(("text", "message"), CASES.items())
 def test_errors_and_warnings_name_standard_input(by_stdin, text, message, packed):
     data = gzip.compress(text.encode()) if packed else text.encode()
-    code, streams = by_stdin(data, "inspect", "--verbose")
-    assert code == int("error" in message)
-    assert message in streams.err + streams.out
-    assert "scanfab-" not in streams.err + streams.out
+    answer = by_stdin(data, "inspect", "--verbose", code=int("error" in message))
+    assert message in answer.err + answer.out
+    assert "scanfab-" not in answer.err + answer.out
 
 
 def test_so_do_warnings_in_results_and_manifests(by_stdin, tmp_path):
-    _, streams = by_stdin(b"x,y,z,radius\n1,2,3,4", "inspect", "--json")
-    assert json.loads(streams.out)["warnings"][0].startswith("standard input: the last line")
-    out = tmp_path / "out.csv"
-    words = ("compute", "--on-error", "skip", "-o", str(out))
-    by_stdin(b"x,y,z,radius\n1,2,3,-4\n", *words)
+    answer = by_stdin(b"x,y,z,radius\n1,2,3,4", "inspect", "--json")
+    assert json.loads(answer.out)["warnings"][0].startswith("standard input: the last line")
+    words = ("compute", "--on-error", "skip", "-o", tmp_path / "out.csv")
+    by_stdin(b"x,y,z,radius\n1,2,3,-4\n", *words, code=1)
     (first, *_) = json.loads((tmp_path / "out.csv.manifest.json").read_text())["warnings"]
     assert first.startswith("frame 0 skipped: standard input: grain 0: the radius")
+
+
+@pytest.mark.parametrize("command", ["inspect", "compute", "view", "calibrate"])
+def test_globs_are_expanded_and_must_match(ask, tmp_path, command):
+    write(tmp_path / "dump_0.txt", dump_text(cubic_rows()))
+    assert "matches nothing" in ask(command, tmp_path / "other_*.txt", code=2).told
+
+
+def test_a_glob_is_read_as_its_files(ask, tmp_path):
+    for frame in (0, 1):
+        write(tmp_path / f"dump_{frame}.txt", dump_text(cubic_rows(), step=frame))
+    by_glob, by_folder = ask("inspect", tmp_path / "dump_*.txt"), ask("inspect", tmp_path)
+    assert by_glob.out == by_folder.out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [(("-",), "standard input needs --format"), (("-", ".", "--format", "table"), "of its own")],
+)
+def test_standard_input_is_a_series_of_its_own_with_a_format(ask, words, message):
+    assert message in ask("compute", *words, code=2).told

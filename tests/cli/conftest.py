@@ -1,0 +1,43 @@
+"""A command of scanfab as tests ask for it."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable
+from typing import NamedTuple
+
+import pytest
+
+from scanfab.cli.main import run
+
+
+class Answer(NamedTuple):
+    """What a command printed."""
+
+    out: str
+    err: str
+
+    @property
+    def rows(self) -> list[dict[str, str]]:
+        """Of CSV on standard output."""
+        return list(csv.DictReader(io.StringIO(self.out)))
+
+    @property
+    def told(self) -> str:
+        """Standard error as one line."""
+        return " ".join(self.err.split())
+
+
+@pytest.fixture
+def ask(capsys) -> Callable[..., Answer]:
+    """Run a command that ends with this exit code, and never with a traceback."""
+
+    def call(*words: object, code: int = 0) -> Answer:
+        capsys.readouterr()
+        assert run([str(word) for word in words]) == code
+        answer = Answer(*capsys.readouterr())
+        assert "Traceback" not in answer.err
+        return answer
+
+    return call
