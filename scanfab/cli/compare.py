@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 # columns on a terminal; where there is no room, those that come last are left out
 SUMMARY = (
-    "source", "variant", "slope", "slope_se", "r2", "peak", "final", "frames", "α_vs", "α_c"
+    "source", "variant", "slope", "slope_se", "r2", "peak", "final", "frames", "alpha_vs", "alpha_c"
 )  # fmt: skip
 FRAMES = (
     "source", "frame", "strain", "shear_strain", "variant", "alpha_vs_axial",
@@ -120,15 +120,15 @@ def print_comparison(comparison: Comparison) -> None:
     summary, frames = shown(comparison.summary), shown(comparison.frames)
     for row in summary:
         own = [one for one in frames if all(one[k] == row[k] for k in ("source", "variant"))]
-        row["α_vs"] = _bars([one["alpha_vs_axial_norm"] for one in own])
-        row["α_c"] = _bars([one["alpha_c_axial_norm"] for one in own])
+        row["alpha_vs"] = _bars([one["alpha_vs_axial_norm"] for one in own])
+        row["alpha_c"] = _bars([one["alpha_c_axial_norm"] for one in own])
     for rows, columns in ((summary, SUMMARY), (frames, FRAMES)):
         kept = [name for name in columns if name not in left_out]
         print_rows(rows, kept, 1)
         click.echo()
     click.echo(
-        "± total: standard error, of α_vs by scan and sample together, of α_c by the sample\n"
-        "± scan: its part of α_vs"
+        "± total: standard error, of α_vs by scan and sample,\n"
+        "of α_c by the sample; ± scan: its part of α_vs"
     )
 
 

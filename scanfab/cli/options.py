@@ -95,7 +95,7 @@ def _click_option(option: Option, **changes: Any) -> Callable[..., Any]:
         **({} if option.default is None else {"default": option.default}),
         "metavar": option.metavar or METAVARS.get(option.kind),
         "multiple": option.several,
-        "is_flag": option.kind is bool,
+        **({"is_flag": True} if option.kind is bool else {}),
         "help": option.help,
         "shell_complete": partial(_completed, option),
         "callback": _output if option.name == "output" else None,
@@ -115,7 +115,10 @@ def _completed(
 ) -> list[CompletionItem]:
     """What a shell offers for an option, which may take other words too: some words, and files."""
     words = option.choices() if callable(option.choices) else option.choices
-    found = [CompletionItem(word) for word in words if word.startswith(text)]
+    # of a list the last word
+    before = text[: text.rfind(",") + 1] if ",..." in (option.metavar or "") else ""
+    named = [before + word for word in words if word not in before.split(",")]
+    found = [CompletionItem(word) for word in named if word.startswith(text)]
     return [*found, CompletionItem(text, type="file")] if option.files else found
 
 

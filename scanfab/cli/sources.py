@@ -54,33 +54,32 @@ class SourceCommand(Command):
 
 
 def _expanded(ctx: click.Context, parameter: click.Parameter, given: Any) -> Any:
-    """The sources, a glob as a shell would have expanded it; what does not exist is refused."""
+    """
+    The sources, globs as a shell would have expanded them.
+
+    The settings file beside them becomes the defaults of the command.
+    """
     from scanfab.base.errors import ReadError
-
-    try:
-        found = expanded_sources(ctx, (given,) if isinstance(given, str) else given)
-    except ReadError as error:
-        raise click.UsageError(str(error)) from None
-    for path in found:
-        if path != "-" and not Path(path).exists():
-            raise click.UsageError(f"{path}: there is no such file, folder or glob")
-    return given if isinstance(given, str) else found
-
-
-def expanded_sources(ctx: click.Context, sources: tuple[str, ...]) -> tuple[str, ...]:
-    """Sources with their globs expanded; the settings file beside them becomes the defaults."""
     from scanfab.io.families import expanded
 
-    found = [path for one in sources for path in ([one] if one == "-" else expanded(one))]
-    take_settings_file(ctx, map(str, found))
-    return tuple(map(str, found))
+    try:
+        sources = [given] if isinstance(given, str) else given
+        every = [str(path) for one in sources for path in expanded(one)]
+    except ReadError as error:
+        raise click.UsageError(str(error)) from None
+    for path in every:
+        if path != "-" and not Path(path).exists():
+            raise click.UsageError(f"{path}: there is no such file, folder or glob")
+    take_settings_file(ctx, every)
+    # calibrate names its one source in the command that it recommends, as it was given
+    return given if isinstance(given, str) else tuple(every)
 
 
 a_source = click.Path(allow_dash=True)
-source_argument = click.argument("source", metavar="SOURCE", type=a_source, callback=_expanded)
 sources_argument = click.argument(
     "sources", metavar="SOURCE...", nargs=-1, required=True, type=a_source, callback=_expanded
 )
+source_argument = click.argument("source", type=a_source, callback=_expanded)
 
 
 def checked(chosen: dict[str, Any], kind: type[S]) -> tuple[dict[str, Any], S]:

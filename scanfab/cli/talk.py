@@ -80,7 +80,7 @@ def _say(text: str) -> None:
     click.echo(f"scanfab: {without_temporary(text)}", err=True)
 
 
-class Work(logging.Handler):
+class _Work(logging.Handler):
     """Work that is counted, and what the library, which never prints by itself, says of it."""
 
     def __init__(self, total: Callable[[], int | None], done: int) -> None:
@@ -135,7 +135,7 @@ def working(
     if level() == QUIET:
         yield lambda: None
         return
-    work, logger = Work(total, done), logging.getLogger("scanfab")
+    work, logger = _Work(total, done), logging.getLogger("scanfab")
     before = logger.level
     logger.addHandler(work)
     logger.setLevel(logging.INFO)
@@ -149,7 +149,7 @@ def working(
 
 
 @contextmanager
-def _bar(work: Work) -> Iterator[None]:
+def _bar(work: _Work) -> Iterator[None]:
     """A line on the terminal that is gone in the end."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn

@@ -24,6 +24,17 @@ def _figures() -> list[str]:
     return [*figures_of("table"), *figures_of("frames")]
 
 
+def _columns() -> set[str]:
+    """Those of all tables."""
+    from scanfab.base.column import columns_of_fields
+    from scanfab.pipeline.calibration import StepRow
+    from scanfab.table.columns import MORE_COLUMNS, map_columns, table_columns
+    from scanfab.table.compare import FRAMES, SUMMARY
+
+    tables = (table_columns(), MORE_COLUMNS, map_columns((), shells=True), FRAMES, SUMMARY)
+    return {one.name for table in (*tables, columns_of_fields(StepRow)) for one in table}
+
+
 @dataclass
 class Output:
     """The options of ``compute`` and ``map`` that are neither of reading nor settings."""
@@ -33,7 +44,7 @@ class Output:
     Result file: .csv .tsv .json .jsonl .parquet; - is CSV on standard output (default: the same, or
     a readable table on a terminal).
     """
-    fields: str | None = option(metavar="NAME,NAME,...")
+    fields: str | None = option(metavar="NAME,NAME,...", choices=_columns)
     """Which columns to write, in this order (default: all)."""
     digits: int = option(default=DEFAULT_DIGITS)
     """Significant digits of written numbers; 17: as short as reads back the same."""
