@@ -164,8 +164,8 @@ def test_the_last_snapshot_of_a_file_that_is_being_written_is_left_out(tmp_path,
 )
 def test_contacts_of_other_grains_are_refused(tmp_path, refusal, pairs, words):
     grains(tmp_path)
-    file = write(tmp_path / "pairs_0.txt", pairs_text(pairs))
-    assert re.search(f"{file}: .*{words}", refusal(tmp_path), re.S)
+    write(tmp_path / "pairs_0.txt", pairs_text(pairs))
+    assert re.search(f"{tmp_path}/.*_0.txt: .*{words}", refusal(tmp_path))
 
 
 def test_a_contact_file_of_another_step_is_not_taken(tmp_path, compute, refusal):
@@ -257,7 +257,10 @@ def test_one_grain_far_away_is_too_far_for_the_whole_alone(tmp_path, refusal, co
     ],
 )
 def test_an_rv_without_grains_or_larger_than_the_sample(tmp_path, refusal, options, words):
-    assert re.match(rf"the RV \(radius .*{words}.*--rv-center", refusal(grains(tmp_path), *options))
+    message = refusal(grains(tmp_path), *options)
+    assert message.startswith("the RV (radius ")
+    assert words in message
+    assert "--rv-center" in message
 
 
 def test_an_rv_at_the_surface_is_a_warning(tmp_path, compute):
