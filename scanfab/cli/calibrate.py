@@ -76,12 +76,13 @@ def calibrate(
     from scanfab.pipeline.record import asked_for
     from scanfab.pipeline.repeat import repeat_command
     from scanfab.pipeline.settings import Settings
+    from scanfab.table.writing import write_rows
     from scanfab.viz.figures.page import make_figures, save_figures
 
     check_plot(plot, None)
     columns = columns_of_fields(StepRow)
     reading, settings = checked(chosen, Settings)
-    excerpt, result = target(output, columns, fields, digits)
+    excerpt = target(output, columns, fields, digits)
     announce_compiling()
     series = open_one((source,), reading, "calibrated")
     tell_inputs([series], settings.workers)
@@ -91,14 +92,14 @@ def calibrate(
     usual = Settings()
     best: Any = {"max_chords": usual.max_chords, "tolerance": usual.tolerance, **found.options}
     command = repeat_command(asked_for([source], reading, replace(settings, **best)))
-    if result is not None:
-        result.save(rows)
+    if output is not None:
+        write_rows(output, rows, columns, excerpt)
     if plot is not None:
         save_figures(plot, make_figures(rows, "calibration"))
-    tells_all = result is not None or is_readable()
+    tells_all = output is not None or is_readable()
     if not tells_all:
         print_csv(rows, excerpt, columns)
-    elif result is None:
+    elif output is None:
         _print(rows)
     # behind rows on standard output, what they show goes beside them
     for sentence in (*found.findings, command):

@@ -75,7 +75,7 @@ def compare(
     from scanfab.table.compare import compare_tables
     from scanfab.table.formats import read_rows
     from scanfab.table.selection import choose_rows
-    from scanfab.table.writing import ALL
+    from scanfab.table.writing import ALL, write_rows
     from scanfab.viz.figures.page import make_figures, save_figures
 
     check_plot(plot, figure, "table")
@@ -91,9 +91,9 @@ def compare(
     if not chosen:
         lacking = "two variants of one frame" if comparison.frames else "frames"
         raise SettingsError(f"there is nothing to compare: the tables hold no {lacking}")
-    excerpt, result = target(output, chosen.columns, fields, digits)
-    if result is not None:
-        result.save(chosen)
+    excerpt = target(output, chosen.columns, fields, digits)
+    if output is not None:
+        write_rows(output, chosen, chosen.columns, excerpt)
     elif is_readable() and not differences and excerpt == ALL:
         print_comparison(comparison)
     else:

@@ -20,7 +20,7 @@ from scanfab.pipeline.told import Told
 if TYPE_CHECKING:
     from scanfab.base.column import Column
     from scanfab.table.row import Row
-    from scanfab.table.writing import Excerpt, ResultFile
+    from scanfab.table.writing import Excerpt
 
 # characters between columns
 GAP = 2
@@ -78,13 +78,15 @@ def is_readable() -> bool:
 
 def target(
     output: Path | None, columns: Sequence[Column], fields: str | None, digits: int
-) -> tuple[Excerpt, ResultFile | None]:
-    """Which columns and digits are asked for, and the file that they go to, if there is one."""
-    from scanfab.table.writing import Excerpt, ResultFile
+) -> Excerpt:
+    """Which columns and digits are asked for; wrong usage if they, or a file, cannot be written."""
+    from scanfab.table.writing import Excerpt, check_output
 
     with usage_errors():
         excerpt = Excerpt.make(columns, fields, digits)
-        return excerpt, None if output is None else ResultFile(output, columns, excerpt)
+        if output is not None:
+            check_output(output)
+        return excerpt
 
 
 def print_csv(

@@ -30,20 +30,20 @@ def merge(parts: tuple[Path, ...], output: Path | None, frames: str | None) -> i
     Then:        scanfab merge part_*.csv -o fabric.csv
     """
     from scanfab.io.options import parse_frames
-    from scanfab.pipeline.merge import check_output, merged
+    from scanfab.pipeline.merge import check_no_part, merged
 
     with usage_errors():
         chosen = parse_frames(frames)
         if output is not None:
-            check_output(output, parts)
+            check_no_part(output, parts)
     found = merged(parts, chosen)
     if output is not None:
         found.save(output)
     elif is_readable():
         print_table(found.rows, found.excerpt)
     else:
-        print_csv(found.rows, found.excerpt, found.settings.columns)
+        print_csv(found.rows, found.excerpt, found.columns)
     # a choice of columns may say nothing of the void fabric
-    if not found.rows or "alpha_vs" not in found.columns:
+    if not found.rows or "alpha_vs" not in [one.name for one in found.columns]:
         return 0
     return 0 if any(row.get("alpha_vs") is not None for row in found.rows) else 1

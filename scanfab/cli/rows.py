@@ -49,7 +49,7 @@ def write_table(
         if is_wrong:
             raise click.UsageError(words)
     reading, settings = checked(chosen, kind)
-    excerpt, result = target(asked.output, settings.columns, asked.fields, asked.digits)
+    excerpt = target(asked.output, settings.columns, asked.fields, asked.digits)
     follows = asked.follow or asked.follow_for is not None
     series = [_followed(asked, sources, reading)] if follows else open_series(sources, reading)
     drawing = _Drawing(asked, figures)
@@ -67,7 +67,8 @@ def write_table(
             job = Job(
                 series,
                 settings,
-                result,
+                asked.output,
+                excerpt,
                 sources=sources,
                 reading=reading,
                 resume=resume,
@@ -144,7 +145,7 @@ def _write_or_say(job: Job, excerpt: Excerpt) -> None:
     from scanfab.base.errors import ScanfabError
 
     # asked for now, as a signal comes at any moment
-    as_table = job.result is None and is_readable()
+    as_table = job.output is None and is_readable()
 
     def standing() -> str:
         return _standing(job, as_table)
@@ -153,23 +154,23 @@ def _write_or_say(job: Job, excerpt: Excerpt) -> None:
         with telling(standing):
             _write(job, excerpt, as_table)
     except (ScanfabError, OSError):
-        if job.result is not None and (job.is_over or 0 < job.done < job.frames()):
+        if job.output is not None and (job.is_over or 0 < job.done < job.frames()):
             click.echo(f"scanfab: stopped {standing()}", err=True)
         raise
 
 
 def _standing(job: Job, as_table: bool) -> str:
     """How far a job is, and how to go on."""
-    result = job.result
-    if result is not None and job.done == job.taken_over > 0 and result.path.exists():
-        again = f"{result.path} is as it was; the same command goes on"
+    output = job.output
+    if output is not None and job.done == job.taken_over > 0 and output.exists():
+        again = f"{output} is as it was; the same command goes on"
         return f"before the first new frame was finished: {again}"
     if not job.done:
         return "before the first frame was finished: nothing is kept"
     done = f"after {job.done} of {job.frames()} frames"
     if job.is_over:
         done = "after the last frame, before the table was complete"
-    if result is None:
+    if output is None:
         kept = "nothing is kept" if as_table else "the rows printed so far are all"
         return f"{done}; {kept}: with -o FILE, --resume could go on"
     return f"{done}; the same command{'' if job.resume else ' with --resume'} goes on"
@@ -178,7 +179,7 @@ def _standing(job: Job, as_table: bool) -> str:
 def _write(job: Job, excerpt: Excerpt, as_table: bool) -> None:
     """Write the rows as they come; on a terminal, all of them as a table."""
     with working(job.frames, job.done) as advance:
-        if job.result is not None:
+        if job.output is not None:
             job.write(advance)
             return
         if as_table:

@@ -116,16 +116,22 @@ def compute(
     return Table(compute_rows(source, settings, executor=executor))
 
 
-def compute_rows(
+def compute_rows(source: Source, settings: Settings, **more: Any) -> Iterator[Row]:
+    """The rows of :func:`compute_frames`, one by one."""
+    for rows in compute_frames(source, settings, **more):
+        yield from rows
+
+
+def compute_frames(
     source: Source,
     settings: Settings,
     *,
     done: Container[int] = (),
     observe: Observer | None = None,
     executor: Executor | None = None,
-) -> Iterator[Row]:
+) -> Iterator[list[Row]]:
     """
-    The rows of :func:`compute`, in the order of the frames, each as soon as it may come.
+    The rows of :func:`compute`, those of each frame as soon as they may come, in their order.
 
     Parameters
     ----------
@@ -135,12 +141,18 @@ def compute_rows(
         Leave out these frames, which an earlier run has computed.
     observe : callable, optional
         Called with the :class:`FrameResult` of each frame, where that is computed.
+
+    Yields
+    ------
+    list of Row
+        None are empty: frames that are skipped are left out.
     """
     run = _Run(Frames(source, settings))
     with _pool(settings.workers, executor) as pool:
         for computed in in_order(pool, run.jobs(done, observe), settings.on_error == "skip"):
             run.tell(computed)
-            yield from computed.rows
+            if computed.rows:
+                yield computed.rows
     if not run.has_grains:
         tell([run.frames.without_grains()], run.frames.name)
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,19 +14,19 @@ from typing import Any
 from scanfab.base.errors import ReadError, SettingsError, note
 from scanfab.base.files import check_folder
 from scanfab.io.follow import FollowedSeries
+from scanfab.io.options import parse_frames
 from scanfab.io.series import Series
-from scanfab.pipeline.compute import Observer, compute_rows
+from scanfab.pipeline.compute import Observer, compute_frames
 from scanfab.pipeline.frames import NoChosenFrameError, chosen_frames
+from scanfab.pipeline.part import PartFile
 from scanfab.pipeline.record import (
     FREE,
+    Finished,
     FrameRows,
-    Inputs,
-    Refuse,
-    as_json,
     asked_for,
     check_inputs,
-    default_settings,
-    files_of_rows,
+    differing_settings,
+    input_entry,
     manifest,
     named_files,
     read_finished,
@@ -34,9 +35,10 @@ from scanfab.pipeline.record import (
 )
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.told import Told
+from scanfab.pipeline.values import as_written
 from scanfab.table.formats import read_rows
 from scanfab.table.row import Row
-from scanfab.table.writing import ALL, ResultFile, differing_settings, prepared_table
+from scanfab.table.writing import ALL, Excerpt, check_output, manifest_of, write_rows
 
 
 class Job:
@@ -52,8 +54,10 @@ class Job:
         With names of their own.
     settings : Settings
         Of all of them.
-    result : ResultFile, optional
+    output : Path, optional
         The file of the rows; without it they are to be taken from :meth:`rows`.
+    excerpt : Excerpt, optional
+        Which columns of them are written, and with how many digits.
     sources, reading
         What the series were opened by, for the manifest: as of :func:`asked_for`.
     resume : bool, optional
@@ -72,14 +76,15 @@ class Job:
     Raises
     ------
     SettingsError
-        If two series have one name, or the folder of the manifest does not exist.
+        If two series have one name, or a file cannot be written where it is asked for.
     """
 
     def __init__(
         self,
         series: Sequence[Series],
         settings: Settings,
-        result: ResultFile | None = None,
+        output: Path | None = None,
+        excerpt: Excerpt = ALL,
         *,
         sources: Sequence[str],
         reading: Mapping[str, Any],
@@ -99,31 +104,24 @@ class Job:
                 )
         if manifest_path is not None:
             check_folder(manifest_path)
-        self.series = series
-        self.settings = settings
-        self.result = result
-        self.resume = resume
-        excerpt = ALL if result is None else result.excerpt
-        self.asked = asked_for(sources, reading, settings, excerpt)
-        """The settings that decide the bytes of the result."""
+        if output is not None:
+            check_output(output)
+        self.series, self.settings, self.output, self.resume = series, settings, output, resume
         self.taken_over = 0
         """How many frames earlier runs have finished."""
         self.is_over = False
         """Whether all rows have come: the table is being made of them."""
         self.found_void_fabric = False
         """Whether any row has one."""
+        self._part = None if output is None else PartFile(output)
+        self._asked = asked_for(sources, reading, settings, excerpt)
+        self._excerpt = excerpt
         self._finished: FrameRows = {}
-        self._keeps_table = False
-        """Whether rows of a complete FILE are among them."""
-        self._warnings: list[str] = []
-        """What the user was told of the rows of a complete FILE."""
-        self._more = more or {}
-        self._told = told or Told()
-        self._executor = executor
+        self._before: Mapping[str, Any] = {}
+        """The manifest of the complete FILE whose rows are taken over."""
+        self._manifest_path, self._more = manifest_path, more or {}
+        self._told, self._executor = told or Told(), executor
         self._observers: Sequence[Observer | None] = observers or [None] * len(series)
-        self._inputs = Inputs()
-        files = [] if result is None else [result.manifest]
-        self._manifests = [*files, *([] if manifest_path is None else [manifest_path])]
 
     @property
     def is_good(self) -> bool:
@@ -166,38 +164,22 @@ class Job:
         SettingsError
             If the rows there were made with other settings or of other inputs.
         """
-        with nullcontext() if self.result is None else self.result.alone():
-            if self.resume and self.result is not None:
-                self._take_over(self.result, needed)
+        if self._part is None:
+            yield
+            return
+        with self._part.alone():
+            if self.resume:
+                self._take_over(self._part, needed)
             yield
 
     def rows(self, advance: Callable[[], object] = lambda: None) -> Iterator[Row]:
         """The rows that are computed now; a frame is finished once its rows are taken."""
-        for one, observe in zip(self.series, self._observers, strict=True):
-            done = {frame for source, frame in self._finished if source == one.name}
-            computed = compute_rows(
-                one, self.settings, done=done, observe=observe, executor=self._executor
-            )
-            own: list[Row] = []
-            try:
-                for row in computed:
-                    yield row
-                    own.append(row)
-                    if len(own) == self.settings.rows_per_frame:
-                        self._finish({(row.source, row.frame): own})
-                        own = []
-                        advance()
-            except NoChosenFrameError as none:
-                # of an array of more jobs than frames some have nothing to do
-                note(f"{str(none).removeprefix('frames: ')}: it has no row in this table")
-        self.is_over = True
-        for one in self.series:
-            if isinstance(one, FollowedSeries):
-                one.end()
+        for rows in self._computed(advance):
+            yield from rows
 
     def write(self, advance: Callable[[], object] = lambda: None) -> None:
         """
-        Write the rows to the file as they come; it is complete or untouched.
+        Write the rows to the file as they come, in a block of :meth:`begun`.
 
         Raises
         ------
@@ -206,119 +188,131 @@ class Job:
         OSError
             If the file cannot be written to.
         """
-        result = self.result
-        assert result is not None
-        replaces = not self.resume and result.path.is_file() and result.manifest.is_file()
-        with result.alone():
-            with result.writer(self.asked, self.resume):
-                frame, known = None, set[Path]()
-                for row in self.rows(advance):
-                    if replaces:
-                        note(
-                            f"{result.path}: the table that is there will be replaced at the end "
-                            f"of this run; `resume` would go on with it"
-                        )
-                        replaces = False
-                    if frame != (row.source, row.frame):
-                        frame = row.source, row.frame
-                        result.record(self._new_inputs(row, known))
-                    result.write(row)
-                if replaces and read_rows(result.path):
-                    raise SettingsError(
-                        f"{result.path}: this run has no rows, and the table that is there stays "
-                        f"as it is: choose frames that there are (`frames`), or another file"
-                    )
-            with prepared_table(result.path, self.every_row, result.columns, result.excerpt):
-                self.save_manifests()
-            result.remove_part()
+        output, part, known = self.output, self._part, set[Path]()
+        assert output is not None
+        assert part is not None
+        if not (self.resume and part.frames):
+            part.begin(self._asked)
+        replaces = not self.resume and output.is_file() and manifest_of(output).is_file()
+        for rows in self._computed(advance):
+            if replaces:
+                note(
+                    f"{output}: the table that is there will be replaced at the end of this run; "
+                    f"`resume` would go on with it"
+                )
+                replaces = False
+            part.add(self._new_inputs(rows[0], known), rows)
+        if replaces and read_rows(output):
+            raise SettingsError(
+                f"{output}: this run has no rows, and the table that is there stays as it is: "
+                f"choose frames that there are (`frames`), or another file"
+            )
+        rows = self.every_row
+        write_rows(output, rows, self.settings.columns, self._excerpt, self.save_manifests)
+        part.remove()
 
     def save_manifests(self) -> None:
-        """Write the manifest beside the file, and where it was asked for."""
-        if not self._manifests:
-            return
-        texts = list(dict.fromkeys([*self._warnings, *self._told.warnings]))
-        found = manifest(self.asked, self.series, texts, self._told.notes, self._inputs)
-        outdated = None if self.result is None or self._keeps_table else self.result.path
-        for path in self._manifests:
-            write_manifest(path, {**found, **self._more}, outdated)
+        """Write the manifest where it was asked for, and beside the file."""
+        texts = dict.fromkeys([*map(str, self._before.get("warnings", [])), *self._told.warnings])
+        found = manifest(self._asked, self.series, list(texts), self._told.notes)
+        if self._manifest_path is not None:
+            write_manifest(self._manifest_path, {**found, **self._more})
+        if self.output is not None:
+            outdated = None if self._before else self.output
+            write_manifest(manifest_of(self.output), {**found, **self._more}, outdated)
 
-    def _finish(self, rows: FrameRows, tells: bool = True) -> None:
+    def _computed(self, advance: Callable[[], object]) -> Iterator[list[Row]]:
+        """The rows of each frame that is computed now."""
+        for one, observe in zip(self.series, self._observers, strict=True):
+            done = {frame for source, frame in self._finished if source == one.name}
+            try:
+                for rows in compute_frames(
+                    one, self.settings, done=done, observe=observe, executor=self._executor
+                ):
+                    yield rows
+                    self._finish({(one.name, rows[0].frame): rows})
+                    advance()
+            except NoChosenFrameError as none:
+                # of an array of more jobs than frames some have nothing to do
+                note(f"{str(none).removeprefix('frames: ')}: it has no row in this table")
+        self.is_over = True
+        for one in self.series:
+            if isinstance(one, FollowedSeries):
+                one.end()
+
+    def _finish(self, frames: FrameRows, tells: bool = True) -> None:
         """Add finished frames; without a column that ``tells``, they count as having a fabric."""
-        self._finished |= rows
-        every = [row for some in rows.values() for row in some]
+        self._finished |= frames
+        every = [row for rows in frames.values() for row in rows]
         has_fabric = any((row.alpha_vs, row.alpha_vs_axial) != (None, None) for row in every)
         self.found_void_fabric |= has_fabric or (bool(every) and not tells)
 
     def _new_inputs(self, row: Row, known: set[Path]) -> list[dict[str, Any]]:
         """Size and hash of the files up to the frame of a row that are not ``known`` yet."""
-        strains, surfaces = named_files(self.asked)
-        found = [*strains, *surfaces, *files_of_rows(self.series, row, known)]
+        strains, surfaces = named_files(self._asked)
+        found = [*strains, *surfaces]
+        for one in self.series:
+            if one.name == row.source:
+                found += one.files(row.frame, known)
+                break
+            found += one.files()
         new = [file for file in dict.fromkeys(found) if file not in known]
         known.update(new)
-        return [self._inputs.entry(file) for file in new]
+        return [input_entry(file) for file in new]
 
-    def _take_over(self, result: ResultFile, needed: Iterable[str]) -> None:
+    def _take_over(self, part: PartFile, needed: Iterable[str]) -> None:
         """Take over the frames of a complete FILE, and of FILE.part."""
         # the series as they are now, also those that are followed
         series = [one.as_it_is if isinstance(one, FollowedSeries) else one for one in self.series]
-        if result.path.is_file():
+        if part.output.is_file():
             try:
-                self._take_table(result.path, series, needed)
+                self._take_table(part.output, series, needed)
             except (SettingsError, ReadError):
                 # the run that was interrupted last has left FILE.part, whatever made FILE
-                if not result.has_part:
+                if not part.frames:
                     raise
-        if result.has_part:
-            self._take_part(result, series)
+        if part.frames:
+            frames = self._checked(part.path, part.read(), series)
+            chosen = {one.name: chosen_frames(one, self.settings.frames) for one in series}
+            for source, frame in sorted(frames):
+                if frame not in chosen[source]:
+                    reason = f"it holds frame {frame}, which is not chosen now"
+                    raise _refusal(part.path, reason)
+            self._finish(frames)
         self.taken_over = self.done
 
     def _take_table(self, path: Path, series: Sequence[Series], needed: Iterable[str]) -> None:
-        refuse = _refusal(path)
-        before, rows = read_finished(path, refuse)
-        if differing := differing_settings(before["settings"], self.asked, FREE):
-            raise refuse(f"it was made with other settings ({', '.join(differing)})")
-        found = self._checked(rows, before["inputs"], before["settings"], series, refuse)
-        columns = set(rows[0]) if rows else set()
-        if found and (lacking := [name for name in needed if name not in columns]):
+        found = read_finished(path, partial(_refusal, path))
+        frames = self._checked(path, found, series, FREE)
+        columns = set(found.rows[0]) if found.rows else set()
+        if frames and (lacking := [name for name in needed if name not in columns]):
             raise SettingsError(
                 f"{path}: its rows lack {', '.join(lacking)} (`fields`), which the figure needs: "
                 f"leave out `plot`, or `resume` to compute all frames again"
             )
-        frames = self._joined_frames(path, {frame for _, frame in found}, before, series)
-        self.settings = replace(self.settings, frames=frames)
-        self.asked = {**self.asked, "frames": as_json(frames)}
-        self._warnings = [str(one) for one in before["warnings"]]
-        self._keeps_table = True
-        self._finish(found, tells=bool({"alpha_vs", "alpha_vs_axial"} & columns))
-
-    def _take_part(self, result: ResultFile, series: Sequence[Series]) -> None:
-        refuse = _refusal(result.part)
-        rows, inputs = result.finished_rows(
-            self.asked, self.settings.rows_per_frame, default_settings()
-        )
-        found = self._checked(rows, inputs, self.asked, series, refuse)
-        chosen = {one.name: chosen_frames(one, self.settings.frames) for one in series}
-        for source, frame in sorted(found):
-            if frame not in chosen[source]:
-                raise refuse(f"it holds frame {frame}, which is not chosen now")
-        self._finish(found)
+        joined = self._joined_frames(path, {frame for _, frame in frames}, found.asked, series)
+        self.settings = replace(self.settings, frames=joined)
+        self._asked = {**self._asked, "frames": as_written(joined)}
+        self._before = found.manifest
+        self._finish(frames, tells=bool({"alpha_vs", "alpha_vs_axial"} & columns))
 
     def _checked(
-        self,
-        rows: Sequence[Mapping[str, Any]],
-        inputs: Sequence[Mapping[str, Any]],
-        asked: Mapping[str, Any],
-        series: Sequence[Series],
-        refuse: Refuse,
+        self, path: Path, found: Finished, series: Sequence[Series], free: Sequence[str] = ()
     ) -> FrameRows:
         """The rows of finished frames, if they are those that this run would compute."""
-        found, _ = rows_by_frame(rows, self.settings)
-        others = {source for source, _ in found} - {one.name for one in series}
+        if differing := differing_settings(found.asked, self._asked, free):
+            raise _refusal(path, f"it was made with other settings ({differing})")
+        frames = rows_by_frame(found.rows, self.settings.columns)
+        frames = {
+            k: rows for k, rows in frames.items() if len(rows) == self.settings.rows_per_frame
+        }
+        others = {source for source, _ in frames} - {one.name for one in series}
         if others:
-            raise refuse(f"its source {min(others)} is not named now")
-        if rows:
-            check_inputs(inputs, asked, series, found, refuse)
-        return found
+            raise _refusal(path, f"its source {min(others)} is not named now")
+        if found.rows:
+            refuse = partial(_refusal, path)
+            check_inputs(found.inputs, found.asked, series, frames, refuse)
+        return frames
 
     def _joined_frames(
         self, path: Path, known: set[int], before: Mapping[str, Any], series: Sequence[Series]
@@ -332,13 +326,13 @@ class Job:
             If together they make none: no frame of FILE may be lost.
         """
         chosen, last = self.settings.frames, max(known, default=0)
-        if all(known <= set(_up_to(one, chosen, last)) for one in series):
+        now = {frame for one in series for frame in range(len(one))[chosen]}
+        if known <= now:
             return chosen
-        asked = slice(*(before["settings"].get("frames") or (None,)))
-        more = {frame for one in series for frame in _up_to(one, chosen, last + 1)}
         # frames that were skipped leave no hole
-        skipped = {frame for one in series for frame in _up_to(one, asked, last) if frame < last}
-        every = sorted(known | more | skipped)
+        then = parse_frames(before.get("frames"))
+        skipped = {frame for one in series for frame in range(len(one))[then] if frame < last}
+        every = sorted(known | now | skipped)
         steps = {right - left for left, right in pairwise(every)} or {1}
         if len(steps) > 1:
             raise SettingsError(
@@ -350,17 +344,9 @@ class Job:
         return slice(every[0], stop, None if step == 1 else step)
 
 
-def _up_to(series: Series, frames: slice, last: int) -> list[int]:
-    """The chosen frames; of a slice without an end those up to a number, and at least one."""
-    chosen = chosen_frames(series, frames)
-    if frames.stop is None and (frames.start or 0) >= 0 and (frames.step or 1) > 0:
-        chosen = chosen[: max(len(range(chosen.start, last + 1, chosen.step)), 1)]
-    return list(chosen)
-
-
-def _refusal(path: Path) -> Refuse:
-    """Errors for rows that a run cannot go on with."""
-    return lambda reason: SettingsError(
+def _refusal(path: Path, reason: str) -> SettingsError:
+    """The error for rows that a run cannot go on with."""
+    return SettingsError(
         f"{path}: `resume` cannot go on with it: {reason}: name another `output=FILE`, or leave "
         f"out `resume` to compute all frames again"
     )

@@ -4,35 +4,37 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from scanfab.base.column import Column
 from scanfab.base.errors import ReadError, SettingsError, warn
-from scanfab.base.files import check_folder
 from scanfab.base.spelling import counted
 from scanfab.io.families import PathLike
 from scanfab.io.options import parse_frames
+from scanfab.pipeline.part import is_unfinished, part_of
 from scanfab.pipeline.record import (
     FREE,
     FrameRows,
-    as_json,
+    differing_settings,
     read_finished,
     rows_by_frame,
     write_manifest,
 )
 from scanfab.pipeline.repeat import restored_settings
 from scanfab.pipeline.settings import Settings
-from scanfab.table.formats import format_of
+from scanfab.pipeline.values import as_written
 from scanfab.table.row import Row
 from scanfab.table.table import Table
-from scanfab.table.writing import Excerpt, ResultFile, differing_settings, is_unfinished, part_of
+from scanfab.table.writing import Excerpt, check_output, manifest_of, write_rows
 
 
 class _Part(NamedTuple):
     """The table of one job, and its manifest."""
 
     path: Path
+    asked: Mapping[str, Any]
     manifest: Mapping[str, Any]
     settings: Settings
     rows: FrameRows
@@ -41,46 +43,24 @@ class _Part(NamedTuple):
     counts: dict[str, int]
     """How many frames each series has."""
 
-    @property
-    def asked(self) -> dict[str, Any]:
-        """Its settings as the manifest lists them."""
-        return dict(self.manifest["settings"])
-
     def frames(self, source: str) -> Iterable[int]:
         """The frames of a series that this job was to compute."""
         return range(self.counts.get(source, 0))[self.settings.frames]
 
 
-@dataclass(frozen=True, eq=False)
-class Merged:
+class Merged(NamedTuple):
     """The rows of one table, and how it is written."""
 
     rows: list[Row]
-    settings: Settings
+    columns: list[Column]
+    """Those that all parts have."""
     excerpt: Excerpt
     manifest: dict[str, Any]
-    columns: frozenset[str]
-    """Those that all parts have."""
-
-    @property
-    def table(self) -> Table:
-        """With the columns that were written."""
-        columns = self.excerpt.columns(self.settings.columns)
-        return Table(self.rows, [one for one in columns if one.name in self.columns])
 
     def save(self, output: Path) -> None:
         """Write the table and its manifest; each is complete or untouched."""
-        columns = self.settings.columns
-        result = ResultFile(output, columns, self.excerpt)
-        excerpt = self.excerpt.for_format(format_of(output), columns)
-        lacking = [one.name for one in excerpt.columns(columns) if one.name not in self.columns]
-        if lacking:
-            raise SettingsError(
-                f"{output}: a run would write {', '.join(lacking)} to it, which the format of the "
-                f"parts cannot hold: name an output of theirs, or let the jobs write .jsonl"
-            )
-        result.save(self.rows)
-        write_manifest(result.manifest, self.manifest)
+        write = partial(write_manifest, manifest_of(output), self.manifest)
+        write_rows(output, self.rows, self.columns, self.excerpt, write)
 
 
 def merge_tables(
@@ -135,17 +115,16 @@ def merge_tables(
     named = [parts] if isinstance(parts, str | os.PathLike) else parts
     paths = [Path(one) for one in named]
     if output is not None:
-        check_output(Path(output), paths)
+        check_no_part(Path(output), paths)
     found = merged(paths, parse_frames(frames))
     if output is not None:
         found.save(Path(output))
-    return found.table
+    return Table(found.rows, found.columns)
 
 
-def check_output(output: Path, paths: Sequence[Path]) -> None:
+def check_no_part(output: Path, paths: Sequence[Path]) -> None:
     """SettingsError if the output cannot be written, or would replace a part."""
-    format_of(output)
-    check_folder(output)
+    check_output(output)
     if output.resolve() in [path.resolve() for path in paths]:
         raise SettingsError(f"{output}: is one of the parts: name another `output=FILE`")
 
@@ -157,7 +136,10 @@ def merged(paths: Sequence[Path], frames: slice) -> Merged:
     parts = [_read(path) for path in dict.fromkeys(paths)]
     first = parts[0]
     for part in parts[1:]:
-        _check_like(first, part)
+        if differing := differing_settings(first.asked, part.asked, FREE):
+            raise ReadError(
+                f"{part.path}: was made with other settings ({differing}) than {first.path}"
+            )
     inputs = _joined_inputs(parts)
     series: dict[str, int] = {}
     for part in parts:
@@ -167,17 +149,25 @@ def merged(paths: Sequence[Path], frames: slice) -> Merged:
         for source, count in series.items()
         for row in _rows(source, range(count)[frames], parts)
     ]
-    sources = list(dict.fromkeys(str(one) for part in parts for one in part.asked["sources"]))
-    asked = {**first.asked, "frames": as_json(frames), "sources": sources}
-    told = {
-        name: list(dict.fromkeys(text for part in parts for text in part.manifest[name]))
-        for name in ("warnings", "notes")
+    sources = _each_once(part.asked["sources"] for part in parts)
+    asked = {**first.asked, "frames": as_written(frames), "sources": sources}
+    manifest = {
+        **first.manifest,
+        "settings": asked,
+        "inputs": inputs,
+        "warnings": _each_once(part.manifest["warnings"] for part in parts),
+        "notes": _each_once(part.manifest["notes"] for part in parts),
+        "frames": series,
     }
-    found = {**first.manifest, "settings": asked, "inputs": inputs, **told, "frames": series}
-    excerpt = Excerpt(tuple(asked.get("fields") or ()), asked.get("digits", Excerpt.digits))
-    every = frozenset(one.name for one in first.settings.columns)
-    columns = every.intersection(*(part.columns for part in parts if part.columns is not None))
-    return Merged(rows, first.settings, excerpt, found, columns)
+    fields = asked.get("fields") or [one.name for one in first.settings.columns]
+    has = [part.columns for part in parts if part.columns is not None]
+    fields = [name for name in fields if all(name in columns for columns in has)]
+    excerpt = Excerpt(tuple(fields), asked.get("digits", Excerpt.digits))
+    return Merged(rows, excerpt.columns(first.settings.columns), excerpt, manifest)
+
+
+def _each_once(lists: Iterable[Iterable[Any]]) -> list[str]:
+    return list(dict.fromkeys(str(one) for some in lists for one in some))
 
 
 def _read(path: Path) -> _Part:
@@ -189,40 +179,23 @@ def _read(path: Path) -> _Part:
         )
     if not path.exists():
         raise ReadError(f"{path}: there is no such part: its job has not been run, or has failed")
-    manifest, rows = read_finished(
-        path, lambda reason: ReadError(f"{path}: {reason}: run its job again")
-    )
+    done = read_finished(path, lambda reason: ReadError(f"{path}: {reason}: run its job again"))
     try:
-        settings = restored_settings(manifest["settings"])
+        settings = restored_settings(done.asked)
     except SettingsError as error:
         raise ReadError(f"{path}: {error}") from None
-    found, broken = rows_by_frame(rows, settings)
-    for source, frame, count in broken:
-        raise ReadError(
-            f"{path}: expected {settings.rows_per_frame} rows of frame {frame} of {source}, one "
-            f"after the other, found {count}: run its job again"
-        )
+    found = rows_by_frame(done.rows, settings.columns)
     counts: dict[str, int] = {}
-    for source, frame in found:
+    for (source, frame), rows in found.items():
+        if len(rows) != settings.rows_per_frame:
+            raise ReadError(
+                f"{path}: expected {settings.rows_per_frame} rows of frame {frame} of {source}, "
+                f"found {len(rows)}: run its job again"
+            )
         counts[source] = max(counts.get(source, 0), frame + 1)
-    counts |= manifest.get("frames", {})
-    return _Part(path, manifest, settings, found, frozenset(rows[0]) if rows else None, counts)
-
-
-def _check_like(first: _Part, part: _Part) -> None:
-    """ReadError if two parts are not of one table."""
-    if differing := differing_settings(first.asked, part.asked, FREE):
-        raise ReadError(
-            f"{part.path}: was made with other settings ({', '.join(differing)}) than {first.path}"
-        )
-    shared = [source for source in part.counts if source in first.counts]
-    sources, others = part.asked["sources"], first.asked["sources"]
-    if shared and sources != others:
-        raise ReadError(
-            f"{part.path}: its series {shared[0]} was made of other files than that of "
-            f"{first.path}: {', '.join(map(str, sources[:3]))} in place of "
-            f"{', '.join(map(str, others[:3]))}"
-        )
+    counts |= done.manifest.get("frames", {})
+    columns = frozenset(done.rows[0]) if done.rows else None
+    return _Part(path, done.asked, done.manifest, settings, found, columns, counts)
 
 
 def _joined_inputs(parts: Sequence[_Part]) -> list[Mapping[str, Any]]:
@@ -255,12 +228,11 @@ def _rows(source: str, chosen: range, parts: Sequence[_Part]) -> Iterator[Row]:
 def _check_same(first: _Part, part: _Part, source: str, frame: int) -> None:
     """ReadError if a frame has other values in two parts."""
     for before, now in zip(first.rows[source, frame], part.rows[source, frame], strict=True):
-        for name in before:
-            if before[name] != now[name]:
-                raise ReadError(
-                    f"{part.path}: frame {frame} of {source} is in {first.path} too, with other "
-                    f"values: {name} is {now[name]} here and {before[name]} there"
-                )
+        for name in [name for name in before if before[name] != now[name]]:
+            raise ReadError(
+                f"{part.path}: frame {frame} of {source} is in {first.path} too, with other "
+                f"values: {name} is {now[name]} here and {before[name]} there"
+            )
 
 
 def _check_skipped(source: str, frame: int, parts: Sequence[_Part]) -> None:

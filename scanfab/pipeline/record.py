@@ -1,7 +1,7 @@
 """
 What a table was made of: settings, versions, and the inputs with size and hash.
 
-A manifest says it of FILE, and FILE.manifest.json.part of FILE.part. By it a run that goes on with
+FILE.manifest.json says it of FILE, and FILE.part of its own rows. By it a run that goes on with
 finished rows, or a merge of several tables, tells whether they are what it would compute now.
 """
 
@@ -9,21 +9,21 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import platform
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from functools import cache
 from importlib.metadata import version
-from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+from scanfab.base.column import Column
 from scanfab.base.errors import ReadError, ScanfabError
 from scanfab.base.files import whole_file
 from scanfab.base.option import options_of
 from scanfab.io.series import Series
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.values import SHAPES, STRAIN_MODES, UsualAxis
-from scanfab.scan.directions import DirectionRule
+from scanfab.pipeline.values import SHAPES, STRAIN_MODES, as_written
 from scanfab.table.columns import row_of
 from scanfab.table.formats import read_rows
 from scanfab.table.row import Row
@@ -45,6 +45,18 @@ Refuse = Callable[[str], ScanfabError]
 """The error for rows that cannot be used, made from the reason."""
 
 
+class Finished(NamedTuple):
+    """Rows that are there, and what they were made of."""
+
+    asked: dict[str, Any]
+    """The settings."""
+    inputs: list[dict[str, Any]]
+    """Path, size and hash of files."""
+    rows: list[dict[str, Any]]
+    manifest: dict[str, Any]
+    """Empty where there is none yet."""
+
+
 def asked_for(
     sources: Sequence[str],
     reading: Mapping[str, Any],
@@ -52,7 +64,7 @@ def asked_for(
     excerpt: Excerpt = ALL,
 ) -> dict[str, Any]:
     """
-    The settings that decide the bytes of a result, in the types of JSON.
+    The settings that decide the bytes of a result, as users write them, in the types of JSON.
 
     Parameters
     ----------
@@ -65,36 +77,22 @@ def asked_for(
     excerpt : Excerpt, optional
         Columns and digits of the result.
     """
+    names = [one.name for one in options_of(type(settings)) if one.decides]
+    written = {name: as_written(getattr(settings, name)) for name in names}
+    if settings.directions is not None:
+        written["directions"] = settings.directions.asked_as
     named = {"scanfab": version("scanfab"), "sources": list(sources)}
-    return {**named, **as_json(dict(reading)), **_chosen(settings), **excerpt.asked()}
+    found = {**named, **reading, **written, **excerpt.asked()}
+    return dict(json.loads(json.dumps(found, default=os.fspath)))
 
 
-def default_settings() -> dict[str, Any]:
-    """The defaults, for manifests that are older than a setting and do not name it."""
-    return _chosen(Settings())
-
-
-def _chosen(settings: Settings) -> dict[str, Any]:
-    options = [one.name for one in options_of(type(settings)) if one.decides]
-    return {name: as_json(getattr(settings, name)) for name in options}
-
-
-def as_json(value: Any) -> Any:
-    """A value of a setting in the types of JSON."""
-    if isinstance(value, DirectionRule):
-        return value.asked_as
-    if isinstance(value, UsualAxis):
-        # the grains decide which axis that is
-        return None
-    if isinstance(value, slice):
-        return [value.start, value.stop, value.step]
-    if isinstance(value, dict):
-        return {key: as_json(item) for key, item in value.items()}
-    if isinstance(value, tuple | list):
-        return [as_json(item) for item in value]
-    if hasattr(value, "__dataclass_fields__"):
-        return as_json(asdict(value))
-    return str(value) if isinstance(value, Path) else value
+def differing_settings(
+    before: Mapping[str, Any], asked: Mapping[str, Any], but: Collection[str] = ()
+) -> str:
+    """The names of the settings that differ, ``but`` for some, in alphabetical order."""
+    names = {name for name in (*before, *asked) if before.get(name) != asked.get(name)}
+    names.difference_update(but)
+    return ", ".join(sorted("version of scanfab" if n == "scanfab" else n for n in names))
 
 
 def named_files(asked: Mapping[str, Any]) -> tuple[list[Path], list[Path]]:
@@ -104,22 +102,16 @@ def named_files(asked: Mapping[str, Any]) -> tuple[list[Path], list[Path]]:
     return strains, [] if shape in SHAPES else [Path(shape)]
 
 
-class Inputs:
-    """Size and hash of files; a file is read again only if it has changed."""
+def input_entry(path: Path) -> dict[str, Any]:
+    """Size and hash of a file, as a manifest lists it; it is read again only if it has changed."""
+    found = path.stat()
+    return dict(_entry(path, found.st_size, found.st_mtime_ns))
 
-    def __init__(self) -> None:
-        self._known: dict[Path, tuple[tuple[int, int], dict[str, Any]]] = {}
 
-    def entry(self, path: Path) -> dict[str, Any]:
-        """The entry of a file in a manifest."""
-        found = path.stat()
-        stamp = (found.st_size, found.st_mtime_ns)
-        if path not in self._known or self._known[path][0] != stamp:
-            # a simulation may write more meanwhile
-            digest, _ = _hash(path, found.st_size)
-            entry = {"path": str(path), "size": found.st_size, "sha256": digest}
-            self._known[path] = stamp, entry
-        return self._known[path][1]
+@cache
+def _entry(path: Path, size: int, _changed: int) -> dict[str, Any]:
+    # a simulation may write more meanwhile
+    return {"path": str(path), "size": size, "sha256": _hash(path, size)[0]}
 
 
 def _hash(path: Path, size: int) -> tuple[str, bool]:
@@ -138,7 +130,6 @@ def manifest(
     series: Iterable[Series],
     warnings: Sequence[str] = (),
     notes: Sequence[str] = (),
-    inputs: Inputs | None = None,
 ) -> dict[str, Any]:
     """
     The manifest of a finished result.
@@ -151,10 +142,8 @@ def manifest(
         What was read.
     warnings, notes : sequence of str, optional
         What the user was told.
-    inputs : Inputs, optional
-        Those that have been looked at already.
     """
-    inputs, series = inputs or Inputs(), list(series)
+    series = list(series)
     strains, surfaces = named_files(asked)
     files = {*strains, *surfaces, *(path for one in series for path in one.files())}
     versions = {name: version(name) for name in PACKAGES}
@@ -162,7 +151,7 @@ def manifest(
         "settings": asked,
         "seed": asked["seed"],
         "versions": {"python": platform.python_version(), **versions},
-        "inputs": [inputs.entry(path) for path in sorted(files)],
+        "inputs": [input_entry(path) for path in sorted(files)],
         "warnings": list(warnings),
         "notes": list(notes),
         # of the whole series, so that a merge of parts knows which frames are missing
@@ -199,7 +188,7 @@ def read_manifest(table: Path) -> dict[str, Any] | None:
         return None
     try:
         found = json.loads(path.read_text("utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise ReadError(f"{path}: cannot be read as JSON: {error}") from None
     # the settings are checked where they are used
     kinds = {"settings": dict, "inputs": list, "versions": dict, "warnings": list}
@@ -213,40 +202,24 @@ def read_manifest(table: Path) -> dict[str, Any] | None:
     return found
 
 
-def read_finished(table: Path, refuse: Refuse) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """The manifest of a finished table, with all settings, and its rows."""
+def read_finished(table: Path, refuse: Refuse) -> Finished:
+    """A finished table, with its manifest."""
     found = read_manifest(table)
     if found is None:
         raise refuse(f"there is no {table.name}.manifest.json, which says what made it")
     rows = read_rows(table, whole=True)
     if rows and not {"source", "frame"} <= set(rows[0]):
         raise refuse("it lacks the columns source and frame, which tell its rows apart")
-    settings = {**default_settings(), **found["settings"]}
-    return {"inputs": [], "warnings": [], "notes": [], **found, "settings": settings}, rows
+    found = {"inputs": [], "warnings": [], "notes": [], **found}
+    return Finished(found["settings"], found["inputs"], rows, found)
 
 
-def rows_by_frame(
-    rows: Iterable[Mapping[str, Any]], settings: Settings
-) -> tuple[FrameRows, list[tuple[str, int, int]]]:
-    """
-    The rows of each frame, and which frames lack rows.
-
-    Returns
-    -------
-    dict
-        Rows by source and frame, of frames that have all of their rows.
-    list of tuple
-        Source, frame and number of rows of the others.
-    """
+def rows_by_frame(rows: Iterable[Mapping[str, Any]], columns: Sequence[Column]) -> FrameRows:
+    """The rows of each frame, by its source and number; they may be fewer than a frame has."""
     found: FrameRows = {}
-    broken = []
-    for (source, frame), group in groupby(rows, key=lambda row: (row["source"], row["frame"])):
-        own = [row_of(settings.columns, row) for row in group]
-        if len(own) == settings.rows_per_frame and (source, frame) not in found:
-            found[source, frame] = own
-        else:
-            broken.append((source, frame, len(own)))
-    return found, broken
+    for row in rows:
+        found.setdefault((row["source"], row["frame"]), []).append(row_of(columns, row))
+    return found
 
 
 def check_inputs(
@@ -283,13 +256,10 @@ def check_inputs(
         raise refuse(f"{gone} is not among the files that are read now")
     for one in series:
         _check_frames(one, before, rows, refuse)
-    for file in surfaces:
-        if not _is_same(file, before):
-            raise refuse(f"{file} has changed since")
+    # new lines may name the strain of a frame that had none
     lacks_strain = any(row.strain is None for some in rows.values() for row in some)
-    for file in (*strains, *cells):
-        # new lines may name the strain of a frame that had none
-        may_grow = file in cells or not lacks_strain
+    for file in (*surfaces, *strains, *cells):
+        may_grow = file in cells or (file in strains and not lacks_strain)
         if not _is_same(file, before, may_grow, by_lines=True):
             raise refuse(f"{file} has changed since, in more than new lines at its end")
 
@@ -333,12 +303,3 @@ def _was_skipped(series: Series, step: int | None, rows: FrameRows) -> bool:
     frames = [number for number, frame in enumerate(series) if frame.name_step == step]
     # a broken file counts as one frame: if it has more now, later frames have other numbers
     return len(frames) == 1 and (series.name, frames[0]) not in rows
-
-
-def files_of_rows(series: Sequence[Series], row: Row, known: set[Path]) -> Iterator[Path]:
-    """The files that the rows up to one are made of, but for those that are known already."""
-    for one in series:
-        if one.name == row.source:
-            yield from one.files(row.frame, known)
-            return
-        yield from one.files()

@@ -17,6 +17,9 @@ from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.record import asked_for
 from scanfab.pipeline.settings import Settings
 
+# options that take their numbers one by one
+APART = ("rv_center", "rv_size", "cell")
+
 
 def repeat_command(
     asked: Mapping[str, Any], output: str | None = None, named: Collection[str] = ()
@@ -42,19 +45,30 @@ def repeat_command(
     >>> repeat_command(asked_for(["dumps"], {}, Settings(boundary="type=2", seed=3)))
     'scanfab compute dumps --boundary type=2 --seed 3'
     """
-    settings = MapSettings(slices=1) if is_map(asked) else Settings()
-    reading = {one.name: one.default for one in READING_OPTIONS}
-    usual = spelt_settings(asked_for((), reading, settings))
+    kind = MapSettings(slices=1) if is_map(asked) else Settings()
     # those that make it a map have no usual value
-    usual |= dict.fromkeys(BLOCK_OPTIONS)
+    usual = {
+        **{one.name: one.default for one in READING_OPTIONS},
+        **asked_for((), {}, kind),
+        **dict.fromkeys(BLOCK_OPTIONS),
+    }
     words = ["scanfab", "map" if is_map(asked) else "compute", *map(str, asked["sources"])]
-    for name, value in spelt_settings(asked).items():
-        option = flag_of(name)
-        if usual.get(name) != value or option[2:] in named:
-            words += _words(option, name, value)
+    for name, value in given_settings(asked).items():
+        if usual.get(name) != value or flag_of(name)[2:] in named:
+            words += _words(flag_of(name), name, value)
     if output is not None:
         words += ["-o", output]
     return shlex.join(words)
+
+
+def given_settings(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings of a manifest that say something, as users write them."""
+    says_nothing: tuple[Any, ...] = (None, [], {})
+    return {
+        name: value
+        for name, value in asked.items()
+        if name not in ("scanfab", "sources") and value not in says_nothing
+    }
 
 
 def reopen(asked: Mapping[str, Any]) -> Series:
@@ -72,8 +86,8 @@ def reopen(asked: Mapping[str, Any]) -> Series:
     missing = [source for source in sources if not Path(source).exists()]
     if missing:
         raise ReadError(f"the source {missing[0]} is not there any more")
-    spelt = spelt_settings(asked)
-    return open_sources(sources, **{name: spelt[name] for name in READING if name in spelt})[0]
+    given = given_settings(asked)
+    return open_sources(sources, **{name: given[name] for name in READING if name in given})[0]
 
 
 def restored_settings(asked: Mapping[str, Any]) -> Settings:
@@ -86,67 +100,25 @@ def restored_settings(asked: Mapping[str, Any]) -> Settings:
         If one of them cannot be used any more.
     """
     kind = MapSettings if is_map(asked) else Settings
-    known = kind.__dataclass_fields__
-    spelt = {name: value for name, value in spelt_settings(asked).items() if name in known}
     try:
-        return kind(**spelt)
+        return kind(**{name: asked[name] for name in kind.__dataclass_fields__ if name in asked})
     except (AttributeError, TypeError, ValueError) as error:
         raise SettingsError(f"the settings of the manifest cannot be used: {error}") from None
 
 
-def spelt_settings(asked: Mapping[str, Any]) -> dict[str, Any]:
-    """The settings of a manifest that are not empty, as users write them."""
-    spelt = {}
-    for name, value in asked.items():
-        if name not in ("scanfab", "sources") and value is not None and value != []:
-            try:
-                spelt[name] = _spell(name, value)
-            except (KeyError, IndexError, TypeError, ValueError):
-                raise ReadError(
-                    f"the manifest's setting {name!r} cannot be understood: {value!r}"
-                ) from None
-    return spelt
-
-
-def _spell(name: str, value: Any) -> Any:
-    if name == "frames" and isinstance(value, list):
-        parts = value[:2] if value[2] is None else value
-        return ":".join("" if part is None else str(part) for part in parts)
-    if name == "columns" and not isinstance(value, dict):
-        raise TypeError
-    if name == "axis" and isinstance(value, list):
-        return ",".join(map(shortest, value))
-    if name in ("rv", "grid") and isinstance(value, list):
-        return ",".join(map(shortest, value))
-    if name == "cutoffs" and isinstance(value, list):
-        return ",".join(_length(one) for one in value)
-    if isinstance(value, dict) and {"value", "unit"} <= set(value):
-        return _length(value)
-    if name == "boundary":
-        return tuple(str(rule["text"]) for rule in value)
-    if isinstance(value, list):
-        return tuple(value)
-    return value
-
-
-def _length(value: Mapping[str, Any]) -> str:
-    return f"{shortest(value['value'])}{value['unit']}"
-
-
-def _words(option: str, name: str, value: Any) -> list[str]:
+def _words(flag: str, name: str, value: Any) -> list[str]:
     """An option as words of a command line."""
-    if name == "fields":
-        return [option, ",".join(value)]
-    if name == "columns":
-        return [option, ",".join(f"{key}={column}" for key, column in value.items())]
     if isinstance(value, bool):
-        return [option] if value else []
-    if name == "with_":
-        return [option, ",".join(value)]
-    if name == "boundary":
-        return [word for rule in value for word in (option, rule)]
-    if isinstance(value, tuple):
-        return [option, *map(shortest, value)]
-    # a value that starts with a dash would be taken for an option
+        return [flag] * value
+    if isinstance(value, dict):
+        value = [f"{key}={column}" for key, column in value.items()]
+    if isinstance(value, list):
+        parts = [shortest(one) if isinstance(one, float) else str(one) for one in value]
+        if name == "boundary":
+            return [word for rule in parts for word in (flag, rule)]
+        if name in APART:
+            return [flag, *parts]
+        value = ",".join(parts)
     text = shortest(value) if isinstance(value, float) else str(value)
-    return [f"{option}={text}"] if text.startswith("-") else [option, text]
+    # a value that starts with a dash would be taken for an option
+    return [f"{flag}={text}"] if text.startswith("-") else [flag, text]

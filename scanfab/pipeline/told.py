@@ -46,25 +46,18 @@ def recorded() -> Iterator[Told]:
     with warnings.catch_warnings():
         filters, show = list(warnings.filters), warnings.showwarning
 
-        def hear(
-            message: Warning | str,
-            category: type[Warning],
-            filename: str,
-            lineno: int,
-            *rest: Any,
-            **more: Any,
-        ) -> None:
+        def hear(message: Any, category: type[Warning], file: str, line: int, *rest: Any) -> None:
             is_ours = issubclass(category, ScanfabWarning | ScanfabNote)
             is_known = is_ours and not told.add(category, str(message))
-            action = _action(filters, str(message), category, filename, lineno) if is_ours else ""
-            if action == "error" and isinstance(message, Warning):
+            action = _action(filters, str(message), category, file, line) if is_ours else ""
+            if action == "error":
                 raise message
             if action != "ignore" and not is_known:
-                show(message, category, filename, lineno, *rest, **more)
+                show(message, category, file, line, *rest)
 
         for kind in (ScanfabWarning, ScanfabNote):
             warnings.simplefilter("always", kind)
-        warnings.showwarning = hear
+        warnings.showwarning = hear  # type: ignore[assignment]
         yield told
 
 

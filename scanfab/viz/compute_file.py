@@ -21,7 +21,7 @@ from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.told import recorded
 from scanfab.table.table import Table, load
-from scanfab.table.writing import Excerpt, ResultFile
+from scanfab.table.writing import Excerpt
 from scanfab.viz.paraview import vtk_folders
 
 Source = Series | PathLike
@@ -120,7 +120,8 @@ def compute_file(
         job = Job(
             series,
             settings,
-            ResultFile(Path(output), settings.columns, excerpt),
+            Path(output),
+            excerpt,
             sources=sources,
             reading=reading,
             resume=resume,

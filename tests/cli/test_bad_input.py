@@ -21,7 +21,7 @@ import pytest
 
 from scanfab.base import plugins
 from scanfab.io import reader
-from scanfab.table.writing import ResultFile
+from scanfab.pipeline.part import PartFile
 from tests.helpers.dumps import (
     PAIRS,
     cubic_rows,
@@ -337,14 +337,11 @@ def test_what_nobody_may_read_or_write(tmp_path, compute, monkeypatch, where, na
 
 def test_a_full_disk_leaves_the_old_result(tmp_path, compute, monkeypatch):
     file, output = grains(tmp_path), write(tmp_path / "table.csv", "precious")
-    write_row = ResultFile.write
 
-    def full(writer, row):
-        if row["variant"] == "c":
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        write_row(writer, row)
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(ResultFile, "write", full)
+    monkeypatch.setattr(PartFile, "add", full)
     answer = compute(file, "-o", output, code=1)
     assert os.strerror(errno.ENOSPC) in answer.err
     assert output.read_text() == "precious"

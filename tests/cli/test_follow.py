@@ -123,7 +123,7 @@ def process(folder):
 
 def wait_for_rows(frames: int) -> None:
     part, end = Path("t.csv.part"), time.monotonic() + 60
-    while not part.exists() or part.read_text().count("\n") < 4 * frames:
+    while not part.exists() or part.read_text().count("\n") <= frames:
         assert time.monotonic() < end
         time.sleep(0.05)
 
@@ -176,7 +176,7 @@ def test_a_broken_file_stops_it_or_is_skipped(folder, finished, capsys):
     assert follow(seconds=0.5) == 1
     said = capsys.readouterr().err
     assert f"dumps/{files[1].name}" in said
-    assert Path("t.csv.part").read_text().count("\n") == 4
+    assert Path("t.csv.part").read_text().count("\n") == 2
     Path("t.csv.part").unlink()
     assert follow("--on-error", "skip", seconds=0.5) == 1
     assert Path("t.csv").read_bytes() == finished_run("--on-error", "skip")

@@ -92,14 +92,16 @@ def test_a_part_without_rows_and_half_a_file_are_removed(tmp_path, rows):
         tmp_path,
         f"""
 from pathlib import Path
-from scanfab.table.columns import COLUMNS, complete_row, table_columns
+from scanfab.table.columns import COLUMNS, complete_row
 from scanfab.base.files import whole_file
-from scanfab.table.writing import ResultFile
+from scanfab.pipeline.part import PartFile
 
 def run(args):
-    with ResultFile(Path("table.csv"), table_columns()).writer({{}}) as writer:
+    part = PartFile(Path("table.csv"))
+    with part.alone():
+        part.begin({{}})
         for _ in range({rows}):
-            writer.write(complete_row(dict.fromkeys(COLUMNS)))
+            part.add([], [complete_row(dict.fromkeys(COLUMNS))])
         with whole_file(Path("figure.png")) as part:
             part.write_text("half")
             os.kill(os.getpid(), signal.SIGTERM)
@@ -108,7 +110,7 @@ def run(args):
     )
     assert answer.returncode == 143, answer.stderr
     left = {path.name for path in tmp_path.iterdir()}
-    assert left == ({"table.csv.part", "table.csv.manifest.json.part"} if rows else set())
+    assert left == ({"table.csv.part"} if rows else set())
 
 
 def test_the_process_hears_signals_before_anything_large_is_imported():

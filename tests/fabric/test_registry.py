@@ -10,7 +10,7 @@ from scanfab import Column, ScanfabError, ScanfabWarning
 from scanfab.table import columns
 from scanfab.table.columns import COLUMNS, complete_row, table_columns
 from scanfab.table.formats import OWN_FORMATS, read_rows
-from scanfab.table.writing import ResultFile
+from scanfab.table.writing import write_rows
 from tests.helpers.lattices import simple_cubic
 from tests.helpers.plugins import offer
 
@@ -61,7 +61,7 @@ def test_its_columns_are_computed_and_stand_behind_the_own_ones():
 def test_its_columns_are_written_and_read_back(tmp_path, suffix):
     path = tmp_path / f"t{suffix}"
     values = dict.fromkeys(COLUMNS) | {"frame": 0, "c_fourth": 0.5, "vs_longest": None}
-    ResultFile(path, table_columns()).save([complete_row(values)])
+    write_rows(path, [complete_row(values)], table_columns())
     (row,) = read_rows(path)
     assert row == values
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -39,6 +40,10 @@ def interrupted_at_row(monkeypatch: pytest.MonkeyPatch, number: int) -> Iterator
     with monkeypatch.context() as patch:
         patch.setattr(Excerpt, "of", interrupted)
         yield rows
+    # an interrupted process ends without its threads; in this one they go on for a while
+    for thread in threading.enumerate():
+        if thread is not threading.current_thread() and not thread.daemon:
+            thread.join()
 
 
 def write_series(folder: Path, frames: int = FRAMES) -> Path:

@@ -66,13 +66,6 @@ def test_what_is_usual_is_not_repeated():
     assert repeat_command(json.loads(json.dumps(asked))) == "scanfab compute dumps"
 
 
-def test_settings_that_an_older_manifest_does_not_know_have_their_defaults():
-    asked = json.loads(json.dumps(asked_for(["d"], {}, Settings(seed=3))))
-    del asked["rattlers"]
-    assert restored_settings(asked) == Settings(seed=3)
-    assert repeat_command(asked) == "scanfab compute d --seed 3"
-
-
 def test_settings_come_back():
     settings = Settings(
         boundary=["type=2", "id>=9"], cutoff="0.3rmax", frames="1:9:2", axis="x", workers=1

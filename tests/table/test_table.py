@@ -18,7 +18,7 @@ from scanfab.table.compare import compare_tables
 from scanfab.table.formats import OWN_FORMATS
 from scanfab.table.row import Row
 from scanfab.table.table import Table, load
-from scanfab.table.writing import ResultFile
+from scanfab.table.writing import write_rows
 
 # the columns that scripts rely on
 FIXED = """
@@ -163,7 +163,7 @@ def test_a_table_compares_itself(results):
 def test_a_saved_table_has_the_bytes_of_the_command_line_and_is_loaded_again(
     results, tmp_path, suffix
 ):
-    ResultFile(tmp_path / f"by_command{suffix}", table_columns()).save(results)
+    write_rows(tmp_path / f"by_command{suffix}", results, table_columns())
     path = tmp_path / f"saved{suffix}"
     results.save(path)
     assert path.read_bytes() == (tmp_path / f"by_command{suffix}").read_bytes()
@@ -234,9 +234,8 @@ def test_a_foreign_format_is_like_the_own_ones_and_takes_no_files_from_them(
     path = tmp_path / "t.rows"
     results.save(path)
     assert path.read_text().startswith("rows:\n{'source': 'dumps'")
-    result = ResultFile(tmp_path / "by_command.rows", table_columns())
-    result.save(results)
-    assert result.path.read_bytes() == path.read_bytes()
+    write_rows(tmp_path / "by_command.rows", results, table_columns())
+    assert (tmp_path / "by_command.rows").read_bytes() == path.read_bytes()
     # told by its content, whatever it is called
     assert load(path.rename(tmp_path / "table")) == results
     with pytest.raises(SettingsError, match=r"can be written as .*\.parquet, .rows, not as .xls"):

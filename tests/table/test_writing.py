@@ -2,45 +2,24 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import io
 import math
-import os
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scanfab.base.errors import ReadError, SettingsError
+from scanfab.base.errors import SettingsError
 from scanfab.table.columns import COLUMNS, table_columns
 from scanfab.table.formats import OWN_FORMATS, read_rows
-from scanfab.table.row import Row
 from scanfab.table.table import Table, load
-from scanfab.table.writing import ALL, Excerpt, ResultFile, write_to
+from scanfab.table.writing import Excerpt, check_output, write_rows, write_to
 from tests.table.test_table import a_row
 
 DIGITS = (0, 18, "x", 2.5)
 every_format = pytest.mark.parametrize("suffix", [one.suffix for one in OWN_FORMATS])
-
-
-def result_of(path, excerpt=ALL):
-    return ResultFile(path, table_columns(), excerpt)
-
-
-@pytest.fixture
-def result(tmp_path):
-    return result_of(tmp_path / "t.csv")
-
-
-def interrupt(result, asked, rows):
-    """Write rows, and stop before the file is complete."""
-    with contextlib.suppress(KeyboardInterrupt), result.writer(asked) as writer:
-        for row in rows:
-            writer.write(row)
-        raise KeyboardInterrupt
 
 
 @given(
@@ -69,70 +48,25 @@ def test_the_header_and_each_row_are_written_as_the_rows_come(tmp_path):
     assert (lines[0], len(lines)) == (",".join(COLUMNS), 4)
 
 
-def test_rows_that_are_all_there_replace_the_old_file_and_its_manifest(result):
-    result.path.write_text("old")
-    result.manifest.write_text("of the old file")
-    result.save([a_row(frame=0), a_row(frame=1)])
-    assert load(result.path)["frame"].tolist() == [0, 1]
-    assert list(result.path.parent.iterdir()) == [result.path]
+def test_a_table_replaces_the_old_one_and_its_manifest(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text("old")
+    (tmp_path / "t.csv.manifest.json").write_text("of the old file")
+    with pytest.raises(ZeroDivisionError):
+        write_rows(path, (a_row(frame=1 // k) for k in (1, 0)), table_columns())
+    assert path.read_text() == "old"
+    write_rows(path, [a_row(frame=0), a_row(frame=1)], table_columns())
+    assert load(path)["frame"].tolist() == [0, 1]
+    assert list(tmp_path.iterdir()) == [path]
     # lines end alike everywhere
-    assert b"\r" not in result.path.read_bytes()
-
-
-def test_an_error_leaves_the_old_file_and_keeps_the_part(result):
-    result.path.write_text("old")
-    interrupt(result, {}, [a_row()])
-    assert result.path.read_text() == "old"
-    assert read_rows(result.part) == [dict(a_row())]
+    assert b"\r" not in path.read_bytes()
 
 
 @pytest.mark.parametrize("name", ["t.docx", "t", "t.csv.gz", ".csv", "nowhere/t.csv"])
 def test_what_cannot_be_written_is_refused_before_anything_is(tmp_path, name):
     with pytest.raises(SettingsError, match=r"can be written as .csv|there is no folder .*nowhere"):
-        result_of(tmp_path / name)
+        check_output(tmp_path / name)
     assert list(tmp_path.iterdir()) == []
-
-
-@every_format
-def test_finished_frames_are_kept_and_a_half_one_is_cut_off(tmp_path, suffix):
-    # an ending may be in capitals
-    result = result_of(tmp_path / f"t{suffix.upper()}")
-    rows = [a_row(frame=k // 2, strain=-1e-300, step=10**12, alpha_vs=k / 3) for k in range(6)]
-    asked = {"seed": 0}
-    interrupt(result, asked, rows[:5])
-    with open(result.part, "a") as stream:
-        stream.write("half a li")
-    done, _ = result.finished_rows(asked, 2)
-    assert [Row(**row) for row in done] == rows[:4]
-    with result.writer(asked, resume=True) as writer:
-        for row in rows[4:]:
-            writer.write(row)
-    assert [Row(**row) for row in read_rows(result.part)] == rows
-
-
-def test_a_part_of_other_settings_or_no_json_lines_is_refused(result):
-    interrupt(result, {"seed": 0, "rv": 0.7}, [a_row()])
-    with pytest.raises(SettingsError, match=r"made with other settings \(seed\)"):
-        result.finished_rows({"seed": 1, "rv": 0.7}, 1)
-    result.part.write_text("source,frame\na,0\n")
-    with pytest.raises(ReadError, match=r"t\.csv\.part: cannot be read as JSON"):
-        result.finished_rows({"seed": 0, "rv": 0.7}, 1)
-
-
-def test_rows_of_other_settings_are_gone_before_the_new_settings_stand(result, monkeypatch):
-    """A process may be killed between the two."""
-    interrupt(result, {"seed": 0}, [a_row()])
-    replace = os.replace
-
-    def killed(source, target):
-        if Path(target).name == "t.csv.manifest.json.part":
-            raise KeyboardInterrupt
-        replace(source, target)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "replace", killed)
-        interrupt(result, {"seed": 1}, [a_row()])
-    assert not result.has_part
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False), st.integers(1, 17))
@@ -153,7 +87,7 @@ def test_columns_come_in_the_order_in_which_they_are_named(tmp_path, suffix):
     path = tmp_path / f"t{suffix}"
     excerpt = Excerpt.make(table_columns(), "alpha_vs, frame,variant", 2)
     assert Excerpt.make(table_columns(), ["alpha_vs", "frame", "variant"], 2) == excerpt
-    result_of(path, excerpt).save([a_row(alpha_vs=0.125, frame=3, variant="c")])
+    write_rows(path, [a_row(alpha_vs=0.125, frame=3, variant="c")], table_columns(), excerpt)
     (row,) = read_rows(path)
     assert list(row.items()) == [("alpha_vs", 0.12), ("frame", 3), ("variant", "c")]
 

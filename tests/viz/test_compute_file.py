@@ -12,7 +12,6 @@ import pytest
 import scanfab
 from scanfab.base.errors import SettingsError, SkippedFrameWarning
 from scanfab.cli.main import run
-from tests.cli.test_resume import _wait_for_frames_under_way
 from tests.helpers.dumps import write
 from tests.helpers.interruptions import interrupted_at_row, write_series
 
@@ -97,7 +96,6 @@ def test_each_goes_on_with_what_the_other_has_left(
                 from_python(output, short_series, **excerpt)
         else:
             assert commanded(output, *words, sources=(short_series,)) == 130
-    _wait_for_frames_under_way()
     assert Path(f"{output}.part").stat().st_size > 0
     computed = []
     if begins == "Python":

@@ -9,7 +9,7 @@ from typing import Any
 
 from scanfab.base.option import flag_of
 from scanfab.pipeline.options import MEANINGS
-from scanfab.pipeline.repeat import spelt_settings
+from scanfab.pipeline.repeat import given_settings
 from scanfab.table.curves import STRAINS, is_turned, spelt_strain, strain_column
 from scanfab.table.row import Row as TableRow
 from scanfab.table.row import number_of, numbers_of, total_error, variant_of
@@ -271,11 +271,11 @@ def input_table(manifest: Mapping[str, Any]) -> Part:
 
 def settings_table(asked: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """Name, value and meaning of each setting of a manifest."""
-    spelt = spelt_settings(asked)
+    given = given_settings(asked)
     return [
         (
             flag_of(name)[2:],
-            _plain(spelt.get(name, "auto" if name in ("spacing", "directions") else "-")),
+            _plain(given.get(name, "auto" if name in ("spacing", "directions") else "-")),
             MEANINGS.get(name, ""),
         )
         for name in asked
@@ -284,7 +284,7 @@ def settings_table(asked: Mapping[str, Any]) -> list[tuple[str, str, str]]:
 
 
 def _plain(value: Any) -> str:
-    if isinstance(value, tuple):
+    if isinstance(value, list):
         return ", ".join(map(str, value))
     if isinstance(value, dict):
         return ", ".join(f"{key}={item}" for key, item in value.items())
