@@ -38,10 +38,10 @@ if TYPE_CHECKING:
     from scanfab.pipeline.calibration import Calibration, calibrate
     from scanfab.pipeline.cluster import dask_executor
     from scanfab.pipeline.compute import compute
+    from scanfab.pipeline.frames import samples
     from scanfab.pipeline.maps.fabric_map import fabric_map
     from scanfab.pipeline.measurement import solids_of
     from scanfab.pipeline.merge import merge_tables
-    from scanfab.pipeline.samples import samples
     from scanfab.pipeline.settings import Settings
     from scanfab.scan.directions import DirectionRule, direction_rule
     from scanfab.scan.scan import ScanSums, scan_lines
@@ -109,7 +109,7 @@ _HOME = {
     "read": "io.sources",
     "read_rows": "table.formats",
     "read_series": "io.sources",
-    "samples": "pipeline.samples",
+    "samples": "pipeline.frames",
     "scan_frames": "viz.scanned_frames",
     "scan_lines": "scan.scan",
     "solids_of": "pipeline.measurement",

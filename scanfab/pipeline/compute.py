@@ -21,10 +21,11 @@ from scanfab.io.frame import Frame
 from scanfab.packing.cell import Cell
 from scanfab.packing.escaped import ESCAPED
 from scanfab.packing.groupings import Grouping, Groupings, grouping_of
+from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.cluster import DaskExecutor, DeadWorkersError
 from scanfab.pipeline.frame import FrameResult, compute_frame
-from scanfab.pipeline.frames import Frames, Readable, Source
+from scanfab.pipeline.frames import Frames, Source
 from scanfab.pipeline.plan import Plan, make_plan, plan_without_grains
 from scanfab.pipeline.settings import MAX_CHORDS, Settings
 from scanfab.pipeline.strain import Flips
@@ -176,7 +177,7 @@ class _Computed:
 class _FrameJob:
     """One frame to be computed, here or in another process."""
 
-    frame: Sample | Readable
+    frame: Sample | Packing | Frame
     plan: Plan
     number: int
     source: str
@@ -249,7 +250,7 @@ class _Run:
                 yield None
                 continue
             number, frame = due
-            known = self.frames.sample_if_read(number, frame)
+            known = self.frames.ready.pop(number, frame)
             if number not in done and known is not None:
                 file = frame if isinstance(frame, Frame) else None
                 yield _FrameJob(known, plan, number, self.frames.name, observe, file)
@@ -326,42 +327,30 @@ def in_order(
         A frame that cannot be computed is told, in place of an error.
     """
     waiting: deque[tuple[_FrameJob, Future[_Computed]]] = deque()
+    ready: list[_Computed] = []
     over: Exception | None = None
-    ready: _Computed | None = None
     try:
         while waiting or ready or over is None:
-            fresh, over = ([], over) if over else _taken(jobs, pool.room() - len(waiting))
+            fresh: list[_FrameJob] = []
+            room = pool.room() - len(waiting)
+            try:
+                while not over and len(fresh) < room and (job := next(jobs)) is not None:
+                    fresh.append(job)
+            except Exception as error:
+                over = error
             threads = max(pool.threads // max(len(waiting) + len(fresh), 1), 1)
             waiting.extend((job, pool.executor.submit(job, threads)) for job in fresh)
             # the next jobs are begun before this, as whoever takes a result may be slow
-            if ready is not None:
-                yield ready
-                ready = None
+            yield from ready
+            ready.clear()
             if waiting and (waiting[0][1].done() or over or len(waiting) >= pool.room()):
-                try:
-                    ready = _result(*waiting.popleft(), skips)
-                except Exception:
-                    # where the jobs have failed, this error has the same cause
-                    if over is not None and not isinstance(over, StopIteration):
-                        raise over from None
-                    raise
+                ready.append(_result(*waiting.popleft(), skips))
         if not isinstance(over, StopIteration):
             raise over
     finally:
         # the executor may go on for others
         for _, future in waiting:
             future.cancel()
-
-
-def _taken(jobs: Iterator[_FrameJob | None], room: int) -> tuple[list[_FrameJob], Exception | None]:
-    """Jobs that are there, up to some number, and what ended them: StopIteration, or an error."""
-    fresh: list[_FrameJob] = []
-    try:
-        while len(fresh) < room and (job := next(jobs)) is not None:
-            fresh.append(job)
-    except Exception as error:
-        return fresh, error
-    return fresh, None
 
 
 def _result(job: _FrameJob, future: Future[_Computed], skips: bool) -> _Computed:

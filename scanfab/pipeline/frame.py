@@ -11,11 +11,11 @@ from typing import Any
 from scanfab.base.errors import Note, PackingError, joined
 from scanfab.base.spelling import spelt_apart
 from scanfab.fabric.state import VOLUMETRIC_STRAIN
+from scanfab.io.frame import Frame
 from scanfab.io.series import other_space
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample
-from scanfab.pipeline.frames import Readable
 from scanfab.pipeline.maps.rows import map_rows
 from scanfab.pipeline.measurement import Measurement, measure
 from scanfab.pipeline.plan import Plan
@@ -59,7 +59,7 @@ class FrameResult:
 
 
 def compute_frame(
-    frame: Packing | Sample | Readable, plan: Plan, *, number: int = 0, source: str = ""
+    frame: Packing | Sample | Frame, plan: Plan, *, number: int = 0, source: str = ""
 ) -> FrameResult:
     """
     Compute one frame of a series; frames do not depend on one another.
@@ -153,7 +153,7 @@ def _empty_rows(known: Mapping[str, Any], plan: Plan) -> Iterator[Row]:
                 yield complete_row({**empty, "variant": variant, **own}, plan.more_columns)
 
 
-def as_sample(frame: Packing | Sample | Readable, plan: Plan) -> Sample:
+def as_sample(frame: Packing | Sample | Frame, plan: Plan) -> Sample:
     """A frame, read if it is not yet, and told apart."""
     if isinstance(frame, Sample):
         return frame

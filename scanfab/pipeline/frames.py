@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
-from scanfab.base.errors import (
-    SKIPPED,
-    Note,
-    PackingError,
-    ReadError,
-    SettingsError,
-    tell,
-)
+from scanfab.base.errors import SKIPPED, Note, PackingError, ReadError, SettingsError, tell
 from scanfab.io.follow import FollowedSeries
-from scanfab.io.reader import Carries
+from scanfab.io.frame import Frame
 from scanfab.io.series import ENDLESS, Series
 from scanfab.packing.boundary import enclosing_class, existing_values
 from scanfab.packing.doubts import cell_doubt, doubts_of
@@ -27,36 +20,13 @@ from scanfab.packing.sample import Sample, SampleRule
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import as_written
 
+Unread = Frame | Packing
 Source = Packing | Series | Iterable[Packing]
 """One frame, a series that is read frame by frame, or packings from anywhere."""
 
 
 class NoChosenFrameError(SettingsError):
     """The series has frames, but none of those that were chosen."""
-
-
-class Readable(Protocol):
-    """A frame of a series, or a packing in its place."""
-
-    @property
-    def carries(self) -> Carries: ...
-
-    @property
-    def named(self) -> Mapping[str, bool]: ...
-
-    def read(self) -> Packing: ...
-
-
-@dataclass(frozen=True)
-class _Given:
-    """A packing made of arrays, whose maker knows its cell."""
-
-    packing: Packing
-    carries: Carries = "cell"
-    named: Mapping[str, bool] = field(default_factory=dict)
-
-    def read(self) -> Packing:
-        return self.packing
 
 
 class _Stream:
@@ -66,17 +36,17 @@ class _Stream:
 
     def __init__(self, packings: Iterable[Packing]) -> None:
         self._coming = iter(packings)
-        self._kept: deque[_Given] = deque()
+        self._kept: deque[Packing] = deque()
         self._number_taken = 0
 
-    def __iter__(self) -> Iterator[_Given]:
+    def __iter__(self) -> Iterator[Packing]:
         """Those that are not taken yet; what has come is kept until it is taken."""
         number = 0
         while number < len(self._kept) or self._kept_another():
             yield self._kept[number]
             number += 1
 
-    def taken(self) -> Iterator[_Given]:
+    def taken(self) -> Iterator[Packing]:
         """Each for the last time, so that no more of them are in memory than need be."""
         while self._kept or self._kept_another():
             self._number_taken += 1
@@ -91,7 +61,7 @@ class _Stream:
         for packing in self._coming:
             if not isinstance(packing, Packing):
                 raise SettingsError(f"expected packings, found {packing!r} among them")
-            self._kept.append(_Given(packing))
+            self._kept.append(packing)
             return True
         return False
 
@@ -131,25 +101,24 @@ class Frames:
         else:
             self.source, self.settings = _Stream(source), settings
         if isinstance(self.source, FollowedSeries):
-            self._refuse_from_end()
+            bounds = (self.settings.frames.start, self.settings.frames.stop)
+            if any((bound or 0) < 0 for bound in (*bounds, self.settings.frames.step)):
+                raise SettingsError(
+                    f"frames: {as_written(self.settings.frames)} counts from the end of the "
+                    f"series, which nobody knows while it is followed: count from its start, as in "
+                    f"10: or ::5"
+                )
         self.name = self.source.name
         self.particles = 0
         """Of the frames that were read on the way to the first that has grains."""
-        self._ready: dict[int, Sample | None] = {}
-
-    def _refuse_from_end(self) -> None:
-        frames = self.settings.frames
-        if any((bound or 0) < 0 for bound in (frames.start, frames.stop, frames.step)):
-            raise SettingsError(
-                f"frames: {as_written(frames)} counts from the end of the series, which nobody "
-                f"knows while it is followed: count from its start, as in 10: or ::5"
-            )
+        self.ready: dict[int, Sample | None] = {}
+        """Chosen frames that were read on that way; None for damaged ones."""
 
     def __repr__(self) -> str:
         source, chosen = self.source, as_written(self.settings.frames)
         return f"Frames {chosen} of {source!r}"
 
-    def __iter__(self) -> Iterator[tuple[int, Readable]]:
+    def __iter__(self) -> Iterator[tuple[int, Unread]]:
         """All frames with their numbers, not read."""
         return enumerate(self.source)
 
@@ -158,7 +127,7 @@ class Frames:
         """The numbers of the chosen frames; there may be fewer."""
         return chosen_frames(self.source, self.settings.frames)
 
-    def due(self) -> Iterator[tuple[int, Readable]]:
+    def due(self) -> Iterator[tuple[int, Unread]]:
         """
         The chosen frames with their numbers, not read; the last time that frames are gone through.
 
@@ -169,39 +138,36 @@ class Frames:
         """
         return (one for one in self.as_they_come() if one is not None)
 
-    def as_they_come(self) -> Iterator[tuple[int, Readable] | None]:
+    def as_they_come(self) -> Iterator[tuple[int, Unread] | None]:
         """The same of a series that is followed, with None where the next is not there yet."""
+        every: Iterable[Unread | None] = self.source
+        if isinstance(self.source, _Stream):
+            every = self.source.taken()
+        elif isinstance(self.source, FollowedSeries):
+            every = self.source.as_they_come()
         # where they are counted from the end, that comes first
         chosen, found, number = self.chosen, False, 0
-        for frame in self._last_time():
+        for frame in every:
             if frame is None:
                 yield None
                 continue
             if number in chosen:
                 found = True
                 yield number, frame
-            if number >= chosen.stop - 1:
-                break
             number += 1
+            if number >= chosen.stop:
+                break
         if not found:
             raise self.no_such_frames()
 
-    def _last_time(self) -> Iterable[Readable | None]:
-        """All frames, for the last time."""
-        if isinstance(self.source, _Stream):
-            return self.source.taken()
-        if isinstance(self.source, FollowedSeries):
-            return self.source.as_they_come()
-        return self.source
-
-    def one(self) -> tuple[int, Readable]:
+    def one(self) -> tuple[int, Unread]:
         """The first chosen frame; SettingsError if there is none."""
         for number, frame in self:
             if number in self.chosen:
                 return number, frame
         raise self.no_such_frames()
 
-    def first(self) -> tuple[int, Readable, Sample] | None:
+    def first(self) -> tuple[int, Unread, Sample] | None:
         """
         The first frame that has grains, of all; None without any.
 
@@ -213,7 +179,7 @@ class Frames:
         for number, frame in self:
             sample = self.sample(number, frame)
             if number in self.chosen:
-                self._ready[number] = sample
+                self.ready[number] = sample
             if sample is None:
                 continue
             self.particles += len(sample.packing)
@@ -222,10 +188,10 @@ class Frames:
                 return number, frame, sample
         return None
 
-    def sample(self, number: int, frame: Readable) -> Sample | None:
+    def sample(self, number: int, frame: Unread) -> Sample | None:
         """A frame told apart; None if it is damaged and such frames are passed over."""
-        if number in self._ready:
-            return self._ready.pop(number)
+        if number in self.ready:
+            return self.ready.pop(number)
         try:
             return self.read(frame)
         except (PackingError, ReadError) as error:
@@ -234,14 +200,14 @@ class Frames:
             tell([Note(SKIPPED, str(error))], f"frame {number}")
             return None
 
-    def sample_if_read(self, number: int, frame: Readable) -> Sample | Readable | None:
-        """What :meth:`sample` gives, of a frame that has been read; else the frame itself."""
-        return self._ready.pop(number, frame)
-
-    def notes(self, frame: Readable, sample: Sample) -> list[Note]:
+    def notes(self, frame: Unread, sample: Sample) -> list[Note]:
         """What looks wrong in a frame before anything is measured."""
-        notes = doubts_of(sample, **frame.named)
-        if no_cell := cell_doubt(sample, frame.carries):
+        if isinstance(frame, Packing):
+            # whoever makes a packing of arrays knows its cell
+            notes, no_cell = doubts_of(sample), cell_doubt(sample, "cell")
+        else:
+            notes, no_cell = doubts_of(sample, **frame.named), cell_doubt(sample, frame.carries)
+        if no_cell:
             notes.append(Note("no_cell", no_cell))
         if not self.settings.boundary:
             notes += boundary_hints(sample, self.settings)
@@ -256,9 +222,10 @@ class Frames:
             )
         return Note("no_grains", "no frame has any grains")
 
-    def read(self, frame: Readable) -> Sample:
+    def read(self, frame: Unread) -> Sample:
         """A frame told apart, by its contacts and the boundary; raises if it is damaged."""
-        return sample_rule(self.settings).sample(frame.read())
+        packing = frame if isinstance(frame, Packing) else frame.read()
+        return sample_rule(self.settings).sample(packing)
 
     def check_boundary(self, first: Sample) -> list[Note]:
         """
@@ -271,7 +238,7 @@ class Frames:
         missing = [rule for rule in rules if not rule.select(first.packing).any()]
         for _, frame in self if missing else ():
             with suppress(PackingError, ReadError, SettingsError):
-                packing = frame.read()
+                packing = frame if isinstance(frame, Packing) else frame.read()
                 missing = [rule for rule in missing if not rule.select(packing).any()]
             if not missing:
                 break
@@ -311,18 +278,14 @@ def sample_rule(settings: Settings) -> SampleRule:
 
 def chosen_frames(source: Iterable[Any], frames: slice) -> range:
     """The frames to compute, in the order of the source."""
-    chosen = _numbers(source, frames)
-    return chosen if chosen.step > 0 else chosen[::-1]
-
-
-def _numbers(source: Iterable[Any], frames: slice) -> range:
     if isinstance(source, Series):
-        return source.numbers_of(frames)
-    bounds = (frames.start, frames.stop, frames.step)
-    if any(bound is not None and bound < 0 for bound in bounds):
-        return range(sum(1 for _ in source))[frames]
-    # without counting the frames first: they may still come
-    return range(ENDLESS)[frames]
+        chosen = source.numbers_of(frames)
+    elif any((bound or 0) < 0 for bound in (frames.start, frames.stop, frames.step)):
+        chosen = range(sum(1 for _ in source))[frames]
+    else:
+        # without counting the frames first: they may still come
+        chosen = range(ENDLESS)[frames]
+    return chosen if chosen.step > 0 else chosen[::-1]
 
 
 def of_whole(series: Series, settings: Settings) -> tuple[Series, Settings]:
@@ -355,3 +318,44 @@ def boundary_hints(sample: Sample, settings: Settings) -> list[Note]:
         f'name them: `boundary="{expression}"`'
     )
     return [Note("unnamed_boundary", text)]
+
+
+def samples(source: Source, **options: Any) -> Iterator[tuple[int, Sample]]:
+    """
+    The chosen frames as samples, one in memory at a time, as :func:`scanfab.compute` sees them.
+
+    Parameters
+    ----------
+    source : Packing, Series or iterable of Packing
+        One frame, or many.
+    **options
+        Those of :func:`scanfab.compute`, of which ``boundary``, ``min_contacts``,
+        ``rattlers``, ``min_force``, ``contact_tolerance``, ``frames`` and ``on_error`` count.
+
+    Yields
+    ------
+    number : int
+        Of the frame in the series, from 0.
+    sample : Sample
+        Its particles, told apart; contacts that no file lists are found by geometry.
+
+    Raises
+    ------
+    ScanfabError
+        If a frame cannot be read (with ``on_error="skip"`` it is passed over), or if there is none.
+    TypeError
+        If there is no such option; names the nearest that there is.
+
+    Examples
+    --------
+    >>> import scanfab
+    >>> series = scanfab.read_series("sample_data/liggghts_periodic")
+    >>> for number, sample in scanfab.samples(series[:2]):
+    ...     print(number, sample)
+    0 Sample: 800 grains, 60 rattlers (fewer than 2 contacts)
+    1 Sample: 800 grains, 54 rattlers (fewer than 2 contacts)
+    """
+    # what is wrong with an option is told at once, not with the first frame
+    frames = Frames(source, Settings(**options))
+    found = ((number, frames.sample(number, frame)) for number, frame in frames.due())
+    return ((number, sample) for number, sample in found if sample is not None)
