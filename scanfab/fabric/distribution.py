@@ -76,17 +76,12 @@ def fit_even(
     2.0
     """
     root = np.sqrt(weights / weights.sum())
-    degree = HIGHEST_DEGREE
-    while degree and not _is_covered(axes, root, degree, space):
-        degree -= 2
-    matrix = _basis(axes, degree, space) * root[:, None]
+    for degree in range(HIGHEST_DEGREE, -1, -2):
+        matrix = _basis(axes, degree, space) * root[:, None]
+        # whether the axes are enough, and even enough
+        if len(matrix) >= matrix.shape[1] and np.linalg.cond(matrix) < WORST_COVERAGE:
+            break
     return EvenFunction(degree, np.linalg.lstsq(matrix, values * root, rcond=None)[0], space)
-
-
-def _is_covered(axes: FloatArray, root: FloatArray, degree: int, space: Space) -> bool:
-    """Whether the axes are enough, and even enough, for a fit of this degree."""
-    matrix = _basis(axes, degree, space) * root[:, None]
-    return len(matrix) >= matrix.shape[1] and bool(np.linalg.cond(matrix) < WORST_COVERAGE)
 
 
 def mean_length_function(

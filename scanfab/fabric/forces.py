@@ -22,7 +22,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.column import numbers
 from scanfab.base.space import SPACE, Space
@@ -51,9 +50,9 @@ class DirectionalMean(NamedTuple):
 
 
 def directional_mean(
-    normals: npt.ArrayLike,
-    size: npt.ArrayLike,
-    axis: npt.ArrayLike,
+    normals: FloatArray,
+    size: FloatArray,
+    axis: FloatArray,
     space: Space = SPACE,
     across: FloatArray | None = None,
 ) -> DirectionalMean | None:
@@ -62,11 +61,11 @@ def directional_mean(
 
     Parameters
     ----------
-    normals : array_like, shape (M, 3)
+    normals : ndarray, shape (M, 3)
         Unit normals n, from the first grain to the second.
-    size : array_like, shape (M,)
+    size : ndarray, shape (M,)
         Branch lengths, or normal forces (compression positive), v.
-    axis : array_like, shape (3,)
+    axis : ndarray, shape (3,)
         Loading axis, a unit vector.
     space : Space, optional
         The plane in which they lie, if the grains are discs.
@@ -88,32 +87,28 @@ def directional_mean(
     --------
     >>> import numpy as np
     >>> from scanfab.fabric.forces import directional_mean
-    >>> round(directional_mean(np.eye(3), [1.0, 1.0, 2.0], [0, 0, 1]).axial, 9)
+    >>> round(directional_mean(np.eye(3), np.array([1.0, 1, 2]), np.eye(3)[2]).axial, 9)
     1.875
     """
-    n, a = np.asarray(normals, dtype=np.float64), np.asarray(axis, dtype=np.float64)
-    sizes, dimension = np.asarray(size, dtype=np.float64), float(space.dimension)
+    n, count, dimension = normals, len(normals), float(space.dimension)
     weights = _weights(n, space)
-    if weights is None:
+    scale = 0.0 if weights is None else float(weights @ size) / count
+    if weights is None or scale <= 0.0:
         return None
-    count = len(n)
-    scale = float(weights @ sizes) / count
-    if scale <= 0.0:
-        return None
-    vectors, factor = sizes[:, None] * n, space.second_order
+    vectors, factor = size[:, None] * n, space.second_order
     if across is not None:
         vectors, factor = across, 4.0 if space.is_plane else 5.0
     product = (weights[:, None] * vectors).T @ n / count
     product = 0.5 * (product + product.T)
     matrix = factor / scale * (product - np.trace(product) / dimension * space.identity)
     # 3/2 a·T·a of a tensor without trace: its value along the axis less that across it; 2 a·T·a
-    along = (vectors @ a) * (n @ a) - np.einsum("ci,ci->c", vectors, n) / dimension
+    along = (vectors @ axis) * (n @ axis) - np.einsum("ci,ci->c", vectors, n) / dimension
     less = dimension / (dimension - 1.0)
     ratio = float(weights @ along) / count / scale
     # By how much each contact moves the mean, times their number. A contact counts in the mean, and
     # moves C, and so the weights of all: without this second part the error would be several times
     # too large.
-    values = along - ratio * sizes
+    values = along - ratio * size
     through = space.second_order * ((weights**2 * values)[:, None] * n).T @ n / count
     error = error_of_mean(weights * values - np.einsum("ci,ij,cj->c", n, through, n))
     return DirectionalMean(
@@ -139,12 +134,13 @@ TENSORS = {
     "gc_weak": "the fabric tensor of the other contacts, trace 1",
 }
 AXIAL = {
-    "bn": "anisotropy of branch lengths, 3/2 a·bn·a, of discs 2 a·bn·a",
-    "fn": "anisotropy of normal forces, 3/2 a·fn·a, of discs 2 a·fn·a",
-    "ft": "anisotropy of tangential forces, 3/2 a·ft·a, of discs 2 a·ft·a",
-    "gc_strong": "anisotropy of the strong contacts",
-    "gc_weak": "anisotropy of the weak contacts",
+    "bn": "branch lengths, 3/2 a·bn·a, of discs 2 a·bn·a",
+    "fn": "normal forces, 3/2 a·fn·a, of discs 2 a·fn·a",
+    "ft": "tangential forces, 3/2 a·ft·a, of discs 2 a·ft·a",
+    "gc_strong": "the strong contacts",
+    "gc_weak": "the weak contacts",
 }
+ERROR = "its standard error if contacts were independent"
 
 
 class Forces:
@@ -152,21 +148,17 @@ class Forces:
 
     columns = (
         *numbers(
-            {
-                f"{name}_{one}": f"{one} of {what}"
-                for name, what in TENSORS.items()
-                for one in COMPONENTS
-            }
+            {f"{name}_{k}": f"{k} of {TENSORS[name]}" for name in TENSORS for k in COMPONENTS}
         ),
-        *numbers(
-            {
-                f"alpha_{name}_axial{suffix}": meaning
-                for name, what in AXIAL.items()
-                for suffix, meaning in (
-                    ("", f"{what}, signed, along the loading axis"),
-                    ("_se", "its standard error if contacts were independent"),
-                )
-            }
+        *(
+            column
+            for name, what in AXIAL.items()
+            for column in numbers(
+                {
+                    f"alpha_{name}_axial": f"anisotropy of {what}, signed, along the loading axis",
+                    f"alpha_{name}_axial_se": ERROR,
+                }
+            )
         ),
     )
 
@@ -204,17 +196,17 @@ class Forces:
 
 def doubts_of_forces(measured: Measured) -> dict[str, str]:
     """Why some of these columns are empty, or 0, by the code of a note."""
-    forces = measured.forces
-    if forces is None or not len(measured.normals):
-        return {}
-    texts = {}
-    normal = forces.force_n
-    if _weights(measured.normals, measured.space) is None:
+    forces, normals = measured.forces, measured.normals
+    texts: dict[str, str] = {}
+    if forces is None or not len(normals):
+        return texts
+    size = np.abs(forces.force_n)
+    if _weights(normals, measured.space) is None:
         texts["few_contacts"] = (
             "the contacts are so few, or so anisotropic, that 1 + n·C·n is not above 0 in "
             "some direction: bn, fn and ft are empty"
         )
-    elif normal.sum() <= 0.0:
+    elif forces.force_n.sum() <= 0.0:
         texts["tension"] = (
             "the contacts pull in the mean, so fn and ft are empty: is the force in the dump "
             "that on the other grain?"
@@ -224,8 +216,7 @@ def doubts_of_forces(measured: Measured) -> dict[str, str]:
             "the dump has the normal part of the contact forces only: ft is empty"
         )
     elif (
-        np.abs(forces.force - normal[:, None] * measured.normals).max()
-        <= NO_FRICTION * np.abs(normal).mean()
+        np.abs(forces.force - forces.force_n[:, None] * normals).max() <= NO_FRICTION * size.mean()
     ):
         # all forces are along the normals, but for the digits of the dump
         texts["no_tangential"] = (

@@ -13,7 +13,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.column import Column, numbers
 from scanfab.base.space import SPACE, Space
@@ -26,7 +25,7 @@ ORDERS = (2, 4)
 FOURTH = "Σ w ℓ nnnn / Σ w ℓ: 81 numbers, the last index counts fastest; in JSON only"
 
 
-def harmonic(order: int, cosine: npt.ArrayLike, space: Space = SPACE) -> FloatArray:
+def harmonic(order: int, cosine: FloatArray, space: Space = SPACE) -> FloatArray:
     """
     What a_l has the mean of: the Legendre polynomial P_l, of discs cos lθ.
 
@@ -34,7 +33,7 @@ def harmonic(order: int, cosine: npt.ArrayLike, space: Space = SPACE) -> FloatAr
     ----------
     order : int
         l, 2 or 4.
-    cosine : array_like
+    cosine : ndarray
         Of the angle to the axis.
     space : Space, optional
         The plane in which the directions lie, if they do.
@@ -46,30 +45,29 @@ def harmonic(order: int, cosine: npt.ArrayLike, space: Space = SPACE) -> FloatAr
 
     Examples
     --------
+    >>> import numpy as np
     >>> from scanfab.base.space import Space
     >>> from scanfab.fabric.harmonics import harmonic
-    >>> float(harmonic(2, 0.0)), float(harmonic(2, 0.0, Space(2)))
-    (-0.5, -1.0)
+    >>> harmonic(2, np.zeros(1)), harmonic(2, np.zeros(1), Space(2))
+    (array([-0.5]), array([-1.]))
     """
-    square = np.asarray(cosine, dtype=np.float64) ** 2
+    square = cosine**2
     # P_2, in a plane cos 2θ
-    second = np.asarray(space.axial(square))
-    if order == 2:
-        return second
-    if space.is_plane:
+    second: FloatArray = space.axial(square)
+    if order == 4 and space.is_plane:
         return 2.0 * second**2 - 1.0
-    return np.asarray((35.0 * square**2 - 30.0 * square + 3.0) / 8.0)
+    return second if order == 2 else (35.0 * square**2 - 30.0 * square + 3.0) / 8.0
 
 
-def tensor4(vectors: npt.ArrayLike, weights: npt.ArrayLike) -> FloatArray:
+def tensor4(vectors: FloatArray, weights: FloatArray) -> FloatArray:
     """
     The weighted mean of n⊗n⊗n⊗n.
 
     Parameters
     ----------
-    vectors : array_like, shape (M, 3)
+    vectors : ndarray, shape (M, 3)
         Unit vectors.
-    weights : array_like, shape (M,)
+    weights : ndarray, shape (M,)
         Of any sum.
 
     Returns
@@ -84,14 +82,14 @@ def tensor4(vectors: npt.ArrayLike, weights: npt.ArrayLike) -> FloatArray:
 
     Examples
     --------
+    >>> import numpy as np
     >>> from scanfab.fabric.harmonics import tensor4
-    >>> tensor4([[0, 0, 1], [1, 0, 0]], [1, 1])[2, 2, 2, 2]
+    >>> tensor4(np.eye(3)[1:], np.ones(2))[2, 2, 2, 2]
     np.float64(0.5)
     """
-    n, w = np.asarray(vectors, dtype=np.float64), np.asarray(weights, dtype=np.float64)
-    pairs = np.einsum("ci,cj->cij", n, n).reshape(len(n), 9)
-    found: FloatArray = ((w[:, None] * pairs).T @ pairs / w.sum()).reshape(3, 3, 3, 3)
-    return found
+    pairs = np.einsum("ci,cj->cij", vectors, vectors).reshape(-1, 9)
+    found: FloatArray = (weights[:, None] * pairs).T @ pairs / weights.sum()
+    return found.reshape(3, 3, 3, 3)
 
 
 class Harmonics:

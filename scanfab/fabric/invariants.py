@@ -20,7 +20,7 @@ from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.errors import error_of_mean
 from scanfab.fabric.measured import Measured
-from scanfab.fabric.tensor import FabricTensor
+from scanfab.fabric.tensor import FABRICS, FabricTensor, of_both
 
 # By dimension: components of a tensor's deviator, and the variance of each of n⊗n, of a unit vector
 # n that has any direction alike.
@@ -99,42 +99,36 @@ def intensity(matrix: FloatArray, space: Space = SPACE) -> float:
     return float(math.sqrt(space.intensity) * np.linalg.norm(fabric_deviator(matrix, space)))
 
 
-FABRICS = {"vs": "void fabric", "c": "contact fabric"}
-PRINCIPAL = {1: "the largest", 2: "the middle one", 3: "the smallest"}
 ERRORS = {"vs": "of the scan", "c": "if contacts were independent"}
 BIAS = {"vs": "the noise of this scan", "c": "as many independent contacts"}
 DISCS = "of discs √(1/2 F:F), F = 4 (G - I/2)"
-NO_B = "empty where G1 - G3 is below 3/√N, and of discs"
 
 
 class Invariants:
     """The columns of the invariants."""
 
-    columns = numbers(
-        {
-            **{
-                f"f_{one}": f"a = √(3/2 F:F) of the {what}, F = 15/2 (G - I/3); {DISCS}"
-                for one, what in FABRICS.items()
-            },
-            **{
-                f"f_{one}_bias": f"what {what} would give f_{one} in the mean"
-                for one, what in BIAS.items()
-            },
-            **{
+    columns = (
+        *of_both("f_{0}", f"a = √(3/2 F:F) of the {{1}}, F = 15/2 (G - I/3); {DISCS}"),
+        *of_both("f_{0}_bias", "what {1} would give f_{0} in the mean", BIAS),
+        *numbers(
+            {
                 f"g{one}_{k}": f"principal value of the {what}, {which}"
                 for one, what in FABRICS.items()
-                for k, which in PRINCIPAL.items()
-            },
-            **{
-                f"b_{one}": f"(G2 - G3)/(G1 - G3) of the {what}, 0 to 1; {NO_B}"
-                for one, what in FABRICS.items()
-            },
-            **{
+                for k, which in ((1, "the largest"), (2, "the middle one"), (3, "the smallest"))
+            }
+        ),
+        *of_both(
+            "b_{0}",
+            "(G2 - G3)/(G1 - G3) of the {1}, 0 to 1; empty where G1 - G3 is below 3/√N, and of "
+            "discs",
+        ),
+        *numbers(
+            {
                 f"{name}_se": f"standard error of {name}, {what}"
                 for one, what in ERRORS.items()
-                for name in (f"f_{one}", *(f"g{one}_{k}" for k in PRINCIPAL))
-            },
-        }
+                for name in (f"f_{one}", *(f"g{one}_{k}" for k in (1, 2, 3)))
+            }
+        ),
     )
 
     def values(self, measured: Measured) -> dict[str, Any]:

@@ -10,7 +10,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray, IntArray
@@ -56,18 +55,18 @@ class Jackknife(NamedTuple):
 
 
 def contact_jackknife(
-    normals: npt.ArrayLike, blocks: npt.ArrayLike, axis: npt.ArrayLike, space: Space = SPACE
+    normals: FloatArray, blocks: IntArray, axis: FloatArray, space: Space = SPACE
 ) -> Jackknife | None:
     """
     The contact fabric's axial anisotropy without the contacts of each block.
 
     Parameters
     ----------
-    normals : array_like, shape (M, 3)
+    normals : ndarray, shape (M, 3)
         Unit normals.
-    blocks : array_like of int, shape (M,)
+    blocks : ndarray of int, shape (M,)
         The block of each contact's point, from 0.
-    axis : array_like, shape (3,)
+    axis : ndarray, shape (3,)
         Loading axis, a unit vector.
     space : Space, optional
         The plane in which they lie, if the grains are discs.
@@ -77,19 +76,16 @@ def contact_jackknife(
     Jackknife or None
         None if one block holds all contacts.
     """
-    along = space.axial((np.asarray(normals, dtype=np.float64) @ np.asarray(axis)) ** 2)
-    places, count = np.asarray(blocks, dtype=np.int64), 2**space.dimension
-    number = np.bincount(places, minlength=count)
+    along, count = space.axial((normals @ axis) ** 2), 2**space.dimension
+    number = np.bincount(blocks, minlength=count)
     if np.any(number == len(along)):
         return None
-    rest = (along.sum() - np.bincount(places, along, minlength=count)) / (len(along) - number)
+    rest = (along.sum() - np.bincount(blocks, along, count)) / (len(along) - number)
     error = math.sqrt(jackknife_variance(rest))
     return Jackknife(rest - along.mean(), error, np.zeros(count))
 
 
-def void_jackknife(
-    sums: BlockedSums, axis: npt.ArrayLike, space: Space = SPACE
-) -> Jackknife | None:
+def void_jackknife(sums: BlockedSums, axis: FloatArray, space: Space = SPACE) -> Jackknife | None:
     """
     The void fabric's axial anisotropy without the segments of each block.
 
@@ -97,7 +93,7 @@ def void_jackknife(
     ----------
     sums : BlockedSums
         Of a scan.
-    axis : array_like, shape (3,)
+    axis : ndarray, shape (3,)
         Loading axis, a unit vector.
     space : Space, optional
         The plane in which all lies, if the grains are discs.

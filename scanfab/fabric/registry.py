@@ -9,7 +9,7 @@ which it may replace.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
 from scanfab.base.column import Column
@@ -68,14 +68,14 @@ def load_fabrics(taken: Iterable[str]) -> dict[str, Fabric]:
     offers = load_plugins(GROUP, "fabric", lambda one: _fabric(one, names))
     owners: dict[str, str] = {}
     for name, offer in offers.items():
-        who = f"{name!r} of {offer.package}"
         for column in offer.plugin.columns:
-            if column.name in owners:
+            who = f"{name!r} of {offer.package}"
+            other = owners.setdefault(column.name, who)
+            if other != who:
                 raise ScanfabError(
-                    f"two fabrics have a column called {column.name!r}: {owners[column.name]} and "
-                    f"{who}; remove one of them"
+                    f"two fabrics have a column called {column.name!r}: {other} and {who}; remove "
+                    f"one of them"
                 )
-            owners[column.name] = who
     return {name: offer.plugin for name, offer in offers.items()}
 
 
@@ -99,36 +99,21 @@ def checked_values(name: str, fabric: Fabric, measured: Measured) -> dict[str, A
     ScanfabError
         If it fails, lacks a value, or gives one that its column cannot hold.
     """
+    columns = {column.name: column for column in fabric.columns}
     try:
         found = dict(fabric.values(measured))
-    except ScanfabError:
-        raise
+        if found.keys() != columns.keys():
+            raise ValueError(f"expected a value for each of {[*columns]}, found {found}")
+        return {key: _value(column, found[key]) for key, column in columns.items()}
     except Exception as error:  # a foreign package may fail in any way
-        raise ScanfabError(
-            f"the fabric {name!r} failed: {type(error).__name__}: {error}"
-        ) from error
-    columns = {column.name: column for column in fabric.columns}
-    for wrong in sorted(found.keys() ^ columns.keys(), key=str):
-        problem = "gives no value for its" if wrong in columns else "gives a value for an unknown"
-        raise ScanfabError(
-            f"the fabric {name!r} {problem} column {wrong!r}: expected one for each of "
-            f"{', '.join(columns)}, None where there is none"
-        )
-    return {key: _value(name, column, found) for key, column in columns.items()}
+        raise ScanfabError(f"the fabric {name!r}: {type(error).__name__}: {error}") from error
 
 
-def _value(name: str, column: Column, found: Mapping[str, Any]) -> Any:
+def _value(column: Column, value: Any) -> Any:
     """A value as its column holds it."""
-    value = found[column.name]
-    try:
-        if value is None or (column.kind is not str and not math.isfinite(value)):
-            return None
-        kept = column.kind(value)
-        if kept != value:
-            raise ValueError
-    except (TypeError, ValueError):
-        raise ScanfabError(
-            f"the fabric {name!r}: column {column.name!r}: expected {column.kind.__name__} or "
-            f"None, found {value!r}"
-        ) from None
+    if value is None or (column.kind is not str and not math.isfinite(value)):
+        return None
+    kept = column.kind(value)
+    if kept != value:
+        raise ValueError(f"{column.name}: expected {column.kind.__name__} or None, found {value!r}")
     return kept

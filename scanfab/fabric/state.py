@@ -13,25 +13,24 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.column import Column, numbers
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.errors import error_of_mean
 from scanfab.fabric.invariants import fabric_deviator
-from scanfab.fabric.measured import Measured
-from scanfab.fabric.tensor import COMPONENTS, FabricTensor
+from scanfab.fabric.measured import Measured, SampleState
+from scanfab.fabric.tensor import COMPONENTS, FabricTensor, of_both
 
 
-def love_weber(force: npt.ArrayLike, branch: npt.ArrayLike, volume: float) -> FloatArray:
+def love_weber(force: FloatArray, branch: FloatArray, volume: float) -> FloatArray:
     """
     The mean stress of a volume: (1/V) Σ f⊗b, made symmetric, compression positive.
 
     Parameters
     ----------
-    force : array_like, shape (M, 3)
+    force : ndarray, shape (M, 3)
         On one grain of each contact.
-    branch : array_like, shape (M, 3)
+    branch : ndarray, shape (M, 3)
         From the other grain's place to that one's; the part of it that lies in the volume.
     volume : float
         Of the grains and the voids.
@@ -49,12 +48,13 @@ def love_weber(force: npt.ArrayLike, branch: npt.ArrayLike, volume: float) -> Fl
 
     Examples
     --------
+    >>> import numpy as np
     >>> from scanfab.fabric.state import love_weber
-    >>> love_weber([[2.0, 0, 0]], [[1.5, 0, 0]], 10.0)[0, 0]
+    >>> love_weber(np.array([[2.0, 0, 0]]), np.array([[1.5, 0, 0]]), 10.0)[0, 0]
     np.float64(0.3)
     """
-    product = np.asarray(force, np.float64).T @ np.asarray(branch, np.float64) / volume
-    return np.asarray(0.5 * (product + product.T))
+    product: FloatArray = force.T @ branch / volume
+    return 0.5 * (product + product.T)
 
 
 # the unit of stresses: force over length squared, as the dump has them
@@ -66,11 +66,11 @@ VOLUMETRIC_STRAIN = Column(
     "of a cell that repeats along all its vectors, since the first frame: -ln(V/V0), positive in "
     "compression; else empty",
 )
-FABRICS = {"vs": "void fabric", "c": "contact fabric"}
-NO_DIRECTION = "empty for √(3/2 s:s) < 0.02 p"
 WITH_TWO = "mean number of contacts of the grains that have two or more"
-DIRECTION = "direction of the stress deviator s"
-ANGLE = "angle between the major axes of"
+NO_DIRECTION = "empty for √(3/2 s:s) < 0.02 p"
+DIRECTION = f"of the stress deviator s; {NO_DIRECTION}"
+ANGLE = "angle between the major axes of {1} and stress, 0 to 90"
+ERRORS = {"vs": "the scan", "c": "contacts, if they were independent"}
 
 
 class State:
@@ -88,25 +88,9 @@ class State:
         ),
         VOLUMETRIC_STRAIN,
         *numbers({"coordination_mechanical": WITH_TWO}),
-        *numbers(
-            {
-                f"acst_{one}": f"A = F:n of the {what} and the {DIRECTION}; {NO_DIRECTION}"
-                for one, what in FABRICS.items()
-            }
-        ),
-        *numbers(
-            {
-                f"angle_{one}_stress": f"{ANGLE} {what} and stress, 0 to 90; {NO_DIRECTION}"
-                for one, what in FABRICS.items()
-            },
-            "degrees",
-        ),
-        *numbers(
-            {
-                "acst_vs_se": "standard error of acst_vs, of the scan",
-                "acst_c_se": "standard error of acst_c, of contacts, if they were independent",
-            }
-        ),
+        *of_both("acst_{0}", f"A = F:n of the {{1}} and the direction {DIRECTION}"),
+        *of_both("angle_{0}_stress", f"{ANGLE}; {NO_DIRECTION}", unit="degrees"),
+        *of_both("acst_{0}_se", "standard error of acst_{0}, of {1}", ERRORS),
     )
 
     def values(self, measured: Measured) -> dict[str, Any]:
@@ -118,34 +102,32 @@ class State:
             return found
         found["void_ratio"] = state.void_ratio
         found["coordination_mechanical"] = state.coordination_mechanical
-        if state.stress is None:
-            return found
-        along = float(measured.axis @ state.stress @ measured.axis)
-        less = state.space.dimension / (state.space.dimension - 1.0)
-        found |= {f"stress_{one}": float(state.stress[at]) for one, at in COMPONENTS.items()}
-        found |= {"p": state.mean_stress, "q": less * (along - state.mean_stress)}
-        if state.direction is not None:
-            found |= _against_stress(measured, state.stress, state.direction)
-        return found
+        if state.stress is not None:
+            along = float(measured.axis @ state.stress @ measured.axis)
+            less = state.space.dimension / (state.space.dimension - 1.0)
+            found |= {f"stress_{one}": float(state.stress[at]) for one, at in COMPONENTS.items()}
+            found |= {"p": state.mean_stress, "q": less * (along - state.mean_stress)}
+        return found | _against_stress(measured, state)
 
 
-def _against_stress(
-    measured: Measured, stress: FloatArray, direction: FloatArray
-) -> dict[str, float | None]:
-    """How both fabrics stand to the stress and the direction of its deviator."""
-    space, n = measured.space, measured.normals
-    along = FabricTensor(stress / np.trace(stress), space)
-    fabrics: dict[str, tuple[FabricTensor, FloatArray]] = {}
+def _against_stress(measured: Measured, state: SampleState) -> dict[str, float | None]:
+    """How both fabrics stand to the stress and the direction of its deviator; if it has one."""
+    space, n, along = state.space, measured.normals, state.direction
+    if state.stress is None or along is None:
+        return {}
+    # of what each tensor is the mean of, the value of F:n
+    fabrics = []
     if measured.void is not None:
         tensors = fabric_deviator(measured.void.replicates, space)
-        each = np.einsum("rij,ij->r", tensors, direction)
-        fabrics["vs"] = measured.void.tensor, each
+        each = np.einsum("rij,ij->r", tensors, along)
+        fabrics.append(("vs", measured.void.tensor, each))
     if measured.contact is not None:
-        each = space.second_order * np.einsum("ci,ij,cj->c", n, direction, n)
-        fabrics["c"] = measured.contact, each
+        each = space.second_order * np.einsum("ci,ij,cj->c", n, along, n)
+        fabrics.append(("c", measured.contact, each))
     found: dict[str, float | None] = {}
-    for name, (fabric, each) in fabrics.items():
-        found[f"acst_{name}"] = float(np.sum(fabric_deviator(fabric.matrix, space) * direction))
-        found[f"angle_{name}_stress"] = fabric.angle_to(along)
+    stress = FabricTensor(state.stress / np.trace(state.stress), space)
+    for name, fabric, each in fabrics:
+        found[f"acst_{name}"] = float(np.sum(fabric_deviator(fabric.matrix, space) * along))
+        found[f"angle_{name}_stress"] = fabric.angle_to(stress)
         found[f"acst_{name}_se"] = error_of_mean(each)
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,6 +14,7 @@ from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray
 
+FABRICS = {"vs": "void fabric", "c": "contact fabric"}
 COMPONENTS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
 
@@ -174,6 +176,23 @@ class FabricTensor:
         dict of str to float
         """
         return {name: float(self.matrix[place]) for name, place in COMPONENTS.items()}
+
+
+def of_both(
+    name: str, meaning: str, of: Mapping[str, str] = FABRICS, unit: str = ""
+) -> tuple[Column, ...]:
+    """
+    A column of the void fabric and one of the contact fabric.
+
+    Braces in name and meaning are filled: {0} with ``vs`` or ``c``, {1} with what stands for it.
+
+    Examples
+    --------
+    >>> from scanfab.fabric.tensor import of_both
+    >>> [(one.name, one.meaning) for one in of_both("f_{0}", "a of the {1}")]
+    [('f_vs', 'a of the void fabric'), ('f_c', 'a of the contact fabric')]
+    """
+    return numbers({name.format(*one): meaning.format(*one) for one in of.items()}, unit)
 
 
 def tensor_columns(name: str, what: str) -> tuple[Column, ...]:

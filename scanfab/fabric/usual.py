@@ -10,7 +10,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.fabric.contact import axial_error
 from scanfab.fabric.jackknife import BLOCKS
 from scanfab.fabric.measured import Measured
-from scanfab.fabric.tensor import tensor_columns, tensor_values
+from scanfab.fabric.tensor import FABRICS, of_both, tensor_columns, tensor_values
 
 ORDER = (
     " (-x, -y, -z; x counts fastest; for an oblique loading axis the octants are turned so that "
@@ -21,6 +21,7 @@ FROM_SCAN = "its standard error from the scan, by the scatter of the replicates"
 VOID, CONTACT = "alpha_vs_axial", "alpha_c_axial"
 INDEPENDENT = "if contacts were independent; too large by about half in relaxed dense packings"
 SCATTER = "by a jackknife over eight octants, in a plane four quadrants"
+ANGLE = "angle between the major axes of void and contact fabric, 0 to 90"
 HALF = "half their difference, which tells compare the scan's noise in a slope"
 
 
@@ -63,11 +64,8 @@ class Scatter:
     """The columns of the sample's own scatter: its error, and each anisotropy without a block."""
 
     columns = (
-        *numbers(
-            {
-                f"{one}_sample_se": f"the sample's own scatter of {one}, {SCATTER}"
-                for one in (VOID, CONTACT)
-            }
+        *of_both(
+            "alpha_{0}_axial_sample_se", f"the sample's own scatter of alpha_{{0}}_axial, {SCATTER}"
         ),
         *numbers(
             {
@@ -125,14 +123,11 @@ class Orientation:
             {
                 f"g{one}_axis_{k}": f"{k} of the direction of the {what}'s largest principal "
                 "value, a unit vector"
-                for one, what in (("vs", "void fabric"), ("c", "contact fabric"))
+                for one, what in FABRICS.items()
                 for k in "xyz"
             }
         ),
-        *numbers(
-            {"coaxiality_deg": "angle between the major axes of void and contact fabric, 0 to 90"},
-            "degrees",
-        ),
+        *numbers({"coaxiality_deg": ANGLE}, "degrees"),
     )
 
     def values(self, measured: Measured) -> dict[str, Any]:

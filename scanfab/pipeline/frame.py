@@ -105,9 +105,9 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
     if not frame.grains.any():
         return FrameResult(source, number, frame, (), list(_empty_rows(known, plan)))
     if plan.map_settings is not None:
-        rows, notes, blocks = map_rows(frame, plan.in_frame(frame), known, f"frame {number}")
-        notes = [*frame.doubts_of_escaped(), *notes]
-        return FrameResult(source, number, frame, (), rows, tuple(notes), blocks)
+        rows, told, blocks = map_rows(frame, plan.in_frame(frame), known, f"frame {number}")
+        told = (*frame.doubts_of_escaped(), *told)
+        return FrameResult(source, number, frame, (), rows, told, blocks)
     if "forces" in plan.groups:
         refuse_without_forces(frame)
     measurements = measure(frame, plan.in_frame(frame), f"frame {number}")

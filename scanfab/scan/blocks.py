@@ -217,15 +217,12 @@ def partition_of(whole: Blocks, window: Blocks) -> Partition:
     both = whole, window
     octants = all(one.parts == (2, 2, 2) and all(one.repeats) and not one.radius for one in both)
     i, j = np.array([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]).T
-    form = np.zeros((2, 6))
-    for kind, one in enumerate(both):
-        if one.radius:
-            square = one.edges @ one.edges.T / one.radius**2
-            form[kind] = square[i, j] * np.where(i == j, 1.0, 2.0)
+    # zeros where there are no shells
+    square = np.array([one.edges @ one.edges.T / (one.radius or np.inf) ** 2 for one in both])
     return Partition(
         to_block=np.array([np.column_stack([one.matrix, one.shift]) for one in both]),
         parts=np.array([[*one.parts, one.shells] for one in both], dtype=np.float64),
         repeats=np.array([one.repeats for one in both], dtype=np.float64),
-        form=form,
+        form=square[:, i, j] * np.where(i == j, 1.0, 2.0),
         halves=True if octants else None,
     )

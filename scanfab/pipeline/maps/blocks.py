@@ -118,21 +118,14 @@ class MapBlocks(NamedTuple):
         thinnest = float(min(one.heights.min() for one in every))
         name = next(one for one in BLOCK_OPTIONS if getattr(self.settings, one))
         found = f"blocks {thinnest:.4g} thick, {thinnest / mean:.3g} mean radii of the grains"
-        choose = (
-            f"choose fewer, so that they are at least {DOUBTED_BELOW:g} mean radii thick "
-            f"({DOUBTED_BELOW * mean:.4g})"
-        )
-        thickness = thinnest / mean * (1.0 + 1e-9)
-        if thickness < REFUSED_BELOW:
-            raise SettingsError(
-                f"{name}: makes {found}: less than a grain says nothing of a fabric: {choose}"
-            )
-        if thickness < DOUBTED_BELOW:
-            text = (
-                f"`{name}` makes {found}: what a block holds is hardly its own, and errors from "
-                f"its parts are uncertain: {choose}"
-            )
-            yield Note("thin_blocks", text)
+        least = f"{DOUBTED_BELOW:g} mean radii thick ({DOUBTED_BELOW * mean:.4g})"
+        choose = f"choose fewer, so that they are at least {least}"
+        if thinnest < REFUSED_BELOW * mean * (1.0 - 1e-9):
+            less = "less than a grain says nothing of a fabric"
+            raise SettingsError(f"{name}: makes {found}: {less}: {choose}")
+        if thinnest < DOUBTED_BELOW * mean * (1.0 - 1e-9):
+            unsure = "what a block holds is hardly its own, and errors from its parts are uncertain"
+            yield Note("thin_blocks", f"`{name}` makes {found}: {unsure}: {choose}")
 
 
 def _axes(

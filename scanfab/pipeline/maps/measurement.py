@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,9 +18,9 @@ from scanfab.pipeline.measurement import coarse_spacing, solids_of
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.tolerance import Errors, Goal, scan_to_tolerance
 from scanfab.scan.blocks import Blocks
-from scanfab.scan.directions import DirectionRule, design_of
+from scanfab.scan.directions import design_of
 from scanfab.scan.edges import CLIP, START
-from scanfab.scan.gaps import GapSums, scan_gaps
+from scanfab.scan.gaps import scan_gaps
 from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Solids
 
@@ -77,15 +78,17 @@ class MedianBlock(Goal):
         self, solids: Solids, plan: Plan, replicates: range, most_steps: float = math.inf
     ) -> MapSums:
         """As planned; replicate by replicate, as the sums of all their axes would be too many."""
-        parts = []
+        weights, moment, parts = plan.rule.weights, plan.moment, []
         for replicate in replicates:
-            words = plan, self.blocks, plan.rule, plan.spacing, replicate, (plan.cutoff,)
-            sums = _scan(solids, *words, most_steps)
+            sums = scan_gaps(
+                solids, plan.rule,
+                spacing=plan.spacing, cutoffs=[plan.cutoff], blocks=self.blocks,
+                variants=plan.variants, replicates=[replicate], seed=plan.seed,
+                workers=plan.workers, most_steps=most_steps,
+            )  # fmt: skip
             most_steps -= float(sums.scan.steps.sum())
             fabrics = {
-                name: block_fabrics(
-                    sums.axes, plan.rule.weights, *sums.in_blocks(name, 0, plan.moment)
-                )
+                name: block_fabrics(sums.axes, weights, *sums.in_blocks(name, 0, moment))
                 for name in plan.variants
             }
             parts.append(MapSums(**vars(sums.scan), fabrics=fabrics))
@@ -119,17 +122,19 @@ def _part_sums(
     solids: Solids, plan: Plan, blocks: tuple[Blocks, Blocks], before: ScanSums
 ) -> dict[str, PartSums]:
     """Along fewer lines, each block in eight parts, for the sample's scatter and for its void."""
-    rule, finer = design_of(PART_AXES), (blocks[0].finer(), blocks[1].finer())
+    rule, parts = design_of(PART_AXES), []
     most = min(MOST_CHORDS, plan.max_chords)
     spacing = coarse_spacing(solids, PART_REPLICATES * len(rule), before, plan, most)
-    parts: list[dict[str, PartSums]] = []
     for replicate in range(PART_REPLICATES):
-        words = plan, finer, rule, spacing, replicate, (0.0, plan.cutoff)
-        voids = sums = _scan(solids, *words)
-        if solids.edge == START:
-            # by this rule, segments count with what is outside the window, too
-            voids = _scan(replace(solids, edge=CLIP), *words)
-        parts.append({})
+        scan = partial(
+            scan_gaps, rule=rule, spacing=spacing, cutoffs=[0.0, plan.cutoff],
+            blocks=(blocks[0].finer(), blocks[1].finer()), variants=plan.variants,
+            replicates=[replicate], seed=plan.seed, workers=plan.workers, most_steps=math.inf,
+        )  # fmt: skip
+        sums = scan(solids)
+        # by the rule start, segments count with what is outside the window, too
+        voids = sums if solids.edge != START else scan(replace(solids, edge=CLIP))
+        found = {}
         for name in plan.variants:
             by_part = blocks[name in "cd"].by_part
             length, number = map(by_part, sums.in_blocks(name, 1, plan.moment))
@@ -137,27 +142,9 @@ def _part_sums(
             # what rounding leaves of nothing is none
             left = np.maximum(number.sum(axis=-1, keepdims=True) - number, 0.0)
             void = np.einsum("d,rdbp->rbp", rule.weights, by_part(voids.in_blocks(name)[0]))
-            parts[-1][name] = PartSums(
-                block_fabrics(sums.axes, rule.weights, rest, left),
-                number.sum(axis=1),
-                spacing**2 / rule.weights.sum() * void,
-            )
+            without = block_fabrics(sums.axes, rule.weights, rest, left)
+            void *= spacing**2 / rule.weights.sum()
+            found[name] = PartSums(without, number.sum(axis=1), void)
+        parts.append(found)
     whole: dict[str, PartSums] = concatenated(parts)
     return whole
-
-
-def _scan(
-    solids: Solids,
-    plan: Plan,
-    blocks: tuple[Blocks, Blocks],
-    rule: DirectionRule,
-    spacing: float,
-    replicate: int,
-    cutoffs: tuple[float, ...],
-    most_steps: float = math.inf,
-) -> GapSums:
-    return scan_gaps(
-        solids, rule,
-        spacing=spacing, cutoffs=cutoffs, blocks=blocks, variants=plan.variants,
-        replicates=[replicate], seed=plan.seed, workers=plan.workers, most_steps=most_steps,
-    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The blocks of the whole sample or of the RV: what lies in each, and which a surface cuts."""
+"""The blocks of the sample or the RV: what lies in them, and which of them a surface cuts."""
 
 from __future__ import annotations
 
@@ -12,16 +12,18 @@ from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.fabric.distribution import direction_points
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import Window
-from scanfab.pipeline.maps.volumes import volumes_inside
-from scanfab.pipeline.plan import Plan
+from scanfab.pipeline.maps.measurement import MapMeasurement
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.edges import ENDS, START
-from scanfab.scan.solids import Solids
 
 # of the mean radius: blocks further inside lose next to no segments that leave the sample
 DEPTH = 2.0
 # of unit vectors for the outer surface of a shell
 SOME = 8
+# through all blocks that a window cuts, and through each of them the fewest and most along an edge
+LINES, SIDE = 1e6, (16, 64)
+# of rays through shells; even, so that all octants get as many, and none lies between two
+POLAR, AZIMUTHS = 64, 128
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +41,9 @@ class Region:
     """What of each of the eight parts of each block lies in the region, shape (B, 8)."""
 
     @classmethod
-    def of(
-        cls, sample: Sample, plan: Plan, solids: Solids, blocks: Blocks, in_window: bool
-    ) -> Region:
-        """Of the whole sample, or of the RV of a frame."""
+    def of(cls, sample: Sample, found: MapMeasurement, in_window: bool) -> Region:
+        """Of the whole sample, or of the RV, of a frame."""
+        plan, solids, blocks = found.plan, found.solids, found.blocks[in_window]
         window = plan.window if in_window else None
         if window is not None and plan.edge == START:
             # it follows segments beyond the RV, and gives each end to the block it is in
@@ -114,3 +115,57 @@ def _facets_of_hull(sample: Sample) -> FloatArray:
         except (QhullError, ValueError):
             return np.array([[0.0, 0.0, 0.0, np.inf]])
     return np.column_stack([facets[:, :-1] @ across, facets[:, -1]])
+
+
+def volumes_inside(blocks: Blocks, window: Window | None) -> FloatArray:
+    """
+    What of each of the eight parts of each block lies in a window, if there is one; shape (B, 8).
+
+    Each line is cut exactly at the window, so that volumes are right to a part in a thousand.
+    """
+    if window is None:
+        return np.repeat(blocks.volumes[:, None] / 8, 8, axis=1)
+    inside = _shells_inside if blocks.radius else _grid_inside
+    finer = blocks.finer().moved(window.center)
+    return blocks.by_part(inside(finer, window.shape))
+
+
+def _grid_inside(blocks: Blocks, window: Convex) -> FloatArray:
+    """The volumes of blocks of a grid in a window about the origin, (B,)."""
+    edges, corners = blocks.edges / np.array(blocks.parts)[:, None], blocks.corners
+    # a block all of whose corners lie in a convex window does so, too
+    whole = window.contains(corners.reshape(-1, 3)).reshape(corners.shape[:2]).all(axis=1)
+    reach = 0.5 * np.linalg.norm(corners[:, 0] - corners[:, -1], axis=1)
+    cut = np.flatnonzero(~whole & window.may_meet(corners.mean(axis=1), reach))
+    side = int(np.clip(np.sqrt(LINES / max(len(cut), 1)), *SIDE))
+    steps = (np.arange(side) + 0.5) / side
+    share = np.where(whole, 1.0, 0.0)
+    for block in cut:
+        found = []
+        for turn in range(3):
+            one, two, along = np.roll(edges, turn, axis=0)
+            across = (steps[:, None, None] * one + steps[:, None] * two).reshape(-1, 3)
+            lines = window.share(corners[block, 0] + across, np.broadcast_to(along, across.shape))
+            found.append(lines.reshape(side, side))
+        # lines along a cylinder's axis are inside or outside, and tell its volume less well
+        share[block] = min(found, key=_roughness).mean()
+    return np.asarray(share * blocks.volumes)
+
+
+def _roughness(shares: FloatArray) -> float:
+    """How much neighbouring lines differ."""
+    return sum(float(np.sum(np.diff(shares, axis=axis) ** 2)) for axis in (0, 1))
+
+
+def _shells_inside(blocks: Blocks, window: Convex) -> FloatArray:
+    """The volumes of the octants of shells about a window's centre, by rays from there; (B,)."""
+    cosine, weight = np.polynomial.legendre.leggauss(POLAR)
+    along = np.repeat(cosine, AZIMUTHS)
+    turn = np.tile(2.0 * np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS, POLAR)
+    across = np.sqrt(1.0 - along**2)
+    units = np.column_stack([across * np.cos(turn), across * np.sin(turn), along])
+    share = window.share(np.zeros_like(units), blocks.radius * units)
+    cones = np.diff(np.minimum(blocks.bounds, blocks.radius * share[:, None]) ** 3) / 3.0
+    cones *= np.repeat(weight, AZIMUTHS)[:, None] * 2.0 * np.pi / AZIMUTHS
+    octant = blocks.of(0.5 * blocks.bounds[1] * units)
+    return np.concatenate([np.bincount(octant, shell, minlength=8) for shell in cones.T])

@@ -36,7 +36,7 @@ FREEDOM = 7.0
 
 def map_rows(
     sample: Sample, plan: Plan, known: Mapping[str, Any], where: str
-) -> tuple[list[Row], list[Note], tuple[Blocks, Blocks]]:
+) -> tuple[list[Row], tuple[Note, ...], tuple[Blocks, Blocks]]:
     """
     Map one frame that has grains.
 
@@ -52,28 +52,22 @@ def map_rows(
     Returns
     -------
     rows : list of Row
-    notes : list of Note
+    notes : tuple of Note
         What is doubtful about them.
     blocks : two Blocks
         Of the whole sample and of the RV.
     """
     assert plan.map_settings is not None
     found = measure_map(sample, plan, where)
-    regions = {
-        inside: Region.of(sample, plan, found.solids, found.blocks[inside], inside)
-        for inside in {VARIANTS[name].in_window for name in plan.variants}
-    }
-    variants = [
-        BlocksOfVariant(found, regions[one.in_window], one)
-        for one in (VARIANTS[name] for name in plan.variants)
-    ]
-    rows = [
-        row_of(plan.map_settings.columns, {**known, "variant": one.variant.name, **values})
-        for one in variants
-        for values in one.rows()
-    ]
-    notes = [*found.notes, *joined(note for one in variants for note in one.notes())]
-    return rows, notes, found.blocks
+    variants = [VARIANTS[name] for name in plan.variants]
+    regions = {kind: Region.of(sample, found, kind) for kind in {one.in_window for one in variants}}
+    rows, notes = [], [*found.notes]
+    for variant in variants:
+        one = BlocksOfVariant(found, regions[variant.in_window], variant)
+        same = {**known, "variant": variant.name}
+        rows += [row_of(plan.map_settings.columns, {**same, **own}) for own in one.rows()]
+        notes += one.notes()
+    return rows, joined(notes), found.blocks
 
 
 class BlocksOfVariant:
@@ -109,10 +103,11 @@ class BlocksOfVariant:
         }
         if blocks.radius:
             arrays |= {"r_inner": blocks.bounds[:-1], "r_outer": blocks.bounds[1:]}
+        listed = {name: _without_nan(values) for name, values in arrays.items()}
         tensors, exists = fabrics.tensors.mean(axis=0), fabrics.exists
         for block, contacts in enumerate(self._contacts()):
             tensor = FabricTensor(tensors[block]) if exists[block] else None
-            own = {name: _known(array[block]) for name, array in arrays.items()}
+            own = {name: values[block] for name, values in listed.items()}
             yield {**same, **tensor_values("vs", tensor, self.axis), **contacts, **own}
 
     @cached_property
@@ -161,12 +156,12 @@ class BlocksOfVariant:
         starts = np.searchsorted(block[order], np.arange(len(self.blocks) + 1))
         # before the first and behind the last are those that are in no block
         groups = np.split(normals[order], starts)[1:-1]
-        for own, error in zip(groups, errors, strict=True):
+        for own, error in zip(groups, _without_nan(errors), strict=True):
             yield {
                 "contacts": len(own),
                 **tensor_values("c", contact_fabric(own), self.axis),
                 "alpha_c_axial_se": axial_error(own, self.axis),
-                "alpha_c_axial_sample_se": _known(error),
+                "alpha_c_axial_sample_se": error,
             }
 
     def _solid_fraction(self) -> dict[str, FloatArray]:
@@ -200,9 +195,8 @@ class BlocksOfVariant:
 
     def notes(self) -> Iterator[Note]:
         """Lines and blocks that are doubtful, and whether the sample is homogeneous."""
-        left_out = left_out_of(
-            self.scan, self.variant, self.edge, float(self.fabrics.segments.sum())
-        )
+        kept = float(self.fabrics.segments.sum())
+        left_out = left_out_of(self.scan, self.variant, self.edge, kept)
         texts = doubts_of_lines(self.scan, self.variant, left_out)
         texts |= {"few_segments": self._too_few(), HOMOGENEITY: self._homogeneity()}
         return (Note(code, text, (self.variant.name,)) for code, text in texts.items() if text)
@@ -211,13 +205,10 @@ class BlocksOfVariant:
         lacking, empty = (int((~one).sum()) for one in (self.fabrics.exists, self.fabrics.is_met))
         if not lacking:
             return ""
-        found = f"{lacking} of {counted(len(self.blocks), 'block')} have no void fabric"
-        if empty == lacking:
-            return f"{found}: no void segment has its middle there"
-        those = f"{empty} hold no void segment at all, the others" if empty else "they hold"
         return (
-            f"{found}: {those} none in more than 5 % of the directions: choose fewer blocks, "
-            f"closer lines (`spacing`, `tolerance`) or a shorter `cutoff`"
+            f"{lacking} of {counted(len(self.blocks), 'block')} have no void fabric: {empty} hold "
+            f"no void segment at all, {lacking - empty} none in more than 5 % of the directions: "
+            f"choose fewer blocks, closer lines (`spacing`, `tolerance`) or a shorter `cutoff`"
         )
 
     def _homogeneity(self) -> str:
@@ -245,7 +236,6 @@ class BlocksOfVariant:
         )
 
 
-def _known(value: Any) -> Any:
-    """As a row has it: None for NaN."""
-    found = value.item()
-    return None if isinstance(found, float) and not math.isfinite(found) else found
+def _without_nan(values: Any) -> list[Any]:
+    """An array as rows have it: None for NaN."""
+    return [None if one != one else one for one in values.tolist()]
