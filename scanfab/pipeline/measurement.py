@@ -8,12 +8,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.convex import Convex
 from scanfab.base.errors import Note
 from scanfab.base.shapes import sphere
-from scanfab.base.typing import FloatArray
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.sample import Sample, Variant
 from scanfab.packing.window import Window, inner_ellipsoid
 from scanfab.pipeline.plan import NOISE, Plan
@@ -61,9 +60,7 @@ class Measurement:
     notes: tuple[Note, ...] = ()
     """What the scan did not reach."""
 
-    def kept(
-        self, variant: str, place: int = 0
-    ) -> tuple[FloatArray, FloatArray | npt.NDArray[np.int64]]:
+    def kept(self, variant: str, place: int = 0) -> tuple[FloatArray, FloatArray | IntArray]:
         """As :meth:`GapSums.kept`, at one of the plan's cut-offs, with the moment of the table."""
         if self.gaps is None:
             return self.sums.kept(variant)

@@ -280,18 +280,18 @@ class _AutoScan:
         return better if growth > 1.0 and affordable else None
 
     def _missed(self, factor: float) -> Note:
-        steps, why = self.sums.steps.sum(), ""
-        if steps > self.sums.chords.sum():
-            why = (
-                f"; {steps / self.sums.work.sum():.0%} of the work was to follow long void "
-                f"segments through the images of the cell: is it too large, or periodic where the "
-                f"sample is not (`cell`, `periodic`)?"
-            )
         text = (
             f"the scan stopped after {self.spent:.2g} chords before the tolerance "
             f"{self.plan.tolerance:g} was met: alpha_vs_axial_se is what it reached; about "
-            f"{factor:.2g} times as many lines would be needed (`max_chords`, `tolerance`){why}"
+            f"{factor:.2g} times as many lines would be needed (`max_chords`, `tolerance`)"
         )
+        following = self.sums.steps.sum() / self.sums.work.sum()
+        if following > 0.5:
+            text += (
+                f"; {following:.0%} of the work was to follow long void segments through the "
+                f"images of the cell: is it too large, or periodic where the sample is not "
+                f"(`cell`, `periodic`)?"
+            )
         return Note(TOLERANCE_MISSED, text)
 
     def _dropped(self, counted: str) -> list[Note]:

@@ -1,7 +1,5 @@
 """Calibration: ladders, from where on they are steady, and recommended settings that hold."""
 
-import math
-
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -16,8 +14,6 @@ from scanfab import (
 )
 from scanfab.base.column import columns_of_fields
 from scanfab.pipeline.calibration import StepRow, first_steady, judged
-from scanfab.viz.figures.calibration import Ladders
-from scanfab.viz.figures.page import drawn_page
 from tests.helpers.lattices import shaken_cubic, simple_cubic
 
 QUICK = {"tolerance": 2e-3, "variants": "cd", "rv": 0.6, "workers": 1}
@@ -160,24 +156,6 @@ def test_steps_beyond_the_budget_are_left_out_with_a_word(packing):
         few = calibrate(packing, **options)
     assert [row.value for row in ladder(few, "spacing")] == [4, 2, 1, 0.5, 0.2]
     assert any("spacing 0.1 left out: it would cut" in str(one.message) for one in told)
-
-
-def test_figure_has_letters_total_errors_and_words(found):
-    with drawn_page([Ladders(found.rows)]) as page:
-        panels = page.axes
-    assert [axes.get_title(loc="left") for axes in panels] == ["(a)", "(b)", "(c)", "(d)"]
-    assert all(axes.get_ylabel().endswith(", axial") for axes in panels)
-    note = page.legends[0].get_title().get_text()
-    assert note.startswith(f"frame {found.rows[0].frame}\nbands: one total standard error")
-    row = next(r for r in found.rows if r.ladder == "rv" and r.alpha_vs_axial_sample_se is not None)
-    half = 1e3 * math.hypot(row.alpha_vs_axial_se, row.alpha_vs_axial_sample_se)
-    heights = [
-        np.ptp(path.vertices[path.vertices[:, 0] == row.value, 1])
-        for shade in panels[3].collections
-        for path in shade.get_paths()
-        if row.value in path.vertices[:, 0]
-    ]
-    assert any(height == pytest.approx(2 * half) for height in heights)
 
 
 def test_one_ladder_is_drawn_on_the_axes_that_it_gets(found):

@@ -28,13 +28,6 @@ def names(*groups):
     ]
 
 
-def test_the_groups_are_those_of_the_option():
-    assert tuple(GROUPS) == GROUP_NAMES
-    found = [column.name for group in GROUPS.values() for column in group.columns]
-    assert len(set(found)) == len(found)
-    assert not set(found) & set(COLUMNS)
-
-
 @pytest.mark.parametrize("asked", ["forces,state", ["state", "forces"], "state forces"])
 def test_several_groups_stand_behind_the_others_in_one_order(yade, asked):
     row = scanfab.compute(yade, variants="a", with_=asked, **{**FAST, "spacing": "1rmin"})[0]
@@ -145,17 +138,3 @@ def test_an_open_whole_has_no_volume_and_says_so():
     assert a.stress_zz is None
     assert c.p == pytest.approx(200e3, rel=0.2)
     assert 0.4 < c.void_ratio < 0.8
-
-
-@pytest.mark.parametrize("suffix", [".csv", ".json", ".jsonl", ".parquet"])
-def test_lists_of_numbers_are_where_cells_may_be_lists(tmp_path, yade, suffix):
-    found = scanfab.compute(yade, with_="harmonics", variants="a", **FAST)
-    path = tmp_path / f"table{suffix}"
-    found.save(path)
-    again = scanfab.load(path)[0]
-    assert again.c_a4 == found[0].c_a4
-    assert ("c_tensor4" in again) == (suffix != ".csv")
-    if suffix != ".csv":
-        assert len(again.c_tensor4) == 81
-        fourth = np.array(again.c_tensor4).reshape(3, 3, 3, 3)
-        np.testing.assert_allclose(np.einsum("ijkk->ij", fourth), found.tensor("gc")[0], atol=1e-12)

@@ -16,9 +16,7 @@ from scanfab import (
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.plan import (
     FEWEST_LINES,
-    NOISE,
     REPLICATES,
-    WIDE,
     make_plan,
 )
 from tests.helpers.lattices import shaken_cubic
@@ -108,25 +106,6 @@ def test_filled_directions_of_a_replicate_are_warned_of(packing):
 def test_auto_spacing_never_makes_too_few_lines(packing, tolerance):
     plan = plan_of(packing, tolerance=tolerance)
     assert math.pi * plan.window.radius**2 / plan.spacing**2 >= 4 * FEWEST_LINES * (1 - 1e-9)
-
-
-def test_auto_spacing_of_a_small_sample_is_as_close_as_is_of_use():
-    random = np.random.default_rng(0)
-    packing = Packing(random.random((400, 3)) * 20, random.uniform(0.5, 1.0, 400))
-    plan = plan_of(packing, tolerance=1e-5)
-    assert plan.spacing == pytest.approx(NOISE[3].close * packing.radius.mean())
-
-
-def test_auto_spacing_is_wider_where_less_is_asked_for():
-    random = np.random.default_rng(0)
-    packing = Packing(random.random((20_000, 3)) * 60, random.uniform(0.5, 1.0, 20_000))
-    wide, close = (plan_of(packing, tolerance=t).spacing for t in (2e-4, 5e-5))
-    assert close < wide < WIDE * packing.radius.mean()
-    assert wide / close == pytest.approx(4.0 ** (2.0 / (2.0 + NOISE[3].growth)))
-    # lines that know nothing of one another: so many segments, however wide they are apart
-    widest, wider = (plan_of(packing, tolerance=t).spacing for t in (6e-4, 5e-4))
-    assert WIDE * packing.radius.mean() < wider
-    assert widest / wider == pytest.approx(1.2)
 
 
 def test_default_window_is_a_fraction_of_half_the_smallest_extent_of_the_surfaces():

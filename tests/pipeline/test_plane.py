@@ -6,8 +6,6 @@ import pytest
 import scanfab
 from scanfab import Cell, Packing, PackingError, SettingsError, compute, find_contacts
 from scanfab.base.space import SPACE, Space
-from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.window_settings import settings_in
 from tests.helpers.dumps import dump_text
 from tests.helpers.truth import SAMPLE_DATA
 
@@ -102,11 +100,6 @@ def test_a_cell_whose_vectors_leave_the_plane_is_an_error(discs):
     cell = Cell([[14.0, 0, 1.0], [0, 14, 0], [0, 0, 3]])
     with pytest.raises(PackingError, match="two of them in the plane"):
         Packing(*discs, cell=cell)
-
-
-@pytest.mark.parametrize(("space", "axis"), [(XY, "y"), (YZ, "z"), (ZX, "z")])
-def test_the_usual_axis_is_the_second_of_the_plane(space, axis):
-    assert settings_in(Settings(), space).axis == Settings(axis=axis).axis
 
 
 @pytest.mark.parametrize(

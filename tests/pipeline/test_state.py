@@ -148,12 +148,6 @@ def test_walls_press_on_clumps_through_a_periodic_face():
         np.testing.assert_allclose(whole(packing).stress, 0.5 * (expected + expected.T))
 
 
-def test_without_a_volume_there_is_no_stress():
-    state = whole(cubic(3, periodic=False))
-    assert state.stress is None
-    assert state.void_ratio is None
-
-
 def test_lenses_and_points_agree():
     """An ellipsoid that is nearly a ball is measured by points, the ball exactly."""
     rng = np.random.default_rng(2)

@@ -63,12 +63,6 @@ def test_auto_directions_takes_more_axes_and_keeps_spacing_and_replicates(packin
     assert fine.spacing == coarse.spacing == pytest.approx(0.2)
 
 
-def test_tolerance_does_not_matter_to_a_fixed_scan(packing):
-    options = {"spacing": 0.2, "directions": 20, "variants": "c"}
-    strict, loose = (compute(packing, tolerance=t, **options) for t in (1e-6, 1.0))
-    assert strict.rows == loose.rows
-
-
 def test_scan_stops_before_it_cuts_more_chords_than_allowed(packing):
     """Of 216 grains in a window; a chord is where a line meets a grain."""
     cut = []
