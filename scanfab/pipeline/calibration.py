@@ -201,15 +201,16 @@ class _Calibrator:
         """The ladders, what they say, and what follows."""
         settings = self.settings
         cutoffs = self._cutoffs()
-        ladders = {name: list(self._ladder(name)) for name in ("spacing", "directions")}
-        ladders |= {"cutoff": cutoffs, "rv": list(self._ladder("rv"))}
-        for name in ("spacing", "directions", "rv"):
-            ladders[name] = judged(ladders[name], self.space.dimension)
+        spacings, directions, rvs = (
+            judged(list(self._ladder(name)), self.space.dimension)
+            for name in ("spacing", "directions", "rv")
+        )
+        ladders = {"spacing": spacings, "directions": directions, "cutoff": cutoffs, "rv": rvs}
         cutoff = settings.cutoff.value if settings.cutoff.unit == "rmin" else PAPER_CUTOFF
         at_cutoff = [row for row in cutoffs if row.value == cutoff] or cutoffs
         sample = _largest(at_cutoff, "alpha_vs_axial_sample_se")
         target = max(settings.tolerance, OF_SAMPLE * (sample or 0.0))
-        best, options = self._recommended(ladders["spacing"], ladders["directions"], target)
+        best, options = self._recommended(spacings, directions, target)
         findings = [_finding(name, rows) for name, rows in ladders.items() if rows]
         reached, own = (
             "unknown" if one is None else f"{one:.2g}"

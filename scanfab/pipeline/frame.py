@@ -19,7 +19,7 @@ from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.pipeline.maps.rows import map_rows
 from scanfab.pipeline.measurement import Measurement, measure
 from scanfab.pipeline.plan import Plan
-from scanfab.pipeline.state import refuse_without_forces
+from scanfab.pipeline.state import refuse_forces
 from scanfab.pipeline.variant_columns import VariantColumns, no_columns
 from scanfab.scan.blocks import Blocks
 from scanfab.table.columns import complete_row, row_of
@@ -108,8 +108,8 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
         rows, told, blocks = map_rows(frame, plan.in_frame(frame), known, f"frame {number}")
         told = (*frame.doubts_of_escaped(), *told)
         return FrameResult(source, number, frame, (), rows, told, blocks)
-    if "forces" in plan.groups:
-        refuse_without_forces(frame)
+    if "forces" in plan.groups or "state" in plan.groups:
+        refuse_forces(frame, plan.groups)
     measurements = measure(frame, plan.in_frame(frame), f"frame {number}")
     columns = [
         VariantColumns(measurement, VARIANTS[variant], place)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from functools import partial
 
 import numpy as np
@@ -25,10 +26,15 @@ POINTS = 2048
 CHUNK = 256
 
 
-def refuse_without_forces(sample: Sample) -> None:
-    """PackingError if the forces of contacts are asked for, and the dump has none."""
+def refuse_forces(sample: Sample, groups: Collection[str]) -> None:
+    """PackingError if forces are asked for that the dump does not have, or not all as numbers."""
     contacts = sample.contacts
-    if contacts.force_n is None and len(contacts):
+    if contacts.force_n is not None and not np.isfinite(contacts.force_n).all():
+        one, two = sample.packing.id[contacts.pairs[np.argmin(np.isfinite(contacts.force_n))]]
+        raise PackingError(
+            f"the contact of the grains {one} and {two} has a force that is no finite number"
+        )
+    if contacts.force_n is None and len(contacts) and "forces" in groups:
         found = "are found by geometry" if contacts.source == "geometric" else "have none"
         raise PackingError(
             f'`with_="forces"` needs the forces of contacts, but these {found}: name a file that '
@@ -38,32 +44,13 @@ def refuse_without_forces(sample: Sample) -> None:
 
 
 def contact_forces(sample: Sample, chosen: BoolArray) -> ContactForces | None:
-    """
-    What some contacts bear and span; None if that is not known.
-
-    Raises
-    ------
-    PackingError
-        If a force is no finite number.
-    """
-    contacts, packing = sample.contacts, sample.packing
+    """What some contacts bear and span; None if that is not known."""
+    contacts = sample.contacts
     if contacts.force_n is None:
         return None
-    _refuse_odd_forces(packing, contacts.force_n)
-    branch = np.einsum("ci,ci->c", _branches(packing)[chosen], contacts.normal[chosen])
+    branch = np.einsum("ci,ci->c", _branches(sample.packing)[chosen], contacts.normal[chosen])
     force = None if contacts.force is None else contacts.force[chosen]
     return ContactForces(branch, contacts.force_n[chosen], force)
-
-
-def _refuse_odd_forces(packing: Packing, force_n: FloatArray) -> None:
-    """PackingError if a force is no finite number: then its normal part is none either."""
-    wrong = ~np.isfinite(force_n)
-    if wrong.any():
-        assert packing.contacts is not None
-        one, two = packing.id[packing.contacts.pairs[np.argmax(wrong)]]
-        raise PackingError(
-            f"the contact of the grains {one} and {two} has a force that is no finite number"
-        )
 
 
 def sample_state(sample: Sample, variant: Variant, window: Window | None) -> SampleState:
@@ -137,9 +124,8 @@ def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
     """Of all contacts that a grain has part in; None without forces or a volume."""
     packing, contacts = sample.packing, sample.contacts
     volume = _volume(packing, window)
-    if contacts.force is None or contacts.force_n is None or volume is None:
+    if contacts.force is None or volume is None:
         return None
-    _refuse_odd_forces(packing, contacts.force_n)
     one, two = contacts.pairs.T
     places = _places(packing)
     start, end = places[one], places[one] + _branches(packing)

@@ -285,10 +285,10 @@ class _AutoScan:
             f"{self.plan.tolerance:g} was met: alpha_vs_axial_se is what it reached; about "
             f"{factor:.2g} times as many lines would be needed (`max_chords`, `tolerance`)"
         )
-        following = self.sums.steps.sum() / self.sums.work.sum()
-        if following > 0.5:
+        steps, work = self.sums.steps.sum(), self.sums.work.sum()
+        if 2 * steps > work:
             text += (
-                f"; {following:.0%} of the work was to follow long void segments through the "
+                f"; {steps / work:.0%} of the work was to follow long void segments through the "
                 f"images of the cell: is it too large, or periodic where the sample is not "
                 f"(`cell`, `periodic`)?"
             )
