@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ReadError, ScanfabError, SettingsError, warn
-from scanfab.base.spelling import counted
 from scanfab.io.families import PathLike
 
 # what decides numbers, or reads what is sent
@@ -176,9 +175,6 @@ class DaskExecutor(Executor):
                 f"{address}: the scheduler has no workers yet: frames wait for them, without a "
                 f"limit: start some with `dask worker {address}`"
             )
-
-    def __repr__(self) -> str:
-        return f"DaskExecutor {self.address}: {counted(len(self.threads), 'worker')}"
 
     def room(self) -> int:
         """How many frames may be under way: one for each thread, so that none waits at a worker."""

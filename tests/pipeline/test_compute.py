@@ -18,7 +18,6 @@ from scanfab.pipeline.settings import Settings
 from scanfab.table.columns import COLUMNS
 from scanfab.table.formats import OWN_FORMATS
 from scanfab.viz.frame_view import look_at
-from scanfab.viz.scanned_frames import scan_frames
 from tests.helpers.dumps import dump_text, pairs_text, write, yade_spheres
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin"}
@@ -101,13 +100,6 @@ def test_the_same_seed_gives_the_same_bytes_with_any_number_of_workers():
     packing = packing_of(heap())
     tables = [scanfab.compute(packing, workers=n, seed=3, **SCAN).rows for n in (1, 2, 5)]
     assert tables[0] == tables[1] == tables[2]
-
-
-def test_another_seed_is_another_scan():
-    packing = packing_of(heap())
-    one, two = (scanfab.compute(packing, seed=seed, **SCAN)[0] for seed in (0, 1))
-    assert one.alpha_vs != two.alpha_vs
-    assert one.alpha_vs == pytest.approx(two.alpha_vs, abs=0.2)
 
 
 def test_rows_come_as_soon_as_their_frame_is_done(shrinking):
@@ -225,13 +217,6 @@ def test_a_part_looks_for_its_first_frame_with_grains_in_the_whole(shrinking):
     assert look.number == whole.number == 2
     assert look.plan.window.radius == whole.plan.window.radius
     assert look.strains == whole.strains
-
-
-def test_figures_of_a_part_are_of_its_frames(shrinking):
-    table = scanfab.compute(shrinking[1:3], variants="c", **SCAN)
-    for rows in (None, table):
-        drawn = scan_frames(shrinking[1:3], table=rows, variants="c", **SCAN)
-        assert [one.number for one in drawn.frames] == [1, 2]
 
 
 def test_no_frames_of_a_part_are_an_error(shrinking):
@@ -438,13 +423,6 @@ def test_an_rv_wider_than_the_cell_is_refused():
         scanfab.compute(packing, variants="c", rv_radius=4.5, **SCAN)
 
 
-def test_a_box_that_does_not_repeat_changes_nothing():
-    open_box = packing_of(heap(), cell=Cell([9.0, 9.0, 9.0], (False, False, False)))
-    assert (
-        scanfab.compute(open_box, **SCAN).rows == scanfab.compute(packing_of(heap()), **SCAN).rows
-    )
-
-
 def test_settings_are_checked_before_a_frame_is_read(tmp_path):
     series = series_of(tmp_path, [heap()])
     (tmp_path / "dump.txt").unlink()
@@ -469,11 +447,6 @@ def test_a_boundary_that_only_a_later_frame_has_is_fine(tmp_path):
     series = series_of(tmp_path, [grains, heap(squeeze=0.9)])
     table = scanfab.compute(series, boundary="type=2", variants="a", **SCAN)
     assert len(table) == 2
-
-
-def test_a_boundary_that_a_packing_does_not_have_is_an_error():
-    with pytest.raises(SettingsError, match="no particle of any frame has type=3"):
-        scanfab.compute(packing_of(heap()), boundary="type=3", variants="a", **SCAN)
 
 
 def test_what_may_be_clumps_is_warned_of_once_and_computed(tmp_path):

@@ -73,15 +73,18 @@ def test_table_and_manifest_are_those_of_the_command(short_series, tmp_path, cap
     ours, other = tmp_path / f"ours{suffix}", tmp_path / f"other{suffix}"
     assert commanded(other, sources=(short_series,)) == 0
     capsys.readouterr()
-    table = from_python(ours, short_series)
+    table = from_python(ours, short_series, manifest=tmp_path / "copy.json")
+    assert (tmp_path / "copy.json").read_bytes() == manifest_of(ours)
     assert capsys.readouterr() == ("", "")
     assert ours.read_bytes() == other.read_bytes()
     assert manifest_of(ours) == manifest_of(other)
     assert table == scanfab.compute(scanfab.read_series(short_series), **OPTIONS)
 
 
-@pytest.mark.parametrize("name", ["table.csv", "table.json", "table.parquet"])
-@pytest.mark.parametrize("excerpt", [{}, {"fields": "source,frame,variant,gc_xx", "digits": 5}])
+@pytest.mark.parametrize(
+    ("name", "excerpt"),
+    [("table.parquet", {}), ("table.csv", {"fields": "source,frame,variant,gc_xx", "digits": 5})],
+)
 @pytest.mark.parametrize("begins", ["the command", "Python"])
 def test_each_goes_on_with_what_the_other_has_left(
     short_series, tmp_path, monkeypatch, name, excerpt, begins
@@ -109,19 +112,6 @@ def test_each_goes_on_with_what_the_other_has_left(
     assert output.read_bytes() == whole.read_bytes()
     assert manifest_of(output) == manifest_of(whole)
     assert {path.name for path in tmp_path.iterdir()} == {name, f"{name}.manifest.json", "whole"}
-
-
-def test_frames_that_came_later_join_a_table_of_the_command(dumps, tmp_path):
-    table, whole = tmp_path / "table.csv", tmp_path / "whole.csv"
-    late = dumps / "dump_300.txt"
-    text = late.read_text()
-    late.unlink()
-    assert commanded(table, sources=(dumps,)) == 0
-    late.write_text(text)
-    assert len(from_python(table, dumps, resume=True)) == 8
-    from_python(whole, dumps)
-    assert table.read_bytes() == whole.read_bytes()
-    assert manifest_of(table) == manifest_of(whole)
 
 
 def test_an_open_series_leaves_the_files_of_its_path(short_series, tmp_path):
@@ -165,12 +155,6 @@ def test_a_resumed_collection_keeps_the_frames_that_it_has(short_series, tmp_pat
     for frames in (":2", ":4"):
         from_python(output, short_series, vtk=folder, frames=frames, resume=True)
     assert (folder / "grains.pvd").read_text().count("<DataSet ") == 4
-
-
-def test_a_second_manifest_may_be_asked_for(short_series, tmp_path):
-    output, copy = tmp_path / "table.csv", tmp_path / "copy.json"
-    from_python(output, short_series, manifest=copy)
-    assert copy.read_bytes() == manifest_of(output)
 
 
 @pytest.fixture
