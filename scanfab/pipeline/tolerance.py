@@ -5,19 +5,20 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from scanfab.base.arrays import concatenated
 from scanfab.base.errors import Note, SettingsError
 from scanfab.base.spelling import spelt_apart, spelt_time
 from scanfab.fabric.void import void_fabric
 from scanfab.pipeline.plan import NOISE, Plan
 from scanfab.scan.directions import design_of, rule_of
 from scanfab.scan.following import FollowedTooFarError
-from scanfab.scan.scan import ScanSums, scan_lines
+from scanfab.scan.scan import scan_lines
 from scanfab.scan.solids import Solids, is_affordable, most_lines
 
 LOGGER = logging.getLogger("scanfab")
@@ -68,8 +69,7 @@ class Goal:
     """
     What is scanned, and what is to meet the tolerance: here the error of each variant.
 
-    A subclass (a map's) scans to sums of its own, with ``replicates``, ``chords``, ``steps`` and
-    ``work`` as those of ScanSums, and tells their errors.
+    A subclass (a map's) scans to ScanSums with more beside, and tells their errors.
     """
 
     def scan(
@@ -77,20 +77,9 @@ class Goal:
     ) -> Any:
         """The sums of some replicates."""
         return scan_lines(
-            solids,
-            plan.rule,
-            spacing=plan.spacing,
-            cutoff=plan.cutoff,
-            variants=plan.variants,
-            replicates=replicates,
-            seed=plan.seed,
-            workers=plan.workers,
-            most_steps=most_steps,
-        )
-
-    def concatenate(self, parts: Sequence[Any]) -> Any:
-        """All replicates of several such sums."""
-        return ScanSums.concatenate(parts)
+            solids, plan.rule, spacing=plan.spacing, cutoff=plan.cutoff, variants=plan.variants,
+            replicates=replicates, seed=plan.seed, workers=plan.workers, most_steps=most_steps,
+        )  # fmt: skip
 
     def errors(self, sums: Any, plan: Plan, variant: str) -> Errors:
         """By the replicates, and about a polynomial."""
@@ -205,7 +194,7 @@ class _AutoScan:
             batch = self.sums = self._first_round()
         else:
             batch = self.goal.scan(self.solids, self.plan, range(start, stop))
-            self.sums = self.goal.concatenate([self.sums, batch])
+            self.sums = concatenated([self.sums, batch])
         lines = most_lines(self.solids, self.plan.spacing) * len(self.plan.rule)
         self.spent += float(batch.work.sum()) + lines * batch.replicates
         each = float(self.sums.work.mean()) + lines
@@ -228,7 +217,7 @@ class _AutoScan:
             try:
                 first = self.goal.scan(self.solids, self.plan, range(1), most / every)
                 rest = self.goal.scan(self.solids, self.plan, range(1, every), most)
-                return self.goal.concatenate([first, rest])
+                return concatenated([first, rest])
             except FollowedTooFarError:
                 wider = 2.0 * self.plan.spacing
                 if self.plan.auto != "replicates" or self.solids.chords(wider) < 1.0:
