@@ -68,10 +68,10 @@ class Measurement:
 
     def spheres_of(self, variant: Variant) -> tuple[FloatArray, FloatArray, Convex | None]:
         """
-        What a few lines of a variant meet, to be looked at.
+        What a few lines of a variant meet, for figures and views.
 
-        Positions (N, 3) from the solids' origin and radii (N,) of its solids, and what its lines
-        are clipped to, if anything. Of a periodic whole that is a sphere, a part of it.
+        Positions (N, 3) from the solids' origin and radii (N,) of its solids, and the region that
+        its lines are clipped to, if any. Of a periodic whole a part is shown, within a sphere.
         """
         solids, medium = self.solids, self.solids.medium
         position, radius, removed = solids.position, solids.radius, solids.removed
@@ -110,7 +110,7 @@ def _measure(sample: Sample, plan: Plan, where: str) -> Measurement:
 def _with_gaps(
     sample: Sample, solids: Solids, sums: ScanSums, plan: Plan, notes: tuple[Note, ...]
 ) -> Measurement:
-    """What a scan says, with the gaps of its lines if need be, and those by block of fewer."""
+    """A scan with all gaps of its lines, if need be, and the gaps of fewer lines by block."""
     blocks = _blocks(sample, plan)
     scan = partial(
         scan_gaps,
@@ -120,7 +120,7 @@ def _with_gaps(
         variants=plan.variants,
         seed=plan.seed,
         workers=plan.workers,
-        # what these scans take is known from the one before them
+        # the scan before tells how long these take: they need no limit
         most_steps=math.inf,
     )
     gaps = None
@@ -138,7 +138,7 @@ def _with_gaps(
 
 
 def _blocks(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
-    """The octants about the middle of the sample (of the cell), and about the window's centre."""
+    """Octants about the middle of the sample (of the cell), and about the centre of the RV."""
     packing, cell = sample.packing, sample.packing.cell
     position = packing.position[sample.gathered]
     low, high = position.min(axis=0), position.max(axis=0)
@@ -156,10 +156,10 @@ def _blocks(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
 
 def coarse_spacing(solids: Solids, axes: int, before: ScanSums, plan: Plan, most: float) -> float:
     """
-    Of a scan for errors: as close as is of use, but of so many chords at the most.
+    The spacing of a scan for errors: as close as is of use, but it cuts at most so many chords.
 
-    ``axes`` are those of all its replicates. What following lines through a periodic medium takes
-    is known from the scan ``before``.
+    ``axes`` is the number of axes of all its replicates. The scan ``before`` tells how many steps
+    it takes to follow lines through a periodic medium.
     """
     if not len(solids.grain_radius):
         return solids.reach

@@ -31,25 +31,25 @@ AS_ASKED = (
 )  # fmt: skip
 # replicates of a fixed scan, and at least of an auto scan
 REPLICATES = 16
-# and at most of one whose directions are added until its error, as these tell it, is small enough
+# replicates at most of a scan that adds directions until its error, as they tell it, is small
 MOST_REPLICATES = 64
 # lines of one axis below which a replicate's mean lengths are too uncertain to be of use
 FEWEST_LINES = 30
-# of what is scanned: far closer lines than anyone could wait for
+# the closest spacing, over the reach of what is scanned: nobody could wait for closer lines
 CLOSEST = 1e-9
-# of the mean radius: lines so far apart know nothing of one another
+# in mean radii: lines so far apart are independent of one another
 WIDE = 3.0
 
 
 class Noise(NamedTuple):
-    """What the error of a scan costs, as it was measured."""
+    """How many segments a scan needs for its error, as measured in dense packings."""
 
     segments: float
-    """For a standard error of 1, at a spacing of the mean radius."""
+    """Number for a standard error of 1, at a spacing of the mean radius."""
     growth: float
-    """The power of the spacing that they grow with."""
+    """The number grows with this power of the spacing."""
     close: float
-    """Of the mean radius: closer lines say little more than those between which they lie."""
+    """A spacing in mean radii: closer lines say little more than their neighbours do."""
 
 
 # By dimension. In dense packings of spheres whose radii are equal, or in the ratio 3 or 10, the
@@ -220,7 +220,7 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
 
 
 def _share_of_first(windows: Sequence[Window], settings: Settings) -> float:
-    """The part of all chords that the scan of the first RV, of several, cuts at least."""
+    """Of several RVs: the share of all chords that the scan of the first one cuts at least."""
     if len(windows) < 2:
         return 1.0
     if any(not VARIANTS[one].in_window for one in settings.variants):

@@ -22,7 +22,7 @@ from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import cell_of, centers_of, strain_mode
 from scanfab.pipeline.values import Vector
 
-# of the smallest grain: what nobody means
+# in radii of the smallest grain: nobody means an RV as small as this
 SMALLEST = 1e-9
 
 
@@ -32,7 +32,7 @@ class RV(NamedTuple):
     fraction: float | None = None
     """Its size as a fraction of the sample's, where there are several to be told apart."""
     window: Window | None = None
-    """None in a series without grains."""
+    """Its place and shape; None in a series without grains."""
 
 
 def sizes_of(settings: Settings) -> tuple[RV, ...]:

@@ -72,7 +72,7 @@ def sample_state(sample: Sample, variant: Variant, window: Window | None) -> Sam
 
 
 def doubts_of_state(sample: Sample, window: Window | None) -> dict[str, str]:
-    """Why there is no stress, or whom it leaves out, by the code of a note."""
+    """Why there is no stress, or what it leaves out, by the code of a note."""
     contacts, packing = sample.contacts, sample.packing
     if len(contacts) and contacts.force is None:
         known = "no forces" if contacts.force_n is None else "the normal part of forces only"
@@ -104,7 +104,7 @@ def _volume(packing: Packing, window: Window | None) -> float | None:
 
 
 def _places(packing: Packing) -> FloatArray:
-    """The place of each sphere's grain, next to the sphere, shape (N, 3): that of a clump."""
+    """The place of each sphere, of a clump that of its image next to the sphere, shape (N, 3)."""
     bodies, position = packing.bodies, packing.position
     return position if bodies is None else position + bodies.to_place(position, packing.cell)
 
@@ -197,7 +197,7 @@ def cut_volumes(
 
 
 def surely_inside(shape: Convex, points: FloatArray, radius: FloatArray) -> BoolArray:
-    """Which spheres lie in a region as a whole; of a quadric that is no sphere not all of them."""
+    """Whether spheres lie wholly in a region; a few in an ellipsoid or cylinder are not found."""
     form = shape.quadric.form
     # √(x·form·x) is a norm: that of a sphere's places is at most that of both parts
     most = math.sqrt(max(float(np.linalg.eigvalsh(form)[-1]), 0.0))

@@ -156,7 +156,7 @@ class _AutoScan:
     spent: float = 0.0
     """Chords; a line costs as much as a chord, also if it meets nothing."""
     left: float = 0.0
-    """As many replicates as the budget allows."""
+    """How many more replicates the budget allows."""
 
     def run(self, where: str) -> list[Note]:
         """Scan until the tolerance holds or nothing can be added; tell what was not reached."""
@@ -284,7 +284,7 @@ class _AutoScan:
         return Note(TOLERANCE_MISSED, text)
 
     def _dropped(self, counted: str) -> list[Note]:
-        """What variants have reached that the scan did not go on for."""
+        """Notes on the variants that did not count, with the error that they reached."""
         notes = []
         for name, errors in self.errors.items():
             if name in counted or errors.reported <= self.plan.tolerance:
@@ -301,7 +301,7 @@ class _AutoScan:
 
 
 def _with_closer_lines(plan: Plan, missing: float, mean_radius: float) -> Plan:
-    """The plan with lines as close as is of use, and a finer rule for what is missing then."""
+    """The plan with closer lines; if those do not suffice, with more directions, too."""
     noise = NOISE[plan.space.dimension]
     power = plan.space.dimension - 1.0 + noise.growth
     closest = min(noise.close * mean_radius, plan.spacing)
@@ -330,7 +330,7 @@ def _within_budget(plan: Plan, solids: Solids) -> Plan:
 
 
 def _kept_grains(solids: Solids, variant: str) -> float:
-    """The fraction of its window's grains that are solid in a variant."""
+    """The fraction of the grains in a variant's window that are solid in the variant."""
     if variant in "ac":
         return 1.0
     removed = solids.removed if solids.medium is None else solids.medium.removed
