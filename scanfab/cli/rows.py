@@ -44,6 +44,7 @@ def write_table(
     for is_wrong, words in (
         (asked.plot and chosen.get("cutoffs"), "--plot is of one cut-off: leave out --cutoffs"),
         (asked.resume and not asked.output, "--resume goes with -o FILE"),
+        ((asked.follow_for or 0) < 0, "--follow-for: expected 0 or more"),
         (asked.vtk and cluster, "--vtk is written where frames are computed: not with --scheduler"),
     ):
         if is_wrong:
@@ -94,8 +95,7 @@ def _followed(asked: Output, sources: tuple[str, ...], reading: dict[str, Any]) 
 
     if len(sources) > 1 or "-" in sources:
         raise click.UsageError("--follow takes one folder, or one file that grows")
-    with usage_errors("--follow-for "):
-        return follow_series(sources[0], seconds=asked.follow_for, **reading)
+    return follow_series(sources[0], seconds=asked.follow_for, **reading)
 
 
 class _Drawing:

@@ -23,10 +23,8 @@ from scanfab.base import plugins
 from scanfab.io import reader
 from scanfab.pipeline.part import PartFile
 from tests.helpers.dumps import (
-    PAIRS,
     cubic_rows,
     dump_text,
-    pairs_text,
     write,
 )
 from tests.helpers.interruptions import PROGRAM
@@ -118,15 +116,6 @@ def test_damaged_text_names_the_file(tmp_path, refusal, damage, words):
     assert re.search(f"{file}.*{words}", refusal(file))
 
 
-def test_no_radius_says_how_to_give_one_and_a_diameter_does_as_well(tmp_path, refusal, compute):
-    message = refusal(grains(tmp_path, names="id type x y z mass"))
-    assert "no radius" in message
-    assert "--radius" in message
-    by_radius = compute(grains(tmp_path))
-    doubled = [(*row[:5], 2 * row[5]) for row in cubic_rows()]
-    assert compute(grains(tmp_path, doubled, names="id type x y z diameter")).out == by_radius.out
-
-
 @pytest.mark.parametrize("count", ["65", "1000000000000000", "9" * 30])
 def test_a_count_that_is_too_large_is_refused_at_once(tmp_path, refusal, count):
     file = grains(tmp_path)
@@ -142,39 +131,6 @@ def test_a_count_that_is_too_large_is_refused_at_once(tmp_path, refusal, count):
     assert ("expected a whole number" if is_huge else f"counts {count} rows") in message
     assert seconds < 5
     assert most < 50e6
-
-
-def test_the_last_snapshot_of_a_file_that_is_being_written_is_left_out(tmp_path, compute):
-    whole = "".join(dump_text(cubic_rows(), step=step, box=BOX) for step in (0, 1, 2))
-    answer = compute(write(tmp_path / "dump.txt", whole[:-500]))
-    assert {row["step"] for row in answer.rows} == {"0", "1"}
-    assert "number 3, is incomplete" in answer.err
-
-
-# contacts
-
-
-@pytest.mark.parametrize(
-    ("pairs", "words"),
-    [
-        ([*((row, row + 1) for row in range(1, 60)), (1, 9999)], "contact 60 names the grain 9999"),
-        ([*PAIRS, (1, 64)], "the grains 1 and 64 are listed as a contact.*another step"),
-        ([(row + 5000, row + 5001) for row in range(60)], "surely the ids of grains"),
-    ],
-)
-def test_contacts_of_other_grains_are_refused(tmp_path, refusal, pairs, words):
-    grains(tmp_path)
-    write(tmp_path / "pairs_0.txt", pairs_text(pairs))
-    assert re.search(f"{tmp_path}/.*_0.txt: .*{words}", refusal(tmp_path))
-
-
-def test_a_contact_file_of_another_step_is_not_taken(tmp_path, compute, refusal):
-    grains(tmp_path, step=500)
-    pairs = write(tmp_path / "pairs_0.txt", pairs_text(step=600))
-    answer = compute(tmp_path)
-    assert "no contact file for step 500" in answer.err
-    assert {row["contacts_from"] for row in answer.rows} == {"geometric"}
-    assert "no contact file for step 500" in refusal(tmp_path, "--contacts", pairs)
 
 
 # folders and series
@@ -228,15 +184,6 @@ def test_a_broken_frame_can_be_skipped_also_the_first(partly_broken, compute, wo
 
 
 # what does not fit the sample
-
-
-def test_positions_outside_a_box_that_is_not_periodic_are_fine(tmp_path, compute):
-    """The box of such a direction enters nowhere: programs let grains leave it."""
-    shifted = [(*row[:4], row[4] + 1024, row[5]) for row in cubic_rows()]
-    near, far = compute(grains(tmp_path)).rows, compute(grains(tmp_path, shifted)).rows
-    for one, other in zip(near, far, strict=True):
-        assert float(one["alpha_vs"]) == pytest.approx(float(other["alpha_vs"]), rel=1e-6)
-        assert one["contacts"] == other["contacts"]
 
 
 def test_one_grain_far_away_is_too_far_for_the_whole_alone(tmp_path, refusal, compute):

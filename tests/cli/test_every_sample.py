@@ -139,8 +139,6 @@ def _not_a_number(rows):
         (lambda rows: None, 3, ("--rattlers", "force"), 1, "the rule --rattlers force needs the"),
         (lambda rows: None, 6, ("--with", "forces", "--contacts", "geometric"), 1, "by geometry"),
         (_not_a_number, 6, ("--with", "forces"), 1, "a force that is no finite number"),
-        (_not_a_number, 6, ("--with", "state"), 1, "a force that is no finite number"),
-        (_not_a_number, 6, ("--rattlers", "force"), 1, "a force that is no finite number"),
     ],
 )
 def test_forces_that_are_not_there(compute, dump, pairs, change, columns, words, code, message):

@@ -63,12 +63,6 @@ def test_verbose_says_what_is_used_and_how_long_each_frame_takes(said, series):
     assert result == said("compute", *FAST)[0]
 
 
-def test_verbose_says_how_near_a_long_scan_is(said):
-    _, lines = said("compute", "--tolerance", "3e-4", "--frames", "0", "--verbose")
-    state = r"scanfab: frame 0: error [\d.e-]+ of 0\.0003\d*, about \d+ s"
-    assert any(re.fullmatch(state, line) for line in lines)
-
-
 @pytest.mark.parametrize("command", ["compute", "inspect", "calibrate"])
 def test_quiet_and_verbose_exclude_one_another(said, command):
     _, lines = said(command, "--quiet", "--verbose", code=2)
@@ -108,8 +102,3 @@ def test_the_library_is_listened_to_no_longer_than_it_works():
     with working(lambda: 3):
         assert logger.handlers != before[0]
     assert (logger.handlers, logger.level) == before
-
-
-def test_inspect_takes_the_words_too(said):
-    assert notes(said("inspect", "--quiet")[1]) == []
-    assert any("grains from" in line for line in said("inspect", "--verbose")[1])

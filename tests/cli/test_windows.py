@@ -113,20 +113,6 @@ def test_what_cannot_be_is_told_with_what_to_choose(compute, words, message):
     assert message in compute(*words, code=2)
 
 
-@pytest.mark.parametrize(
-    ("source", "words", "message"),
-    [
-        (SHEAR, ["--rv-size", "0.1,0.1,0.1"], "overlaps its own image"),
-        (SHEAR, ["--rv-size", "1e-15,0.01,0.01"], "is nothing beside"),
-        (BOX, ["--rv-size", "0.2,0.01,0.01"], "beyond the sample, that is more than two"),
-        (BOX, ["--rv-size", "0.001,0.001,0.001", "--rv-center", "9", "9", "9"], "holds no grain"),
-        (BOX, ["--rv", "70"], "beyond the sample"),
-    ],
-)
-def test_a_box_that_does_not_fit_the_sample_is_refused(compute, source, words, message):
-    assert message in compute("--rv-shape", "box", *words, source=source, code=1)
-
-
 def test_broken_surfaces_are_told(compute, tmp_path):
     file = tmp_path / "open.ply"
     corners = corners_of_a_box(np.full(3, 0.004))
@@ -134,22 +120,6 @@ def test_broken_surfaces_are_told(compute, tmp_path):
     assert "open.ply: the surface is not closed" in compute("--rv-shape", file, code=1)
     file.write_bytes(b"ply\nnonsense")
     assert "open.ply: cannot be read" in compute("--rv-shape", file, code=1)
-
-
-@pytest.mark.parametrize("name", ["box", "cylinder", "ellipsoid", "follows"])
-def test_paraview_gets_the_surface_of_the_window(compute, tmp_path, name):
-    compute(*SHAPES[name], "--vtk", tmp_path / "vtk", "--variants", "c")
-    first, second = (pyvista.read(tmp_path / "vtk" / f"window_00000{k}.vtp") for k in (0, 1))
-    grains = pyvista.read(tmp_path / "vtk" / "grains_000000.vtp")
-    assert first.is_manifold
-    inside = np.asarray(grains.points)[np.asarray(grains["in_window"]) == 1]
-    assert len(inside) > 20
-    low, high = np.asarray(first.points).min(axis=0), np.asarray(first.points).max(axis=0)
-    cell = np.array([0.01755, 0.01872, 0.01638])
-    # an image of each lies in the box of the surface
-    images = inside + np.rint((0.5 * (low + high) - inside) / cell) * cell
-    assert np.all((images > low - 1e-3 * cell) & (images < high + 1e-3 * cell))
-    assert np.array_equal(first.points, second.points) == (name != "follows")
 
 
 @pytest.mark.parametrize("words", [SHAPES["box"], [*SHAPES["cylinder"], "--cut"]])
