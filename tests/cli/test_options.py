@@ -83,19 +83,6 @@ def test_a_made_up_option_takes_one_declaration(monkeypatch):
     assert function.__doc__.endswith("stray_light : int, optional\n    How much of it, as `rv`.")
 
 
-def test_a_shell_is_offered_words_and_files():
-    from click.shell_completion import ShellComplete
-
-    from scanfab.cli.group import cli
-
-    shell = ShellComplete(cli, {}, "scanfab", "_SCANFAB_COMPLETE")
-    offered = {
-        (flag, text): [one.value for one in shell.get_completions(["compute", flag], text)]
-        for flag, text in (("--variants", "c"), ("--rv-shape", "b"), ("--format", "ya"))
-    }
-    assert list(offered.values()) == [["cd", "c"], ["box", "b"], ["yade"]]
-
-
 def test_the_page_of_the_command_line_shows_what_the_help_has():
     """So that a declared option is on the page without another word."""
     spec = importlib.util.spec_from_file_location("page", DOCS / "make_command_line.py")
