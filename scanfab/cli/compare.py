@@ -109,7 +109,8 @@ def print_comparison(comparison: Comparison) -> None:
     from scanfab.table.row import variant_of
 
     names = short_names((row.source for row in comparison.summary), 20)
-    left_out = {"strain", "shear_strain"} - {strain_column(comparison.frames)}
+    is_sheared = strain_column(comparison.frames) == "shear_strain"
+    left_out = {"strain" if is_sheared else "shear_strain"}
     if len(names) == 1:
         click.echo(next(iter(names.values())))
         left_out.add("source")
