@@ -26,13 +26,6 @@ def test_a_is_seven_and_a_half_alpha_for_transverse_isotropy(lateral):
     assert intensity(matrix) == pytest.approx(7.5 * abs(axial), abs=1e-14)
 
 
-def test_a_does_not_depend_on_the_frame():
-    rng = np.random.default_rng(1)
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    matrix = np.diag([0.25, 0.35, 0.4])
-    assert intensity(turn @ matrix @ turn.T) == pytest.approx(intensity(matrix))
-
-
 @pytest.mark.parametrize("count", [100, 1000])
 def test_the_bias_is_what_isotropic_contacts_give(count):
     """METHOD: the mean of a is 7.136/√N, its standard deviation 2.31/√N."""

@@ -47,17 +47,10 @@ def test_contact_jackknife_is_a_recomputation_without_each_octant():
     ]
     assert found.shift == pytest.approx(np.array(without) - every, abs=1e-14)
     assert found.error == pytest.approx(written_out(without))
-
-
-def test_an_octant_without_contacts_moves_nothing():
-    random = np.random.default_rng(2)
-    found = contact_jackknife(unit_vectors(random, 50), random.integers(0, 7, 50), AXIS)
+    # an octant without contacts moves nothing; if one has them all, there is no error
+    found = contact_jackknife(normals, np.minimum(blocks, 6), AXIS)
     assert found.shift[7] == pytest.approx(0.0, abs=1e-15)
-    assert np.all(found.shift[:7] != 0)
-
-
-def test_contacts_in_one_octant_alone_have_no_error():
-    assert contact_jackknife(np.eye(3), [4, 4, 4], AXIS) is None
+    assert contact_jackknife(normals, np.full(200, 4), AXIS) is None
 
 
 def test_contact_jackknife_of_independent_contacts_is_their_scatter():

@@ -41,11 +41,6 @@ def cubic(offered):
     offered("cubic", Cubic())
 
 
-def test_there_are_no_others_as_a_rule():
-    assert columns.installed_fabrics() == {}
-    assert tuple(column.name for column in columns.table_columns()) == COLUMNS
-
-
 @pytest.mark.usefixtures("cubic")
 def test_its_columns_are_computed_and_stand_behind_the_own_ones():
     packing = scanfab.Packing(simple_cubic(5).position, 0.5)
@@ -64,14 +59,6 @@ def test_its_columns_are_written_and_read_back(tmp_path, suffix):
     write_rows(path, [complete_row(values)], table_columns())
     (row,) = read_rows(path)
     assert row == values
-
-
-@pytest.mark.usefixtures("cubic")
-def test_a_value_that_it_forgets_is_an_error():
-    with pytest.raises(TypeError, match="a value for each column, None for none: vs_longest"):
-        complete_row(dict.fromkeys(COLUMNS) | {"c_fourth": 0.5})
-    with pytest.raises(TypeError, match="None for none: c_forth, c_fourth"):
-        complete_row(dict.fromkeys(COLUMNS) | {"c_forth": 0.5, "vs_longest": None})
 
 
 class Foreign:

@@ -82,22 +82,6 @@ def test_discs_in_a_row_that_overlap():
     assert found == pytest.approx(expected, rel=1e-3)
 
 
-def test_the_integral_is_that_of_the_number():
-    """L(c) = φ - ∫ N dc: the mean length follows from its own derivative."""
-    normal = isotropic_pairs(50)
-    overlap = np.linspace(-0.02, 0.02, 50)
-    for space, flat in ((Space(None), normal), (Space(2), normal * [1, 1, 0])):
-        unit = flat / np.linalg.norm(flat, axis=1)[:, None]
-        pairs = NearPairs(unit, overlap, np.full(50, 0.25), 40.0, 60.0, space)
-        from scanfab.fabric.spectrum import _removed
-
-        cosine = np.abs(unit @ [0.6, 0.8, 0.0])
-        cutoffs = np.linspace(0.0, 0.1, 4001)
-        number = np.array([_removed(pairs, cosine, one)[0] for one in cutoffs])
-        steps = 0.5 * (number[1:] + number[:-1]) * np.diff(cutoffs)
-        assert _removed(pairs, cosine, 0.1)[1] == pytest.approx(steps.sum(), rel=1e-4)
-
-
 def test_it_stands_beside_the_sheared_sample():
     """A real, periodic run: without a cut-off within 15 % where there is anisotropy, as at 0.1."""
     series = scanfab.read_series("sample_data/liggghts_periodic")

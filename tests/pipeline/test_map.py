@@ -138,6 +138,8 @@ def test_a_frame_of_discs_among_spheres_is_refused():
     frames = [Packing(random.uniform(0, 10, (200, k)), 0.3) for k in (3, 2)]
     with pytest.raises(scanfab.PackingError, match="frame 1: all its centres lie in the plane x-y"):
         mapped(frames, slices=2)
+    with pytest.raises(SettingsError, match="all grains are discs in the plane x-y: `compute`"):
+        fabric_map(frames[1], grid=(2, 2, 1))
 
 
 def test_blocks_in_the_middle_of_an_open_sample_lose_no_segments():
@@ -184,25 +186,6 @@ def test_the_rv_and_its_rules(packing):
         assert ("edge" in table.names) == (edge != "clip")
 
 
-def test_discs_are_refused_without_advice_that_would_be_refused_too():
-    random = np.random.default_rng(0)
-    discs = Packing(random.uniform(0, 9, (40, 2)), 0.4, contacts=np.zeros((0, 2), int))
-    with pytest.raises(SettingsError, match="all grains are discs in the plane x-y: `compute`"):
-        fabric_map(discs, grid=(2, 2, 1))
-
-
-def test_the_way_to_blocks_that_no_surface_cuts_is_told():
-    position, radius = simple_cubic(6)
-    for variants, better in [
-        ("a", "or those of the RV by `variants=c` and `edge"),
-        ("c", "or `edge"),
-    ]:
-        _, told = mapped(
-            Packing(position, radius * 0.98), slices=2, variants=variants, contact_tolerance=0.05
-        )
-        assert any(f"choose smaller blocks, {better}=start`" in one for one in told)
-
-
 def test_the_median_block_meets_the_tolerance(packing):
     words = {"directions": "auto", "spacing": "auto", "tolerance": 4e-3}
     table, _ = mapped(packing, grid=(3, 3, 3), **words)
@@ -245,15 +228,10 @@ def test_frames_without_grains_have_empty_rows():
     ("options", "message"),
     [
         ({}, "just one of `grid`, `slices` and `shells`, found none"),
-        ({"grid": "2,2,2", "slices": 3}, "found `grid` and `slices`"),
-        ({"grid": "2,2"}, "grid: expected three numbers"),
-        ({"grid": (2, 0, 2)}, "grid: expected three numbers"),
-        ({"slices": 0}, "slices: expected 1 or more"),
         ({"shells": 2.5}, "shells: expected 1 or more"),
         ({"slices": 2, "cutoffs": "0,1"}, "cutoffs: a map is of one cut-off"),
         ({"slices": 2, "rv": "0.4,0.6"}, "rv: expected one size, .* found 2"),
         ({"slices": 2, "with_": "state"}, "with_: a map has no further columns, found state"),
-        ({"slices": -1}, "slices: expected 1 or more"),
     ],
 )
 def test_what_is_no_map_is_refused(options, message):
