@@ -131,5 +131,5 @@ def test_sizes_that_cannot_be(wrong):
 
 @pytest.mark.parametrize("one", [{"rv_radius": 2.0}, {"rv_shape": "box", "rv_size": "1,2,3"}])
 def test_several_have_no_size_besides(one):
-    with pytest.raises(SettingsError, match="`rv` asks for 2 sizes"):
+    with pytest.raises(SettingsError, match="`rv` asks for 2"):
         Settings(rv=[0.4, 0.5], **one)
