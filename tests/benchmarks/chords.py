@@ -8,57 +8,31 @@ import subprocess
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numba import njit
 
 from scanfab.base.shapes import sphere
-from scanfab.scan.blocks import Blocks
-from scanfab.scan.directions import DirectionRule
-from scanfab.scan.edges import EDGES, START
-from scanfab.scan.gaps import scan_gaps
-from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.lines import line_triads
-from scanfab.scan.scan import scan_lines
-from scanfab.scan.solids import Solids, margin_of
-from tests.benchmarks.packings import PAPER, dense
+from scanfab.scan.solids import Solids
+from tests.benchmarks.packings import PAPER, dense, solids_near
+from tests.benchmarks.scans import CLOSE, CUTOFF, ONE_AXIS, sweep
 from tests.benchmarks.timing import interleaved, table
 
 HERE = Path(__file__).parent
-SPACING = 0.05
-CUTOFF = 0.5
-AXIS = np.array([[0.36, 0.48, 0.8]])
-RULE = DirectionRule("one", AXIS, np.ones(1), None, turned=False)
 # of a scan in threads: as many as an auto scan starts with
 DIRECTIONS = 16
-EMBREE_LIMIT = 110.0
-# of RVs for which the rules at their surface are compared, in mean radii
-EDGE_RADII = (5.0, 10.0, 20.0)
+EMBREE = "Embree 3, 16 rays a packet, all hits"
+FLOOR = "floor: only the square roots (Numba)"
 
 
 def rv_solids() -> Solids:
     """The grains of the paper's sample that reach into the RV of 0.7."""
     position, radius = dense(PAPER)
     extent = (position + radius[:, None]).max(axis=0) - (position - radius[:, None]).min(axis=0)
-    window = 0.7 * 0.5 * extent.min()
-    near = np.linalg.norm(position, axis=1) < window + radius
-    removed = np.random.default_rng(1).random(near.sum()) < 0.1
-    return Solids(position[near], radius[near], removed, sphere(float(window)))
-
-
-def sweep(solids, variants="c", directions=1, workers=1, spacing=SPACING):
-    """One replicate a direction."""
-    return scan_lines(
-        solids,
-        RULE,
-        spacing=spacing,
-        cutoff=CUTOFF,
-        variants=variants,
-        replicates=range(directions),
-        workers=workers,
-    )
+    return solids_near(sphere(0.7 * 0.5 * float(extent.min())))
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
@@ -163,15 +137,15 @@ class Projected:
     """The spheres along the axis, and the grid over the window."""
 
     def __init__(self, solids: Solids) -> None:
-        u, v, depth = line_triads(AXIS)[0] @ solids.position.T
+        u, v, depth = line_triads(ONE_AXIS.axes)[0] @ solids.position.T
         order = np.argsort(depth)
         self.u, self.v, self.depth = u[order], v[order], depth[order]
         self.radius = solids.radius[order]
-        self.lines = int(2 * solids.reach / SPACING)
-        self.grid = (-0.5 * self.lines * SPACING, SPACING, self.lines, solids.reach)
+        self.lines = int(2 * solids.reach / CLOSE)
+        self.grid = (-0.5 * self.lines * CLOSE, CLOSE, self.lines, solids.reach)
 
-    def floor(self, part: slice = slice(None)):
-        return floor(self.u[part], self.v[part], self.radius[part], *self.grid)
+    def floor(self):
+        return floor(self.u, self.v, self.radius, *self.grid)
 
     def floor_in_threads(self, threads: int):
         with ThreadPoolExecutor(threads) as pool:
@@ -194,157 +168,67 @@ def floor_in_c(projected: Projected, folder: Path):
     function = ctypes.CDLL(str(library)).floor_c
     double = ctypes.c_double
     function.restype = double
-    arrays = [a.ctypes.data_as(ctypes.c_void_p) for a in (projected.u, projected.v)]
-    arrays.append(projected.radius.ctypes.data_as(ctypes.c_void_p))
+    arrays = [
+        one.ctypes.data_as(ctypes.c_void_p) for one in (projected.u, projected.v, projected.radius)
+    ]
     first, spacing, lines, window = projected.grid
     rest = (double(first), double(spacing), ctypes.c_long(lines), double(window))
     return lambda: function(ctypes.c_long(projected.u.size), *arrays, *rest)
 
 
 def embree(projected: Projected, folder: Path):
-    """Nanoseconds a chord of Embree, or why it was not measured."""
+    """A way that returns Embree's own seconds, without the time to load; None if there is none."""
     program = folder / "embree"
-    source = str(HERE / "embree.cpp")
-    flags = ["-O3", "-march=native", source, "-o", str(program), "-lembree3"]
+    flags = ["-O3", "-march=native", str(HERE / "embree.cpp"), "-o", str(program), "-lembree3"]
     if shutil.which("g++") is None:
-        return "no g++"
+        return None
     if subprocess.run(["g++", *flags], capture_output=True, check=False).returncode:
-        return "Embree 3 is not installed (Debian: libembree-dev)"
+        return None
     spheres = np.column_stack([projected.u, projected.v, projected.depth, projected.radius])
     spheres.astype(np.float32).tofile(folder / "spheres")
-    words = [str(word) for word in (*projected.grid, CUTOFF)]
-    done = subprocess.run(
-        [str(program), str(folder / "spheres"), *words], capture_output=True, text=True, check=True
-    )
-    seconds, hits, kept = (float(word) for word in done.stdout.split())
-    return seconds, int(hits), int(kept)
+    command = [program, folder / "spheres", *(str(one) for one in (*projected.grid, CUTOFF))]
+    return lambda: float(subprocess.check_output(command, text=True).split()[0])
 
 
-def run(repeats: int) -> dict[str, str]:
-    """The sections ``chords``, ``variants``, ``edges``, ``maps`` and ``threads``."""
+def chords(repeats: int) -> str:
+    """One direction in one thread: the scan, its floor, a list per line, and Embree."""
     solids = rv_solids()
     projected = Projected(solids)
     count = projected.floor()[1]
-    with tempfile.TemporaryDirectory() as name:
-        return {
-            "chords": _chords(solids, projected, count, Path(name), repeats),
-            "variants": _variants(solids, repeats),
-            "edges": _edges(repeats),
-            "maps": _maps(repeats),
-            "threads": _threads(solids, projected, repeats),
-        }
-
-
-def _chords(solids, projected, count, folder, repeats):
     ways = {
-        "scanfab, variant c": lambda: sweep(solids),
-        "floor: only the square roots (Numba)": projected.floor,
+        "scanfab, variant c": partial(sweep, solids),
+        FLOOR: projected.floor,
         "list per line, sorted and merged (Numba)": projected.list_per_line,
     }
-    in_c = floor_in_c(projected, folder)
-    if in_c is not None:
-        ways["the same floor in C, gcc -O3 -march=native"] = in_c
-    rays: list[tuple[float, int, int]] = []
-    said = embree(projected, folder)
-    if not isinstance(said, str):
-        ways["Embree 3, 16 rays a packet, all hits"] = lambda: rays.append(
-            embree(projected, folder)
-        )
-    seconds = interleaved(ways, repeats, clock=time.process_time)
-    if rays:  # without the time to load and build
-        seconds["Embree 3, 16 rays a packet, all hits"] = float(np.median([r[0] for r in rays]))
-    base = seconds["floor: only the square roots (Numba)"]
+    note = f"\n\n{len(solids.radius):,} grains reach into the RV; {count:,} chords."
+    with tempfile.TemporaryDirectory() as name:
+        in_c = floor_in_c(projected, Path(name))
+        if in_c is not None:
+            ways["the same floor in C, gcc -O3 -march=native"] = in_c
+        seconds = interleaved(ways, repeats, clock=time.process_time)
+        rays = embree(projected, Path(name))
+        if rays is None:
+            note += " Without g++ or Embree 3 (Debian: libembree-dev) that was not measured."
+        else:
+            seconds |= interleaved({EMBREE: rays}, repeats, clock=None)
     rows = [
-        (name, f"{1e9 * value / count:.2f}", f"{value / base:.2f}")
+        (name, f"{1e9 * value / count:.2f}", f"{value / seconds[FLOOR]:.2f}")
         for name, value in sorted(seconds.items(), key=lambda item: item[1])
     ]
-    if isinstance(said, str):
-        rows.append(("Embree 3", f"skipped: {said}", "-"))
-    elif 1e9 * seconds["Embree 3, 16 rays a packet, all hits"] / count > EMBREE_LIMIT:
-        rows.append((f"(Embree is badly used above {EMBREE_LIMIT:.0f} ns)", "", ""))
-    note = f"\n\n{len(solids.radius):,} grains reach into the RV; {count:,} chords."
     return table(["way", "ns a chord", "of the floor"], rows) + note
 
 
-def _variants(solids, repeats):
-    position, radius = dense(PAPER)
-    removed = np.random.default_rng(1).random(PAPER) < 0.1
-    whole = Solids(position, radius, removed, solids.window)
-    seconds = interleaved(
-        {variants: lambda v=variants: sweep(whole, v) for variants in ("a", "abcd")},
-        repeats,
-        clock=time.process_time,
-    )
-    rows = [(name, f"{value / seconds['a']:.2f}") for name, value in seconds.items()]
-    return table(["variants in one pass", "time of a alone"], rows)
-
-
-def _edges(repeats):
-    """The rules at the window's surface, of which one needs the grains beyond it, too."""
-    position, radius = dense(PAPER)
-    removed = np.zeros(PAPER, bool)
-    around = CellGrains(position, radius, removed, np.eye(3), np.zeros(3, bool))
-    rows = []
-    for size in EDGE_RADII:
-        window, ways = sphere(size * float(radius.mean())), {}
-        for edge in EDGES:
-            every = around if edge == START else None
-            near = window.may_meet(position, radius + (margin_of(every) if every else 0.0))
-            chosen = position[near], radius[near], removed[near], window
-            ways[edge] = Solids(*chosen, edge=edge, around=every)
-        for spacing, directions in ((SPACING, int(400 / size**2)), (1.5, int(20_000 / size**1.5))):
-            words = {"spacing": spacing, "directions": directions}
-            seconds = interleaved(
-                {edge: lambda s=of, w=words: sweep(s, **w) for edge, of in ways.items()},
-                repeats,
-                clock=time.process_time,
-            )
-            ratios = [f"{seconds[edge] / seconds['clip']:.2f}" for edge in EDGES[1:]]
-            rows.append((f"{size:g}", f"{spacing:g}", *ratios))
-    titles = [
-        "radius of the RV",
-        "spacing of lines",
-        *(f"`{edge}` over `clip`" for edge in EDGES[1:]),
-    ]
-    return table(titles, rows)
-
-
-def _maps(repeats):
-    """Blocks of all grains beside the same lines without any."""
-    position, radius = dense(PAPER)
-    solids = Solids(position, radius, np.zeros(PAPER, bool))
-    reach = float(np.abs(position).max() + radius.max())
-    box = Blocks(np.full(3, -reach), 2 * reach * np.eye(3), (10, 10, 10))
-    kinds = {
-        "octants": Blocks.about(np.zeros(3), 2 * reach),
-        "a grid of 1,000 blocks": box,
-        "10 shells": replace(box, parts=(1, 1, 1), radius=reach, shells=10),
-    }
-    rows = []
-    for spacing, directions in ((0.3, 16), (1.0, 100), (1.5, 200)):
-        words = {"spacing": spacing, "variants": "a", "replicates": range(directions)}
-        ways = {"none": lambda w=words: scan_lines(solids, RULE, cutoff=CUTOFF, **w)}
-        for name, one in kinds.items():
-            ways[name] = lambda b=one, w=words: scan_gaps(
-                solids, RULE, cutoffs=[CUTOFF], blocks=(b, b), **w
-            )
-        seconds = interleaved(ways, repeats, clock=time.process_time)
-        rows += [
-            (f"{name}, lines {spacing:g} mean radii apart", f"{value / seconds['none']:.2f}")
-            for name, value in seconds.items()
-        ]
-    return table(["blocks", "of none"], rows)
-
-
-def _threads(solids, projected, repeats):
-    ways = {
-        "scanfab 1": lambda: sweep(solids, directions=DIRECTIONS),
-        "scanfab 2": lambda: sweep(solids, directions=DIRECTIONS, workers=2),
-        "floor 1": lambda: projected.floor_in_threads(1),
-        "floor 2": lambda: projected.floor_in_threads(2),
-    }
+def threads(repeats: int) -> str:
+    """What a second thread gives, for many directions."""
+    solids = rv_solids()
+    projected = Projected(solids)
+    ways = {f"floor {n}": partial(projected.floor_in_threads, n) for n in (1, 2)}
+    for n in (1, 2):
+        ways[f"scanfab {n}"] = partial(sweep, solids, directions=DIRECTIONS, workers=n)
     seconds = interleaved(ways, repeats)
     gain = {name: seconds[f"{name} 1"] / seconds[f"{name} 2"] for name in ("scanfab", "floor")}
-    rows = [(name, f"{value:.2f}") for name, value in gain.items()]
-    rows.append(("scanfab / floor", f"{gain['scanfab'] / gain['floor']:.2f}"))
-    return table(["two threads", "of one"], rows)
+    gain["scanfab / floor"] = gain["scanfab"] / gain["floor"]
+    return table(["two threads", "of one"], [(n, f"{one:.2f}") for n, one in gain.items()])
+
+
+SECTIONS = {"chords": chords, "threads": threads}

@@ -1,111 +1,176 @@
-"""scanfab.read on a text dump of two million grains against general parsers, same columns."""
+"""scanfab.read on large text files against general parsers, which are told where the rows are."""
 
 from __future__ import annotations
 
+import os
 import tempfile
-import warnings
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 import scanfab
 from tests.benchmarks.timing import interleaved, table
-
-NAMES = ["id", "type", "x", "y", "z", "vx", "vy", "vz", "fx", "fy", "fz", "radius", "mass"]
-NEEDED = ["id", "type", "x", "y", "z", "radius"]
-PLACES = [NAMES.index(name) for name in NEEDED]
-HEADER = 9
+from tests.helpers.made import lf_dem, mfix
+from tests.helpers.made.data_files import HEAD as DATA_HEAD
 
 
-def write_dump(path: Path, count: int) -> None:
-    """As LIGGGHTS writes it: %d and %g, and a blank at the end of a line."""
-    random = np.random.default_rng(0)
-    id = random.permutation(count) + 1
-    row = "%d %d " + "%g " * 11 + "\n"
-    with open(path, "w") as file:
-        file.write(f"ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n{count}\n")
-        file.write(
-            "ITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\nITEM: ATOMS " + " ".join(NAMES) + " \n"
+class Text(NamedTuple):
+    """A kind of file: its name, what stands above the rows, and the row of a grain."""
+
+    file: str
+    head: str
+    row: str
+    separator: str = " "
+    """Of several blanks in a row polars would make empty words, so that pandas reads these."""
+    needed: Sequence[int] | None = None
+    """Places of the words that a general parser makes arrays of; all if None."""
+
+
+NAMES = "id,x,y,z,radius\n"
+ROW = "{i},{x!r},{y!r},{z!r},{r!r}\n"
+ITEMS = (
+    "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n@\nITEM: BOX BOUNDS ff ff ff\n"
+    "0 1\n0 1\n0 1\nITEM: ATOMS "
+)
+DUMP = Text(
+    "large.dump",
+    f"{ITEMS}id type x y z vx vy vz fx fy fz radius mass \n",
+    "{i} 1 {x:g} {y:g} {z:g} {x:g} {y:g} {z:g} {z:g} {x:g} {y:g} {r:g} {x:g} \n",
+    needed=(0, 1, 2, 3, 4, 11),
+)
+LARGE = {
+    "table, .csv": Text("table.csv", NAMES, ROW, ","),
+    "table, .tsv": Text("table.tsv", NAMES.replace(",", "\t"), ROW.replace(",", "\t"), "\t"),
+    "table, .txt": Text("table.txt", NAMES.replace(",", " "), ROW.replace(",", " ")),
+    "table, aligned by blanks": Text(
+        "aligned.txt",
+        "# id x y z radius\n",
+        " {i:8d} {x:14.7e} {y:14.7e} {z:14.7e} {r:14.7e}\n",
+        r"\s+",
+    ),
+    "table, without names": Text("unnamed.txt", "", "{x:.9g} {y:.9g} {z:.9g} {r:.9g}\n"),
+    "YADE `export.text`": Text("a.txt", "#format x_y_z_r\n", "{x:g}\t{y:g}\t{z:g}\t{r:g}\n", "\t"),
+    "LAMMPS text dump": Text(
+        "a.lammpstrj", f"{ITEMS}id type x y z radius\n", "{i} 1 {x:g} {y:g} {z:g} {r:g}\n"
+    ),
+}
+FORMATS = LARGE | {
+    "LIGGGHTS data file": Text(
+        "liggghts.data",
+        DATA_HEAD.format(title="LIGGGHTS data file", style=" # sphere").replace(
+            "3 atoms", "@ atoms"
+        ),
+        "{i} 1 {r:.17g} 2500 {x:.17g} {y:.17g} {z:.17g}\n",
+    ),
+    "extended XYZ": Text(
+        "packing.xyz",
+        '@\nLattice="9 0 0 0 9 0 0 0 9" Properties=id:I:1:pos:R:3:radius:R:1\n',
+        ROW.replace(",", " "),
+    ),
+    "MercuryDPM, `.data`": Text(
+        "a.data",
+        "@ 0.5 0 0 0 1 1 1 \n",
+        "{x:.10g} {y:.10g} {z:.10g} 0.1 0.2 0.3 {r:.10g} 1 0 0 0 0 0 0\n",
+    ),
+    "LF_DEM `par_*.dat`": Text(
+        "par.dat",
+        lf_dem.HEAD.replace("np 3", "np @") + lf_dem.GRAINS + "# 0.1 1 0.2 0 0 \n",
+        "{i} {r:g} {x:g} {y:g} {z:g} 9.12345 9.12345 9.12345 \n",
+    ),
+    "MFiX version 1": Text(
+        "particle_input.dat",
+        "",
+        "  {x:19.12E}  {y:19.12E}  {z:19.12E}  {r:19.12E}  2.65E+03  0.0E+00  0.0E+00  0.0E+00\n",
+        r"\s+",
+    ),
+    "MFiX version 2": Text(
+        "two.dat",
+        mfix.HEADER.format(diameter="T  0.0017", dimension=3).replace(
+            "Particles:    2", "Particles: @"
+        ),
+        "  {x:19.14E}  {y:19.14E}  {z:19.14E}  {r:19.14E}  2.65E+03  0.0E+00  0.0E+00  0.0E+00\n",
+        r"\s+",
+    ),
+}
+
+
+def write(text: Text, folder: Path, count: int) -> Path:
+    """A file of spheres in rows that touch; its head says their number where it has an @."""
+    place = np.indices((count // 10_000, 100, 100)).reshape(3, -1).T * 0.002
+    place = place + 1e-6 * np.random.default_rng(0).random(place.shape)
+    radius = 0.001 + 1e-7 * np.random.default_rng(1).random(count)
+    # in a folder of its own: other files beside it might hold its contacts, and would be looked at
+    path = Path(tempfile.mkdtemp(dir=folder)) / text.file
+    with path.open("w") as file:
+        file.write(text.head.replace("@", str(count)))
+        rows = zip(place.tolist(), radius.tolist(), strict=True)
+        file.writelines(
+            text.row.format(i=i, x=x, y=y, z=z, r=r) for i, ((x, y, z), r) in enumerate(rows, 1)
         )
-        for start in range(0, count, 100_000):
-            part = id[start : start + 100_000]
-            values = random.random((len(part), 11))
-            values[:, 3:9] = 1e-3 * random.standard_normal((len(part), 6))
-            values[:, 9:] = 0.005 + 0.01 * values[:, 9:]
-            file.writelines(
-                row % (number, 1, *line)
-                for number, line in zip(part.tolist(), values.tolist(), strict=True)
-            )
+    return path
 
 
-def parsers(path: Path, count: int) -> dict[str, Callable[[], object]]:
-    """Those that are installed; each makes arrays of the needed columns."""
-    names = [*NAMES, "behind"]
+def parsers(path: Path, text: Text) -> dict[str, Callable[[], object]]:
+    """Those that are installed; each makes arrays of the needed columns as numbers."""
+    above = text.head.count("\n")
+    separator = None if text.separator == r"\s+" else text.separator
+    names = [str(place) for place in range(len(text.row.split(separator)))]
+    # a separator at the end of a row
+    ends = [names.pop()] if text.row.endswith(" \n") else []
+    needed = names if text.needed is None else [names[k] for k in text.needed]
 
     def with_polars() -> object:
         import polars
 
-        schema = {**dict.fromkeys(NAMES, polars.Float64), "behind": polars.String}
-        frame = polars.scan_csv(
-            path,
-            has_header=False,
-            separator=" ",
-            quote_char=None,
-            schema=schema,
-            skip_lines=HEADER,
-        )
-        found = frame.select(NEEDED).collect()
-        return [found[name].to_numpy() for name in NEEDED]
+        schema = {**dict.fromkeys(names, polars.Float64), **dict.fromkeys(ends, polars.String)}
+        found = polars.scan_csv(
+            path, has_header=False, separator=text.separator, quote_char=None,
+            schema=schema, skip_lines=above,
+        ).select(needed).collect()  # fmt: skip
+        return [found[name].to_numpy() for name in needed]
 
     def with_pandas() -> object:
         import pandas
 
         found = pandas.read_csv(
-            path,
-            engine="c",
-            sep=" ",
-            header=None,
-            names=names,
-            usecols=NEEDED,
-            skiprows=HEADER,
-            dtype=np.float64,
-        )
-        return [found[name].to_numpy() for name in NEEDED]
+            path, engine="c", sep=text.separator, header=None, names=[*names, *ends],
+            usecols=needed, skiprows=above, dtype=np.float64,
+        )  # fmt: skip
+        return [found[name].to_numpy() for name in needed]
 
     def with_pyarrow() -> object:
         from pyarrow import csv
 
+        types = dict.fromkeys(names, "float64")
         found = csv.read_csv(
             path,
-            read_options=csv.ReadOptions(column_names=names, skip_rows=HEADER),
-            parse_options=csv.ParseOptions(delimiter=" ", quote_char=False),
-            convert_options=csv.ConvertOptions(
-                include_columns=NEEDED, column_types=dict.fromkeys(NAMES, "float64")
-            ),
+            read_options=csv.ReadOptions(column_names=[*names, *ends], skip_rows=above),
+            parse_options=csv.ParseOptions(delimiter=text.separator, quote_char=False),
+            convert_options=csv.ConvertOptions(include_columns=needed, column_types=types),
         )
-        return [found[name].to_numpy() for name in NEEDED]
+        return [found[name].to_numpy() for name in needed]
 
     def with_numpy() -> object:
-        return np.loadtxt(path, skiprows=HEADER, usecols=PLACES, comments=None, max_rows=count)
+        return np.loadtxt(path, skiprows=above, usecols=text.needed, comments=None)
 
     def with_ovito() -> object:
         from ovito.io import import_file
 
         known = ["Particle Identifier", "Particle Type", *(f"Position.{x}" for x in "XYZ")]
         found = import_file(path, columns=[*known, *6 * [None], "Radius", None]).compute()
-        return [
-            found.particles[name][...] for name in ("Particle Identifier", "Position", "Radius")
-        ]
+        return [found.particles[name][...] for name in (known[0], "Position", "Radius")]
 
-    ways = {
-        "polars": with_polars,
-        "pandas": with_pandas,
-        "pyarrow": with_pyarrow,
-        "numpy": with_numpy,
-        "ovito": with_ovito,
-    }
+    ways = {"pandas": with_pandas}
+    if text.separator != r"\s+":
+        ways = {"polars": with_polars}
+    if text is DUMP:
+        ways |= {"pandas": with_pandas, "pyarrow": with_pyarrow, "numpy": with_numpy}
+        ways["ovito"] = with_ovito
     return {name: way for name, way in ways.items() if _is_installed(name)}
 
 
@@ -117,21 +182,45 @@ def _is_installed(name: str) -> bool:
     return True
 
 
-def run(repeats: int, count: int = 2_000_000) -> dict[str, str]:
-    """The section ``reading``."""
-    warnings.simplefilter("ignore")
+def read(path: Path) -> object:
+    """By scanfab, as if the file were new."""
+    os.utime(path)
+    return scanfab.read(path)
+
+
+def reading(repeats: int, count: int = 2_000_000) -> str:
+    """A dump as LIGGGHTS writes it, against all parsers."""
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "large.dump"
-        write_dump(path, count)
-        ways = parsers(path, count)
-        seconds = interleaved({"scanfab.read": lambda: scanfab.read(path), **ways}, repeats)
+        path = write(DUMP, Path(folder), count)
+        ways = parsers(path, DUMP)
+        seconds = interleaved({"scanfab.read": partial(read, path), **ways}, repeats)
     best = min(value for name, value in seconds.items() if name in ways)
     rows = [
         (name, f"{value:.2f}", f"{best / value:.2f}")
         for name, value in sorted(seconds.items(), key=lambda item: item[1])
     ]
-    missing = [
-        name for name in ("polars", "pandas", "pyarrow", "numpy", "ovito") if name not in ways
-    ]
-    note = f"\n\nNot installed, so not measured: {', '.join(missing)}." if missing else ""
-    return {"reading": table(["reader", "seconds", "speed of the best parser"], rows) + note}
+    return table(["reader", "seconds", "speed of the best parser"], rows)
+
+
+def of_formats(
+    repeats: int, formats: dict[str, Text], count: int, clock: Callable[[], float]
+) -> str:
+    """Each format beside polars, or pandas for words several blanks apart."""
+    lines = []
+    for title, text in formats.items():
+        with tempfile.TemporaryDirectory() as folder:
+            path = write(text, Path(folder), count)
+            ways = {"scanfab": partial(read, path), **parsers(path, text)}
+            (_, ours), (name, theirs) = interleaved(ways, repeats, clock=clock).items()
+            size = path.stat().st_size / 1e6
+        numbers = (f"{size:.0f}", f"{size / ours:.0f}", name, f"{theirs / ours:.2f}")
+        lines.append((title, *numbers))
+    return table(["file", "MB", "MB/s", "parser", "of its speed"], lines)
+
+
+SECTIONS = {
+    "reading": reading,
+    "reading large": partial(of_formats, formats=LARGE, count=1_000_000, clock=time.perf_counter),
+    # processor time is best compared in one thread: POLARS_MAX_THREADS=1
+    "reading formats": partial(of_formats, formats=FORMATS, count=300_000, clock=time.process_time),
+}

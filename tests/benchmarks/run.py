@@ -2,6 +2,9 @@
 All benchmarks by one command; see docs/performance.md.
 
 python tests/benchmarks/run.py [--only chords reading ...] [--repeats 5] [--largest] [-w]
+
+Each section of the page is a function of a module's SECTIONS, which takes how many runs of each way
+there are and returns a table.
 """
 
 from __future__ import annotations
@@ -11,21 +14,14 @@ import datetime
 import platform
 import subprocess
 import sys
+import warnings
+from functools import partial
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-GROUPS = (
-    "chords",
-    "windows",
-    "periodic",
-    "scaling",
-    "startup",
-    "reading",
-    "reading_formats",
-    "reading_large",
-)
+MODULES = ("chords", "scans", "scaling", "startup", "reading")
 PACKAGES = ("scanfab", "numpy", "numba", "polars")
 
 
@@ -44,29 +40,27 @@ def machine() -> str:
     )
 
 
-def measure(group: str, repeats: int, largest: bool) -> dict[str, str]:
-    """The sections of a group of benchmarks."""
-    run = import_module(f"tests.benchmarks.{group}").run
-    found: dict[str, str] = run(repeats, largest) if group == "scaling" else run(repeats)
-    return found
-
-
 def main() -> None:
     """Measure, print, and with --write renew the page."""
+    warnings.simplefilter("ignore")
+    sys.path[0] = str(ROOT)  # not this folder, whose modules have common names
+    timing = import_module("tests.benchmarks.timing")
+    sections = {}
+    for module in MODULES:
+        sections |= import_module(f"tests.benchmarks.{module}").SECTIONS
     parser = argparse.ArgumentParser(description="Measure the ratios of docs/performance.md.")
-    parser.add_argument("--only", nargs="+", choices=GROUPS, default=GROUPS)
+    parser.add_argument("--only", nargs="+", choices=sections, default=[*sections], metavar="NAME")
     parser.add_argument("--repeats", type=int, default=5, help="runs of which the median counts")
     parser.add_argument("--largest", action="store_true", help="ten million grains too")
     parser.add_argument("-w", "--write", action="store_true", help="renew the tables of the page")
     given = parser.parse_args()
-    sys.path[0] = str(ROOT)  # not this folder, whose modules have common names
-    timing = import_module("tests.benchmarks.timing")
-    for group in given.only:
-        for name, text in measure(group, given.repeats, given.largest).items():
-            dated = f"{machine()}\n\n{text}"
-            print(f"\n## {name}\n\n{dated}", flush=True)
-            if given.write:
-                timing.write_section(name, dated)
+    if given.largest:
+        sections["growth"] = partial(sections["growth"], largest=True)
+    for name in given.only:
+        dated = f"{machine()}\n\n{sections[name](given.repeats)}"
+        print(f"\n## {name}\n\n{dated}", flush=True)
+        if given.write:
+            timing.write_section(name, dated)
 
 
 if __name__ == "__main__":

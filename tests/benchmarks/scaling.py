@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 import warnings
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,44 +23,30 @@ SIZES = (10_000, 100_000, 1_000_000)
 LARGEST = 10_000_000
 
 
-def run(repeats: int, largest: bool) -> dict[str, str]:
-    """The sections ``tolerance``, ``neighbours`` and ``growth``."""
-    warnings.simplefilter("ignore")
-    return {
-        "tolerance": _tolerance(repeats),
-        "neighbours": _neighbours(repeats),
-        "growth": _growth((*SIZES, LARGEST) if largest else SIZES),
-    }
-
-
-def _tolerance(repeats: int, tolerance: float = 1e-4) -> str:
+def tolerance(repeats: int) -> str:
+    """Seconds of ``compute`` at the default tolerance."""
     packing = dense_packing(PAPER)
-
-    def compute(workers: int):
-        return scanfab.compute(packing, tolerance=tolerance, workers=workers)
-
-    seconds = interleaved({f"{n}": lambda n=n: compute(n) for n in (1, 2)}, repeats)
-    found = compute(2)
+    ways = {f"{n}": partial(scanfab.compute, packing, workers=n) for n in (1, 2)}
+    seconds = interleaved(ways, repeats)
+    found = ways["2"]()
     error = max(found["alpha_vs_axial_se"])
     rows = [(n, f"{value:.3f}") for n, value in seconds.items()]
     note = f"\n\n{sum(found['segments']):,} segments; the largest standard error is {error:.1e}."
     return table(["threads", "seconds"], rows) + note
 
 
-def _neighbours(repeats: int) -> str:
+def neighbours(repeats: int) -> str:
+    """Contacts by geometry."""
     packing = scanfab.Packing(*dense(200_000))
-    seconds = interleaved(
-        {"": lambda: scanfab.find_contacts(packing)}, repeats, clock=time.process_time
-    )[""]
-    return table(
-        ["grains", "million grains a second"],
-        [(f"{len(packing):,}", f"{len(packing) / seconds / 1e6:.2f}")],
-    )
+    ways = {"": partial(scanfab.find_contacts, packing)}
+    speed = len(packing) / interleaved(ways, repeats, clock=time.process_time)[""] / 1e6
+    return table(["grains", "million grains a second"], [(f"{len(packing):,}", f"{speed:.2f}")])
 
 
-def _growth(sizes: tuple[int, ...]) -> str:
+def growth(repeats: int, largest: bool = False) -> str:
+    """Each size once, in a process of its own."""
     rows = []
-    for count in sizes:
+    for count in (*SIZES, LARGEST) if largest else SIZES:
         with tempfile.TemporaryDirectory() as folder:
             packing = dense_packing(count)
             np.savez(
@@ -74,25 +61,12 @@ def _growth(sizes: tuple[int, ...]) -> str:
                 [sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE, check=True
             )
         found = json.loads(answer.stdout)
-        rows.append(
-            (
-                f"{count:,}",
-                f"{found['seconds']:.2f}",
-                f"{1e6 * found['seconds'] / count:.2f}",
-                f"{found['table'] / 2**20:.0f}",
-                f"{found['peak'] / 2**20:.0f}",
-                f"{(found['peak'] - found['table']) / count:.0f}",
-            )
-        )
-    titles = [
-        "grains",
-        "seconds",
-        "µs a grain",
-        "MiB with the table",
-        "peak MiB",
-        "more, B a grain",
-    ]
-    return table(titles, rows)
+        numbers = [f"{found['seconds']:.2f}", f"{1e6 * found['seconds'] / count:.2f}"]
+        numbers += [f"{found[name] / 2**20:.0f}" for name in ("table", "peak")]
+        numbers.append(f"{(found['peak'] - found['table']) / count:.0f}")
+        rows.append((f"{count:,}", *numbers))
+    sizes = ["MiB with the table", "peak MiB", "more, B a grain"]
+    return table(["grains", "seconds", "µs a grain", *sizes], rows)
 
 
 def one_size(folder: str) -> None:
@@ -112,3 +86,6 @@ def _peak() -> int:
     """Bytes; macOS counts bytes, Linux kilobytes."""
     unit = 1 if sys.platform == "darwin" else 1024
     return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+SECTIONS = {"tolerance": tolerance, "neighbours": neighbours, "growth": growth}

@@ -1,45 +1,59 @@
-"""Medians of interleaved runs, and the tables of docs/performance.md."""
+"""Interleaved runs of several ways to do a thing, and the tables of docs/performance.md."""
 
 from __future__ import annotations
 
 import gc
 import random
 import re
-import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 ENOUGH = 10.0
 PAGE = Path(__file__).parents[2] / "docs" / "performance.md"
 
 
-def interleaved(
-    ways: Mapping[str, Callable[[], object]],
+def samples(
+    ways: Mapping[str, Callable[[], Any]],
     repeats: int,
     warm: bool = True,
-    clock: Callable[[], float] = time.perf_counter,
-) -> dict[str, float]:
+    clock: Callable[[], Any] | None = time.perf_counter,
+) -> dict[str, np.ndarray]:
     """
-    Median seconds of each way: one run of each in turn, so that all share the machine's moods.
+    Seconds of each way in each turn; ways take turns, so that all share the machine's moods.
 
     Each turn has an order of its own, as a run also feels what the one before it left in caches.
     Ways that take milliseconds have more turns, until the median is not a matter of luck. What runs
-    in one thread is measured by ``time.process_time``: other work on the machine matters less.
+    in one thread is measured by ``time.process_time``: other work on the machine matters less. A
+    clock may be several clocks in one array; without a clock each way returns its own seconds.
     """
     if warm:
         for way in ways.values():
             way()
-    seconds: dict[str, list[float]] = {name: [] for name in ways}
+    seconds: dict[str, list[Any]] = {name: [] for name in ways}
     began, turns, order = time.perf_counter(), 0, random.Random(0)
     while turns < repeats or (warm and time.perf_counter() - began < ENOUGH):
         turns += 1
         for name in order.sample(list(ways), len(ways)):
             gc.collect()
-            start = clock()
-            ways[name]()
-            seconds[name].append(clock() - start)
-    return {name: statistics.median(values) for name, values in seconds.items()}
+            start = clock() if clock else 0.0
+            answer = ways[name]()
+            seconds[name].append(clock() - start if clock else answer)
+    return {name: np.array(values) for name, values in seconds.items()}
+
+
+def interleaved(*words: Any, **options: Any) -> dict[str, float]:
+    """Median seconds of each way, see :func:`samples`."""
+    return {name: float(np.median(one)) for name, one in samples(*words, **options).items()}
+
+
+def over_first(seconds: Mapping[str, float]) -> list[tuple[str, str]]:
+    """Rows of a table: each way, and how many times as long as the first it takes."""
+    first = next(iter(seconds.values()))
+    return [(name, f"{value / first:.2f}") for name, value in seconds.items()]
 
 
 def table(titles: Sequence[str], rows: Sequence[Sequence[object]]) -> str:

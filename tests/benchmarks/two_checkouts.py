@@ -12,13 +12,19 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import statistics
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 
-DATA = Path(__file__).parents[2] / "sample_data"
+import numpy as np
+
+ROOT = Path(__file__).parents[2]
+sys.path[0] = str(ROOT)  # not this folder, whose modules have common names
+
+from tests.benchmarks.timing import samples, table  # noqa: E402
+
 CUTOFFS = ",".join(f"{0.2 * k:.1f}rmin" for k in range(1, 11))
 SCAN = {"directions": 61, "workers": 1, "seed": 3}
 CASES = {
@@ -54,83 +60,64 @@ for line in sys.stdin:
 
 
 class Checkout:
-    """A process that computes with one of them."""
+    """A process that computes with one of them, and ends with its input."""
 
-    def __init__(self, python: str, cache: Path) -> None:
+    def __init__(self, python: str, cache: str) -> None:
         """All cases are computed once; ``first`` is what that takes, in processor seconds."""
         self.process = subprocess.Popen(
-            [python, "-c", WORKER, json.dumps([str(DATA), SCAN, CASES])],
-            env={**os.environ, "NUMBA_CACHE_DIR": str(cache)},
-            cwd=cache,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
-        self.told, self.answers = self.process.stdin, self.process.stdout
-        self.first = float(self.answers.readline())
+            [python, "-c", WORKER, json.dumps([str(ROOT / "sample_data"), SCAN, CASES])],
+            env={**os.environ, "NUMBA_CACHE_DIR": cache}, cwd=cache,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        self.first = float(self.process.stdout.readline())
+        self.values: dict[str, str] = {}
 
-    def run(self, case: str) -> tuple[float, str]:
-        """Processor seconds of a case, and a number of its table."""
-        print(case, file=self.told, flush=True)
-        seconds, value = self.answers.readline().split()
-        return float(seconds), value
+    def run(self, case: str) -> float:
+        """Processor seconds of a case; a number of its table is kept."""
+        print(case, file=self.process.stdin, flush=True)
+        seconds, self.values[case] = self.process.stdout.readline().split()
+        return float(seconds)
 
-    def end(self) -> None:
-        """Let it go."""
-        self.told.close()
-        self.process.wait()
+
+def compiled_first(python: str) -> float:
+    """Seconds of all cases in a new process without compiled code."""
+    with tempfile.TemporaryDirectory() as cache:
+        one = Checkout(python, cache)
+        one.process.communicate()
+        return one.first
+
+
+def row(case: str, seconds: dict[str, np.ndarray]) -> tuple[str, ...]:
+    """The ratio of a case: this checkout's time over the other's, turn by turn."""
+    low, middle, high = np.percentile(seconds["this"] / seconds["other"], [25, 50, 75])
+    spread = f"{low:.3f} to {high:.3f}"
+    return case, f"{middle:.3f}", spread, f"{np.median(seconds['this']):.2f}"
 
 
 def main() -> None:
-    """Print the ratio of each case: this checkout's time over the other's."""
+    """Print the ratio of each case."""
     parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
     parser.add_argument("other", help="Python of an environment that has the other installed")
     parser.add_argument("--pairs", type=int, default=15)
     parser.add_argument("--cold", type=int, default=3, help="pairs that compile everything")
     asked = parser.parse_args()
-    with tempfile.TemporaryDirectory() as name:
-        cold = []
-        for turn in range(asked.cold):
-            pair = [Checkout(python, _cache(name, python, turn)) for python in _both(asked.other)]
-            cold.append(pair[0].first / pair[1].first)
-            print(f"compiled first: {pair[0].first:.1f} s of {pair[1].first:.1f} s", flush=True)
-            for one in pair:
-                one.end()
-        here, other = (Checkout(python, _cache(name, python, 0)) for python in _both(asked.other))
-        print("\n| case | median of pairs | quarter to three quarters | seconds |")
-        print("| --- | --- | --- | --- |")
+    pythons = {"this": sys.executable, "other": asked.other}
+    ways = {name: partial(compiled_first, python) for name, python in pythons.items()}
+    rows = [row("compiled first", samples(ways, asked.cold, warm=False, clock=None))]
+    with tempfile.TemporaryDirectory() as one, tempfile.TemporaryDirectory() as two:
+        both = {
+            name: Checkout(python, cache)
+            for (name, python), cache in zip(pythons.items(), (one, two), strict=True)
+        }
         for case in CASES:
-            pairs = [_pair(here, other, case, turn) for turn in range(asked.pairs)]
-            low, middle, high = statistics.quantiles([one / two for one, two in pairs], n=4)
-            seconds = statistics.median(one for one, _ in pairs)
-            print(
-                f"| {case} | {middle:.3f} | {low:.3f} to {high:.3f} | {seconds:.2f} |", flush=True
-            )
-        if cold:
-            spread = f"{min(cold):.3f} to {max(cold):.3f}"
-            print(f"| compiled first | {statistics.median(cold):.3f} | all: {spread} | |")
-
-
-def _both(other: str) -> tuple[str, str]:
-    return sys.executable, other
-
-
-def _cache(folder: str, python: str, turn: int) -> Path:
-    """Where compiled code is kept, empty at first."""
-    path = Path(folder) / f"{turn}{'here' if python == sys.executable else 'other'}"
-    path.mkdir(exist_ok=True)
-    return path
-
-
-def _pair(here: Checkout, other: Checkout, case: str, turn: int) -> tuple[float, float]:
-    """Seconds of both, which take turns in who is first; their numbers must be the same."""
-    first, second = (here, other) if turn % 2 else (other, here)
-    found = {first: first.run(case), second: second.run(case)}
-    if found[here][1] != found[other][1]:
-        print(f"{case}: the checkouts differ: {found[here][1]} and {found[other][1]}", flush=True)
-    return found[here][0], found[other][0]
+            ways = {name: partial(checkout.run, case) for name, checkout in both.items()}
+            rows.append(row(case, samples(ways, asked.pairs, clock=None)))
+            values = {checkout.values[case] for checkout in both.values()}
+            if len(values) > 1:
+                print(f"{case}: the checkouts differ: {' and '.join(sorted(values))}")
+        for checkout in both.values():
+            checkout.process.communicate()
+    print(table(["case", "median of pairs", "quarter to three quarters", "seconds"], rows))
 
 
 if __name__ == "__main__":

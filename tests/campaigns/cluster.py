@@ -16,11 +16,12 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
-import threading
 import time
+from functools import partial
 from pathlib import Path
 from random import Random
 
+from tests.campaigns.frame import count_wrong, ended
 from tests.helpers.dask_cluster import DaskCluster
 from tests.helpers.interruptions import PROGRAM, write_series
 
@@ -51,11 +52,17 @@ class Campaign:
         (self.folder / "t.csv.manifest.json").unlink()
         return data
 
+    def fault(self, code: int, said: str) -> str | None:
+        """What is wrong with an ended run."""
+        if code != 0:
+            return f"exit code {code}: {said}"
+        return None if self.taken() == self.expected else "OTHER bytes"
+
     def cluster(self, name: str) -> DaskCluster:
         (self.folder / name).mkdir()
         return DaskCluster(self.folder / name)
 
-    def workers_killed(self, cluster: DaskCluster) -> bool:
+    def workers_killed(self, cluster: DaskCluster, number: int) -> str | None:
         """One run, in whose course one to three workers are killed."""
         deaths = self.random.randint(1, 3)
         process = self.run("--scheduler-file", str(cluster.file))
@@ -63,55 +70,29 @@ class Campaign:
             time.sleep(self.random.uniform(0.0, 3.0))
             cluster.kill(self.random.randrange(len(cluster.workers)))
             cluster.add()
-        code, said = _ended(process)
-        return (code == 0 and self.taken() == self.expected) or _told(code, said)
+        return self.fault(*ended(process))
 
-    def scheduler_killed(self, name: str) -> bool:
+    def scheduler_killed(self, number: int) -> str | None:
         """One run that loses its scheduler, and goes on with another."""
-        with self.cluster(name) as first:
+        with self.cluster(f"scheduler-{number}") as first:
             process = self.run("--scheduler-file", str(first.file))
             time.sleep(self.random.uniform(2.0, 6.0))
             first.kill_scheduler()
-            code, said = _ended(process)
-        if code == 0:
-            # it was faster than the signal
-            return self.taken() == self.expected
-        if code != 1:
-            return _told(code, said)
-        with self.cluster(f"{name}-next") as second:
-            code, said = _ended(self.run("--resume", "--scheduler-file", str(second.file)))
-        return (code == 0 and self.taken() == self.expected) or _told(code, said)
-
-
-def _ended(process: subprocess.Popen[str]) -> tuple[int, str]:
-    watch = threading.Timer(120, process.kill)
-    watch.start()
-    said = process.stderr.read() if process.stderr is not None else ""
-    watch.cancel()
-    return process.wait(), said
-
-
-def _told(code: int, said: str) -> bool:
-    print(f"exit code {code}: {said}")
-    return False
+            code, said = ended(process)
+        if code == 1:  # 0: it was faster than the signal
+            with self.cluster(f"scheduler-{number}-next") as second:
+                code, said = ended(self.run("--resume", "--scheduler-file", str(second.file)))
+        return self.fault(code, said)
 
 
 def main(worker_runs: int = 50, scheduler_runs: int = 10, seed: int = 0) -> int:
     """The number of runs whose bytes differ."""
-    wrong = 0
     with tempfile.TemporaryDirectory() as folder:
         campaign = Campaign(Path(folder), seed)
         with campaign.cluster("workers") as cluster:
-            for run in range(worker_runs):
-                same = campaign.workers_killed(cluster)
-                wrong += not same
-                print(f"workers killed, run {run + 1}: {'the same' if same else 'OTHER'} bytes")
-        for run in range(scheduler_runs):
-            same = campaign.scheduler_killed(f"scheduler-{run}")
-            wrong += not same
-            print(f"scheduler killed, run {run + 1}: {'the same' if same else 'OTHER'} bytes")
-    print(f"{worker_runs} and {scheduler_runs} runs, {wrong} with other bytes")
-    return wrong
+            killed = partial(campaign.workers_killed, cluster)
+            wrong = count_wrong("workers killed", worker_runs, killed)
+        return wrong + count_wrong("scheduler killed", scheduler_runs, campaign.scheduler_killed)
 
 
 if __name__ == "__main__":

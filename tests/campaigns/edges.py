@@ -22,9 +22,9 @@ The exit code is 0 if nothing is off by more than 4 errors.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable, Iterable
+from functools import partial
 
 import numpy as np
 
@@ -39,6 +39,7 @@ from scanfab.scan.lines import line_triads
 from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Inner, Solids, margin_of
 from tests.benchmarks.packings import relaxed_cell
+from tests.campaigns.frame import asked
 from tests.helpers.naive import void_tensor
 from tests.helpers.scanning import Estimate, ratio, scan_triads
 
@@ -46,23 +47,20 @@ RULE = direction_rule("lebedev:11")
 TRIADS = line_triads(RULE.axes)
 CUTOFF, LARGEST = 0.5, 1.5
 Z = np.array([0.0, 0.0, 1.0])
+Medium = tuple[np.ndarray, np.ndarray, float]
+"""Positions and radii in a periodic cube, and its edge."""
 
 
-def about(cell: Cell, position, radius, center, window, edge: str) -> Solids:
-    """A window about a place of a periodic packing."""
+def about(center: np.ndarray, window, edge: str, medium: Medium | None = None) -> Solids:
+    """A window about a place of a periodic medium, by default the dense packing."""
+    position, radius, edge_length = medium or relaxed_cell()
+    cell = Cell([edge_length] * 3)
     place, removed = position - center, np.zeros(len(radius), bool)
     grains = CellGrains(place, radius, removed, cell.vectors, np.array(cell.periodic))
     reach = 0.0 if window is None else window.reach + margin_of(grains)
     images, row = cell.images_near_origin(place, radius + reach)
-    return Solids(
-        images,
-        radius[row],
-        removed[row],
-        window,
-        grains if window is None else None,
-        edge=edge,
-        around=grains,
-    )
+    whole = grains if window is None else None
+    return Solids(images, radius[row], removed[row], window, whole, edge=edge, around=grains)
 
 
 def pooled(sums: Iterable[ScanSums], variant: str) -> tuple[Estimate, Estimate]:
@@ -101,14 +99,14 @@ def poisson(packings: int) -> bool:
     """Freely overlapping spheres, in a window of six largest radii."""
     density, window, edge_length = 0.2, 6 * LARGEST, 26.0
     beta = density * np.pi * 13 / 12
-    cell, right = Cell([edge_length] * 3), True
+    right = True
 
     def sums(seed: int, edge: str) -> ScanSums:
         random = np.random.default_rng([seed, 3])
         count = random.poisson(density * edge_length**3)
         position = edge_length * random.random((count, 3))
         radius = random.uniform(0.5, LARGEST, count)
-        solids = about(cell, position, radius, np.zeros(3), sphere(window), edge)
+        solids = about(np.zeros(3), sphere(window), edge, (position, radius, edge_length))
         return scan_triads(solids, TRIADS, random.random((len(RULE), 2)), 1.0, CUTOFF, "c")
 
     for edge in EDGES:
@@ -132,9 +130,7 @@ def scans(centers: int, solids: Callable[[np.ndarray], Solids], spacing: float, 
 
 def of_medium() -> tuple[float, float]:
     """Mean length and axial anisotropy of the dense packing, without a window."""
-    position, radius, edge_length = relaxed_cell()
-    cell = Cell([edge_length] * 3)
-    solids = about(cell, position, radius, np.zeros(3), None, "clip")
+    solids = about(np.zeros(3), None, "clip")
     every = [
         scan_triads(solids, TRIADS, shift, 0.1, CUTOFF, "a")
         for shift in np.random.default_rng(2).random((20, len(RULE), 2))
@@ -146,14 +142,10 @@ def of_medium() -> tuple[float, float]:
 
 def medium(centers: int) -> bool:
     """Windows at random places of a dense periodic packing."""
-    position, radius, edge_length = relaxed_cell()
-    cell, (length, alpha), right = Cell([edge_length] * 3), of_medium(), True
+    (length, alpha), right = of_medium(), True
     for size in (3.0, 4.0, 5.0, 6.0, 8.0):
         for edge in EDGES:
-
-            def solids(center: np.ndarray, size: float = size, edge: str = edge) -> Solids:
-                return about(cell, position, radius, center, sphere(size), edge)
-
+            solids = partial(about, window=sphere(size), edge=edge)
             found = pooled(scans(centers, solids, 0.5, "c"), "c")
             expected = clipped(length, size) if edge == "clip" else length
             right &= told(f"RV, R = {size:g}, `{edge}`", found, expected, alpha)
@@ -175,29 +167,21 @@ def ball(centers: int) -> bool:
         return Solids(images, radius[row], removed, edge=edge, inner=inner)
 
     for shrink in (0.0, 1.0, 2.0, 3.0):
-        found = pooled(
-            scans(centers, lambda center, by=shrink: cut(center, by, "ends"), 0.5, "a"), "a"
-        )
+        solids = partial(cut, shrink=shrink, edge="ends")
+        found = pooled(scans(centers, solids, 0.5, "a"), "a")
         right &= told(f"ball of {size:g}, `ends`, smaller by {shrink:g}", found, length, alpha)
-    found = pooled(scans(centers, lambda center: cut(center, 0.0, "clip"), 0.5, "a"), "a")
+    found = pooled(scans(centers, partial(cut, shrink=0.0, edge="clip"), 0.5, "a"), "a")
     told(f"ball of {size:g}, `clip`", found, length, alpha)
     return right
 
 
 def main() -> int:
-    """Whether any of them is off."""
-    parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
-    parser.add_argument("--packings", type=int, default=3000)
-    parser.add_argument("--centers", type=int, default=400)
-    parser.add_argument("--only", nargs="+", choices=("poisson", "medium", "ball"))
-    asked = parser.parse_args()
-    kinds = {"poisson": asked.packings, "medium": asked.centers, "ball": asked.centers}
-    right = True
-    for name, count in kinds.items():
-        if not asked.only or name in asked.only:
-            right &= {"poisson": poisson, "medium": medium, "ball": ball}[name](count)
-    return 0 if right else 1
+    """How many of them are off."""
+    kinds = {"poisson": poisson, "medium": medium, "ball": ball}
+    given = asked(__doc__, packings=3000, centers=400, only=kinds)
+    numbers = {"poisson": given.packings, "medium": given.centers, "ball": given.centers}
+    return [kinds[name](numbers[name]) for name in given.only].count(False)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(bool(main()))

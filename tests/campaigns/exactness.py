@@ -13,12 +13,11 @@ equal, and lengths to rounding. The exit code is 0 if all are.
 
 from __future__ import annotations
 
-import argparse
 import sys
-import time
 
 import numpy as np
 
+from tests.campaigns.frame import asked
 from tests.scan.kernels import test_axes, test_bins
 
 MOST_OVERLAP = 0.6
@@ -62,22 +61,13 @@ def check(number: int, seed: int) -> str | None:
 
 def main() -> int:
     """The number of packings that differ."""
-    parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
-    parser.add_argument("--packings", type=int, default=10_000)
-    parser.add_argument("--seed", type=int, default=0)
-    asked = parser.parse_args()
-    begun, wrong = time.monotonic(), 0
-    for number in range(asked.packings):
-        difference = check(number, asked.seed)
+    given, wrong = asked(__doc__, packings=10_000, seed=0), 0
+    for number in range(given.packings):
+        difference = check(number, given.seed)
         if difference is not None:
             wrong += 1
-            print(f"packing {number} of seed {asked.seed}: {difference}", flush=True)
-        if (number + 1) % 1000 == 0:
-            print(
-                f"{number + 1} packings, {wrong} differ, {time.monotonic() - begun:.0f} s",
-                flush=True,
-            )
-    print(f"{asked.packings} packings, {wrong} differ")
+            print(f"packing {number} of seed {given.seed}: {difference}", flush=True)
+    print(f"{given.packings} packings, {wrong} differ")
     return wrong
 
 

@@ -1,7 +1,7 @@
 """
 What becomes of every file of a folder: other people's dumps, which are not in the repository.
 
-    python tests/campaigns/foreign_files.py FOLDER -o found.csv [--expected expected.csv]
+    python -m tests.campaigns.foreign_files FOLDER [--output found.csv] [--expected expected.csv]
 
 Each file goes through `scanfab inspect` and, if that reads it, `scanfab compute`, in processes of
 their own. A line for each file says which reader took it and what it found in the last frame, or
@@ -12,7 +12,6 @@ file differs from what is expected, or if a command broke: a traceback, a signal
 
 from __future__ import annotations
 
-import argparse
 import csv
 import json
 import os
@@ -20,36 +19,23 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = [sys.executable, "-c", "from scanfab.cli.main import main; main()"]
+from tests.campaigns.frame import asked
+from tests.helpers.interruptions import PROGRAM
+
 SECONDS = 300
 # a rough scan: the dump is tried, not the fabric
 ROUGH = ["--spacing", "1rmin", "--directions", "20", "--variants", "a"]
-COLUMNS = (
-    "file",
-    "outcome",
-    "format",
-    "frames",
-    "grains",
-    "radius_min",
-    "radius_max",
-    "contacts",
-    "contacts_from",
-    "periodic",
-    "message",
-)
+OF_THE_FRAME = ("format", "grains", "radius_min", "radius_max", "contacts", "contacts_from")
+COLUMNS = ("file", "outcome", "frames", "periodic", *OF_THE_FRAME, "message")
 
 
 def main() -> None:
     """Every file, one after the other."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--expected", type=Path)
-    parser.add_argument("--no-compute", action="store_true")
-    given = parser.parse_args()
-    expected = {} if given.expected is None else read_expected(given.expected)
-    wrong = 0
+    given = asked(__doc__, folder=Path, output="found.csv", expected="", no_compute=False)
+    expected, wrong = {}, 0
+    if given.expected:
+        with open(given.expected, newline="") as file:
+            expected = {row["file"]: row for row in csv.DictReader(file)}
     with open(given.output, "w", newline="") as file:
         writer = csv.DictWriter(file, COLUMNS)
         writer.writeheader()
@@ -60,18 +46,11 @@ def main() -> None:
             row["file"] = str(path.relative_to(given.folder))
             writer.writerow(row)
             file.flush()
-            found = differences(row, expected.get(row["file"], {}))
+            found = differences(row, expected.pop(row["file"], {}))
             wrong += bool(found)
             print(f"{'WRONG ' if found else ''}{row['file']}: {', '.join(found) or spelt(row)}")
-    lost = expected.keys() - {one["file"] for one in read_expected(given.output).values()}
-    print(*(f"WRONG {name}: is not there" for name in sorted(lost)), sep="\n")
-    sys.exit(1 if wrong or lost else 0)
-
-
-def read_expected(path: Path) -> dict[str, dict[str, str]]:
-    """Rows by the names of their files."""
-    with open(path, newline="") as file:
-        return {row["file"]: row for row in csv.DictReader(file)}
+    print(*(f"WRONG {name}: is not there" for name in sorted(expected)), sep="\n")
+    sys.exit(1 if wrong or expected else 0)
 
 
 def tried(path: Path, compute: bool) -> dict[str, str]:
@@ -85,8 +64,7 @@ def tried(path: Path, compute: bool) -> dict[str, str]:
     if row["outcome"] != "read":
         return row
     frame = json.loads(out.splitlines()[-1])
-    for name in ("format", "grains", "radius_min", "radius_max", "contacts", "contacts_from"):
-        row[name] = "" if frame[name] is None else str(frame[name])
+    row |= {name: "" if frame[name] is None else str(frame[name]) for name in OF_THE_FRAME}
     row["frames"] = str(frame["frame"] + 1)
     row["periodic"] = "".join("xyz"[k] for k in range(3) if (frame["periodic"] or [0] * 3)[k])
     if compute and frame["grains"]:
@@ -99,10 +77,9 @@ def tried(path: Path, compute: bool) -> dict[str, str]:
 
 def run(words: list[str]) -> tuple[int, str, str]:
     """Exit code, output and messages; -1 if they are not done in time."""
+    command = [*PROGRAM, *words]
     try:
-        done = subprocess.run(
-            [*PROGRAM, *words], cwd=ROOT, capture_output=True, text=True, timeout=SECONDS
-        )
+        done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS)
     except subprocess.TimeoutExpired:
         return -1, "", f"not done after {SECONDS} s"
     return done.returncode, done.stdout, done.stderr

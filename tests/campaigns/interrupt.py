@@ -18,6 +18,7 @@ from pathlib import Path
 from random import Random
 
 from scanfab.table.formats import OWN_FORMATS
+from tests.campaigns.frame import count_wrong
 from tests.helpers.interruptions import Interrupter, write_series
 
 SUFFIXES = [one.suffix for one in OWN_FORMATS]
@@ -26,21 +27,21 @@ OPTIONS = ("--tolerance", "6e-4")
 
 def main(runs: int = 100, seed: int = 0) -> int:
     """The number of runs whose bytes differ."""
-    wrong = 0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         tool = Interrupter(write_series(folder / "series"), OPTIONS, Random(seed))
         expected = {suffix: tool.whole(folder / f"whole{suffix}") for suffix in SUFFIXES}
-        for run in range(runs):
-            suffix = SUFFIXES[run % len(SUFFIXES)]
+
+        def fault_of(number: int) -> str | None:
+            suffix = SUFFIXES[number % len(SUFFIXES)]
             data, seconds = expected[suffix]
-            place = folder / f"run{run}"
+            place = folder / f"run{number}"
             place.mkdir()
-            times = tool.random.randint(1, 3)
-            same = tool.interrupted(place / f"table{suffix}", seconds, times) == data
-            wrong += not same
-            print(f"run {run + 1}: {suffix}, {'the same bytes' if same else 'OTHER BYTES'}")
-    print(f"{runs} runs, {wrong} with other bytes; exit codes {dict(tool.codes)}")
+            found = tool.interrupted(place / f"table{suffix}", seconds, tool.random.randint(1, 3))
+            return None if found == data else f"OTHER bytes in {suffix}"
+
+        wrong = count_wrong("interrupted", runs, fault_of)
+    print(f"exit codes {dict(tool.codes)}")
     return wrong
 
 

@@ -12,36 +12,39 @@ their licences: they are fetched by who wants them.
 
 from __future__ import annotations
 
-import argparse
 import csv
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import scanfab
 from scanfab.table.row import total_error
+from tests.campaigns.frame import SAMPLE_DATA, asked
 
-TABLE = Path(__file__).parents[2] / "sample_data" / "paper" / "others.csv"
+TABLE = SAMPLE_DATA / "paper" / "others.csv"
 HARD_SPHERES = "karambola/demo/hard_spheres/input_xyz"
 JAMMED = "packing-generation/Docs/Examples/packing.xyzd"
 FINNEY = "MPLBM-UT/domain_construction/create_geometry_from_XYZ/FinneyPack.txt"
 AXES = "xyz"
+COMMON = (
+    "grains",
+    "contacts",
+    "coordination",
+    "solid_fraction",
+    "cutoff",
+    "mean_length",
+    "alpha_vs",
+)
 CUTOFFS = "0,0.5rmin,1rmin"
 
 
-@dataclass(frozen=True)
-class Others:
+class Others(NamedTuple):
     """A packing of others, and how it is measured."""
 
     name: str
     packing: Any
     options: dict[str, Any]
-
-
-def cube(edge: float) -> list[float]:
-    return [edge, edge, edge]
 
 
 def hard_spheres(folder: Path) -> Iterator[Others]:
@@ -50,7 +53,7 @@ def hard_spheres(folder: Path) -> Iterator[Others]:
         second = path.read_text(encoding="ascii").splitlines()[1]
         edge = float(re.search(r"boxsz = ([\d.]+)", second)[1])  # type: ignore[index]
         packing = scanfab.read(
-            path, format="table", skip=2, columns="x=2,y=3,z=4", radius=1.0, cell=cube(edge)
+            path, format="table", skip=2, columns="x=2,y=3,z=4", radius=1.0, cell=[edge] * 3
         )
         yield Others(path.stem, packing, {"variants": "a"})
 
@@ -60,7 +63,7 @@ def jammed(path: Path) -> Others:
     information = path.with_suffix(".nfo").read_text(encoding="ascii")
     edge = float(information.split("Dimensions:")[1].split()[0])
     # nearest neighbours are up to 1e-3 diameters apart
-    packing = scanfab.read(path, cell=cube(edge))
+    packing = scanfab.read(path, cell=[edge] * 3)
     return Others("jammed", packing, {"variants": "a", "contact_tolerance": 2e-3})
 
 
@@ -82,13 +85,7 @@ def measured(others: Others) -> Iterator[dict[str, Any]]:
         for axis in AXES
     ]
     for rows in zip(*tables, strict=True):
-        first = rows[0]
-        line = {
-            "sample": others.name,
-            **{name: first[name] for name in ("grains", "contacts", "coordination")},
-            **{name: first[name] for name in ("solid_fraction", "cutoff", "mean_length")},
-            "alpha_vs": first["alpha_vs"],
-        }
+        line = {"sample": others.name, **{name: rows[0][name] for name in COMMON + OF_A_CUTOFF}}
         for axis, row in zip(AXES, rows, strict=True):
             line[f"alpha_vs_{axis}"] = row["alpha_vs_axial"]
             line[f"alpha_vs_{axis}_se"] = total_error(row, "alpha_vs_axial")
@@ -99,9 +96,7 @@ def measured(others: Others) -> Iterator[dict[str, Any]]:
 
 def main() -> None:
     """Measure all, and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
-    parser.add_argument("folder", type=Path)
-    folder = parser.parse_args().folder
+    folder = asked(__doc__, folder=Path).folder
     samples = [*hard_spheres(folder / HARD_SPHERES), jammed(folder / JAMMED)]
     samples.append(finney(folder / FINNEY))
     rows = [row for others in samples for row in measured(others)]

@@ -15,18 +15,17 @@ computed again; an unfinished one goes on. `python docs/make_validation.py` make
 
 from __future__ import annotations
 
-import argparse
 import shutil
 import subprocess
-import sys
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-ROOT = Path(__file__).parents[2]
-TABLES = ROOT / "sample_data" / "paper"
+from tests.campaigns.frame import SAMPLE_DATA, asked
+from tests.helpers.interruptions import PROGRAM
+
+TABLES = SAMPLE_DATA / "paper"
 BLOCKS = range(1, 9)
 AXES = ("xx", "yy", "zz", "xy", "xz", "yz")
 
@@ -43,14 +42,16 @@ HARMONICS = [f"{name}{end}" for name in ("vs_a2", "vs_a4", "c_a2", "c_a4") for e
 DIGITS = 7
 
 
-@dataclass(frozen=True)
-class Run:
+USUAL = ("paper", "default", "start", "ends", "counts")
+
+
+class Run(NamedTuple):
     """A run of a deck, and what there is to measure of it."""
 
     folder: str
     options: tuple[str, ...] = ()
     frames: str = "0:41"
-    measures: tuple[str, ...] = ("paper", "default", "start", "ends", "counts")
+    measures: tuple[str, ...] = USUAL
 
     @property
     def is_shell(self) -> bool:
@@ -61,8 +62,7 @@ class Run:
         return self.folder.startswith("biaxial")
 
 
-@dataclass(frozen=True)
-class Measure:
+class Measure(NamedTuple):
     """Options of compute, and the columns that are kept."""
 
     options: tuple[str, ...]
@@ -109,14 +109,14 @@ SHELL = ("--boundary", "mask=3")
 SWEEPS = ("cutoffs", "rvs", "small-rv", "recursive", "four", "coarse", "few")
 READINGS = ("literal", "half-sphere")
 RUNS = {
-    "yade_1": Run("yade_1", SHELL, measures=(*Run.measures, *SWEEPS, *READINGS, "harmonics")),
+    "yade_1": Run("yade_1", SHELL, measures=(*USUAL, *SWEEPS, *READINGS, "harmonics")),
     "yade_2": Run("yade_2", SHELL),
     "yade_dense": Run("yade_dense", SHELL),
     "yade_reversal": Run("yade_1", SHELL, "40:", ("default", "start", "counts")),
     "yade_rough": Run("yade_rough", SHELL, "0:25", ("default", "ends", "counts")),
     "yade_printed": Run("yade_printed", SHELL, "0:25", ("default", "ends", "counts")),
-    "periodic_1": Run("periodic_1", measures=(*Run.measures, "cutoffs", "harmonics")),
-    "biaxial_1": Run("biaxial_1", measures=(*Run.measures, "cutoffs", "harmonics")),
+    "periodic_1": Run("periodic_1", measures=(*USUAL, "cutoffs", "harmonics")),
+    "biaxial_1": Run("biaxial_1", measures=(*USUAL, "cutoffs", "harmonics")),
 }
 
 
@@ -130,55 +130,32 @@ def words(runs: Path, run: Run, name: str) -> list[str]:
         more = ["--rv-radius", repr(float(radius["rv_radius"][0])), "--rv-center", "0", "0", "0"]
     elif not run.is_shell and "--variants" not in measure.options:
         more = ["--variants", "a" if name == "counts" else "abcd"]
-    fields = ",".join(measure.columns)
-    kept = ["--fields", fields, "--digits", str(DIGITS)]
-    return [
-        "compute",
-        run.folder,
-        *run.options,
-        "--frames",
-        run.frames,
-        *options,
-        *more,
-        *kept,
-    ]
+    kept = ["--fields", ",".join(measure.columns), "--digits", str(DIGITS)]
+    return ["compute", run.folder, *run.options, "--frames", run.frames, *options, *more, *kept]
 
 
-def compute(runs: Path, table: Path, run: Run, name: str, workers: str) -> None:
+def compute(runs: Path, table: Path, run: Run, name: str, workers: int) -> None:
     """One table, in the folder of the runs, so that it says no more of it than the run's name."""
-    program = [sys.executable, "-c", "from scanfab.cli.main import main; main()"]
-    more = ["--workers", workers, "--resume", "--quiet", "-o", str(table)]
-    subprocess.run([*program, *words(runs, run, name), *more], cwd=runs, check=True)
+    more = ["--workers", str(workers), "--resume", "--quiet", "-o", str(table)]
+    subprocess.run([*PROGRAM, *words(runs, run, name), *more], cwd=runs, check=True)
     table.with_name(table.name + ".manifest.json").unlink(missing_ok=True)
-
-
-def tables(names: list[str], only: list[str]) -> Iterator[tuple[str, Run, str]]:
-    for run_name in names:
-        run = RUNS[run_name]
-        for name in run.measures:
-            if name in only:
-                yield run_name, run, name
 
 
 def main() -> None:
     """Compute what is missing."""
-    parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
-    parser.add_argument("runs", type=Path)
-    parser.add_argument("--into", type=Path, default=TABLES)
-    parser.add_argument("--only", nargs="+", choices=RUNS, default=[*RUNS])
-    parser.add_argument("--measures", nargs="+", choices=MEASURES, default=[*MEASURES])
-    parser.add_argument("--workers", default="2")
-    asked = parser.parse_args()
-    runs, into = asked.runs.resolve(), asked.into.resolve()
-    for run_name, run, name in tables(asked.only, asked.measures):
+    given = asked(__doc__, runs=Path, into=TABLES, only=RUNS, measures=MEASURES, workers=2)
+    runs, into = given.runs.resolve(), given.into.resolve()
+    for run_name in given.only:
+        run = RUNS[run_name]
         if not (runs / run.folder / "engine.csv").exists():
             print(f"{run_name}: no {run.folder}/engine.csv in {runs}, left out", flush=True)
             continue
         shutil.copyfile(runs / run.folder / "engine.csv", into / f"{run_name}_engine.csv")
-        table = into / f"{run_name}_{name}.csv"
-        if not table.exists():
-            print(table.name, flush=True)
-            compute(runs, table, run, name, asked.workers)
+        for name in [one for one in run.measures if one in given.measures]:
+            table = into / f"{run_name}_{name}.csv"
+            if not table.exists():
+                print(table.name, flush=True)
+                compute(runs, table, run, name, given.workers)
 
 
 if __name__ == "__main__":

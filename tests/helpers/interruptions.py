@@ -46,12 +46,12 @@ def interrupted_at_row(monkeypatch: pytest.MonkeyPatch, number: int) -> Iterator
             thread.join()
 
 
-def write_series(folder: Path, frames: int = FRAMES) -> Path:
-    """Small frames of 64 grains, squeezed along z a little more each time."""
+def write_series(folder: Path, frames: int = FRAMES, edge: int = 4) -> Path:
+    """Small frames of edge³ grains, squeezed along z a little more each time."""
     folder.mkdir()
     for frame in range(frames):
-        rows = cubic_rows(squeeze=1 - 0.005 * frame)
-        text = dump_text(rows, step=100 * frame, box=((0, 4),) * 3)
+        rows = cubic_rows(edge, squeeze=1 - 0.005 * frame)
+        text = dump_text(rows, step=100 * frame, box=((0, edge),) * 3)
         write(folder / f"dump_{100 * frame}.txt", text)
     return folder
 
