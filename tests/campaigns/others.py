@@ -27,15 +27,8 @@ HARD_SPHERES = "karambola/demo/hard_spheres/input_xyz"
 JAMMED = "packing-generation/Docs/Examples/packing.xyzd"
 FINNEY = "MPLBM-UT/domain_construction/create_geometry_from_XYZ/FinneyPack.txt"
 AXES = "xyz"
-COMMON = (
-    "grains",
-    "contacts",
-    "coordination",
-    "solid_fraction",
-    "cutoff",
-    "mean_length",
-    "alpha_vs",
-)
+COMMON = ("grains", "contacts", "coordination", "solid_fraction")
+OF_A_CUTOFF = ("cutoff", "mean_length", "alpha_vs")
 CUTOFFS = "0,0.5rmin,1rmin"
 
 
