@@ -24,7 +24,7 @@ import numpy.typing as npt
 from scanfab.base.column import Column
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.tensor import axial, weighted_tensors
-from scanfab.packing.near import NearPairs
+from scanfab.packing.search import NearPairs
 from scanfab.scan.directions import rule_of
 
 # in smallest radii: for longer ones the surfaces are no parabolas
@@ -74,7 +74,7 @@ def predicted_alpha(
 
     >>> import numpy as np
     >>> from scanfab.fabric.spectrum import predicted_alpha
-    >>> from scanfab.packing.near import NearPairs
+    >>> from scanfab.packing.search import NearPairs
     >>> chain = NearPairs(np.eye(3)[2:], np.array([0.02]), np.array([0.25]), np.pi / 4, 0.98)
     >>> round(predicted_alpha(chain, 0.47, 0.0, (0, 0, 1)), 4)
     0.0051

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from scanfab.base.errors import Note
 from scanfab.base.space import SPACE, Space
+from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -143,3 +145,46 @@ def bodies_of(
     moment = [np.bincount(head, volume * along, len(head))[head] for along in branch.T]
     place = position[head] + np.column_stack(moment) / weight[:, None]
     return Bodies(number, head, turns, place)
+
+
+class Grouping(NamedTuple):
+    """The spheres of a frame, those of one body by one number."""
+
+    id: IntArray
+    """Shape (N,): as the dump numbers the spheres."""
+    body: IntArray
+    """Shape (N,): the id of the first sphere of each one's body."""
+
+    def in_words(self) -> str:
+        """How many grains there are, bodies of one sphere among them, and of how many spheres."""
+        grains = counted(len(np.unique(self.body)), "grain")
+        return f"{grains} of {counted(len(self.id), 'sphere')}"
+
+
+def regrouped(first: int, before: Grouping, now: Grouping) -> Note | None:
+    """
+    What to tell if other spheres are one body than before, or other spheres are there.
+
+    Parameters
+    ----------
+    first : int
+        Number of the frame before.
+    before, now : Grouping
+        The numbers of bodies may be others, as long as the same spheres are one.
+    """
+    common, early, late = np.intersect1d(before.id, now.id, return_indices=True)
+    one, two = before.body[early], now.body[late]
+    both = len(np.unique(np.column_stack([one, two]), axis=0))
+    if not both == len(np.unique(one)) == len(np.unique(two)):
+        text = (
+            f"other spheres are one body than in frame {first}: each frame is computed with its "
+            f"own bodies; is the column that numbers them the right one (`bodies`)? (told once)"
+        )
+        return Note("other_bodies", text)
+    if len(common) == len(before.id) == len(now.id):
+        return None
+    text = (
+        f"{now.in_words()}, where frame {first} has {before.in_words()}: grains have left or "
+        f"come in (told once)"
+    )
+    return Note("grains_left", text)

@@ -15,8 +15,6 @@ from scanfab.base.typing import BoolArray
 from scanfab.packing.packing import Packing
 
 OPERATORS = {
-    "=": np.equal,
-    "!=": np.not_equal,
     ">": np.greater,
     ">=": np.greater_equal,
     "<": np.less,
@@ -79,7 +77,7 @@ class BoundaryRule:
         if len(packing) == 0:
             return np.zeros(0, dtype=bool)  # an empty frame may have lost its columns
         values = _column(packing, self.column)
-        gaps = np.isnan(values) if values.dtype.kind == "f" else np.zeros(len(packing), bool)
+        gaps = np.isnan(values)
         if gaps.any():
             raise SettingsError(
                 f"boundary: the column {self.column} has no value for {np.count_nonzero(gaps)} of "
@@ -166,11 +164,10 @@ def _column(packing: Packing, name: str) -> npt.NDArray[Any]:
         "radius": packing.radius,
         **dict(zip("xyz", packing.position.T, strict=True)),
     }
-    if name not in known and name in packing.columns and packing.columns[name].ndim == 1:
-        known[name] = packing.columns[name]
+    for other, values in packing.columns.items():
+        if values.ndim == 1:
+            known.setdefault(other, values)
     if name not in known:
-        others = (key for key, values in packing.columns.items() if values.ndim == 1)
-        known = dict.fromkeys([*known, *others], packing.radius)
         raise SettingsError(
             f"boundary: there is no column {name!r}; the columns are {', '.join(known)}"
         )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import Any, Literal, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,9 @@ from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.bodies import Bodies
 from scanfab.packing.cell import Cell
+
+if TYPE_CHECKING:
+    from scanfab.packing.packing import Packing
 
 ContactSource = Literal["file", "geometric"]
 
@@ -54,12 +57,11 @@ class ContactList(NamedTuple):
     force_n: npt.ArrayLike | None = None
 
     def __repr__(self) -> str:
-        named = {"images": self.image, "forces": self.force}
-        if self.force is None:
-            named["normal forces"] = self.force_n
-        has = [f"with {name}" for name, values in named.items() if values is not None]
+        normal_force = self.force_n if self.force is None else None
+        named = {"images": self.image, "forces": self.force, "normal forces": normal_force}
+        has = "".join(f", with {name}" for name, values in named.items() if values is not None)
         number = counted(len(np.asarray(self.pairs)), "contact")
-        return f"ContactList: {', '.join([f'{number} from {self.source}', *has])}"
+        return f"ContactList: {number} from {self.source}{has}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,38 +116,14 @@ class Contacts:
         return f"Contacts: {self.in_words()}"
 
     def in_words(self) -> str:
-        """
-        How many there are, and where they come from.
-
-        Returns
-        -------
-        str
-        """
+        """How many there are, and where they come from."""
         whence = "from file" if self.source == "file" else "by geometry"
-        forces = "" if self.force_n is None else " with normal forces"
-        forces = forces if self.force is None else " with forces"
+        forces = "" if self.force is None else " with forces"
+        if self.force is None and self.force_n is not None:
+            forces = " with normal forces"
         return f"{counted(len(self), 'contact')} {whence}{forces}"
 
-    def chosen(self, some: BoolArray) -> Contacts:
-        """
-        Some of them.
-
-        Parameters
-        ----------
-        some : ndarray of bool, shape (M,)
-            Which.
-
-        Returns
-        -------
-        Contacts
-        """
-        values = ((one.name, getattr(self, one.name)) for one in fields(self))
-        chosen: dict[str, Any] = {
-            name: array[some] for name, array in values if isinstance(array, np.ndarray)
-        }
-        return replace(self, **chosen)
-
-    def neighbours(self, bodies: Bodies | None) -> IntArray:
+    def neighbours(self, bodies: Bodies | None, without: BoolArray | None = None) -> IntArray:
         """
         The pairs of grains that touch, each once, in however many points.
 
@@ -155,44 +133,52 @@ class Contacts:
         ----------
         bodies : Bodies or None
             Of the packing; without them, grains are spheres, and every contact is a pair.
+        without : ndarray of bool, shape (M,), optional
+            Contacts that do not count.
 
         Returns
         -------
         ndarray of int, shape (K, 2)
             Rows of the grains' first spheres.
         """
+        pairs, image = self.pairs, self.image
+        if without is not None:
+            # np.compress is several times as fast as to index with a mask
+            pairs, image = (np.compress(~without, one, axis=0) for one in (pairs, image))
         if bodies is None:
-            return self.pairs
-        heads = bodies.head[self.pairs]
-        return heads[_first_of_each(heads, bodies.image(self.pairs, self.image))]
+            return pairs
+        heads = bodies.head[pairs]
+        return heads[_first_of_each(heads, bodies.image(pairs, image))]
 
 
-class Spheres(NamedTuple):
-    """What the geometry of contacts follows from."""
-
-    position: FloatArray
-    """Shape (N, 3), inside the cell, dump's length unit."""
-    radius: FloatArray
-    """Shape (N,), dump's length unit."""
-    id: IntArray
-    """Shape (N,), for messages."""
-    cell: Cell | None
-    turns: IntArray | None = None
-    """Shape (N, 3): lattice vectors to where each grain was given; None: where it is."""
-    bodies: Bodies | None = None
-    """A contact between two spheres of one body is none."""
+def branches(
+    position: FloatArray, pairs: IntArray, image: IntArray, cell: Cell | None
+) -> FloatArray:
+    """From the first to the second place of each pair, shape (M, 3), dump's length unit."""
+    one, two = pairs.T
+    branch: FloatArray = position[two] - position[one]
+    return branch if cell is None else branch + image @ cell.vectors
 
 
-def resolve_contacts(listed: ContactList, spheres: Spheres) -> Contacts:
+def resolve_contacts(listed: ContactList, packing: Packing, turns: IntArray | None) -> Contacts:
     """
     Geometry of listed contacts, each pair and image once.
+
+    Parameters
+    ----------
+    listed : ContactList
+        As the source has them.
+    packing : Packing
+        Its grains.
+    turns : ndarray of int, shape (N, 3), or None
+        Lattice vectors from where each grain is to where it was given; None if it was given there.
 
     Raises
     ------
     PackingError
         If a contact names a row that does not exist, or cannot be one.
     """
-    count = len(spheres.radius)
+    count = len(packing)
     pairs = cast("contacts", listed.pairs, np.int64, (None, 2))
     if pairs.size and (pairs.min() < 0 or pairs.max() >= count):
         wrong = int(np.flatnonzero(np.any((pairs < 0) | (pairs >= count), axis=1))[0])
@@ -201,29 +187,27 @@ def resolve_contacts(listed: ContactList, spheres: Spheres) -> Contacts:
             f"but there are {count} grains (rows from 0)"
         )
     force, force_n = _forces(listed, len(pairs))
-    image = _images(listed, pairs, spheres)
-    if spheres.bodies is not None:
-        outer = spheres.bodies.between(pairs, image)
-        pairs, image = pairs[outer], image[outer]
-        force, force_n = (None if one is None else one[outer] for one in (force, force_n))
-    branch = spheres.position[pairs[:, 1]] - spheres.position[pairs[:, 0]]
-    if spheres.cell is not None:
-        branch = branch + image @ spheres.cell.vectors
+    image = _images(listed, pairs, packing, turns)
+    rows = np.arange(len(pairs))
+    if packing.bodies is not None:
+        rows = np.flatnonzero(packing.bodies.between(pairs, image))
+        pairs, image = pairs[rows], image[rows]
+    branch = branches(packing.position, pairs, image, packing.cell)
     length: FloatArray = np.linalg.norm(branch, axis=1)
-    _refuse_itself(pairs, image, spheres)
+    _refuse_itself(pairs, image, packing)
     if listed.source == "file":
-        _refuse_long(pairs, length, spheres)
+        _refuse_long(pairs, length, packing)
     keep = _first_of_each(pairs, image)
     same = length[keep] == 0
     if np.any(same):
-        warn_of_same_centre(pairs[keep][same], spheres.id)
+        warn_of_same_centre(pairs[keep][same], packing.id)
         keep = keep[~same]
     pairs, image, branch, length = pairs[keep], image[keep], branch[keep], length[keep]
     normal = branch / length[:, None]
-    radius = spheres.radius[pairs]
+    radius = packing.radius[pairs]
     middle = 0.5 * (length + radius[:, 0] - radius[:, 1])
-    point = spheres.position[pairs[:, 0]] + middle[:, None] * normal
-    force, force_n = (None if one is None else one[keep] for one in (force, force_n))
+    point = packing.position[pairs[:, 0]] + middle[:, None] * normal
+    force, force_n = (None if one is None else one[rows[keep]] for one in (force, force_n))
     if force_n is not None and force_n.ndim == 2:
         force_n = np.einsum("ci,ci->c", force_n, normal)
     return Contacts(pairs, image, normal, point, force, listed.source, force_n)
@@ -240,36 +224,38 @@ def _forces(listed: ContactList, count: int) -> tuple[FloatArray | None, FloatAr
     return None, force_n if force_n.ndim == 1 else cast("force_n", force_n, np.float64, (count, 3))
 
 
-def _images(listed: ContactList, pairs: IntArray, spheres: Spheres) -> IntArray:
+def _images(
+    listed: ContactList, pairs: IntArray, packing: Packing, turns: IntArray | None
+) -> IntArray:
     """Lattice translations of the second grains, from positions inside the cell."""
-    cell = spheres.cell
+    cell = packing.cell
     if listed.image is not None:
         image: IntArray = cast("image", listed.image, np.int64, (len(pairs), 3))
         if np.any(image[:, ~np.array((False,) * 3 if cell is None else cell.periodic)]):
             raise PackingError("image: a contact passes a face that is not periodic")
-        if spheres.turns is None:
+        if turns is None:
             return image
-        return image + spheres.turns[pairs[:, 1]] - spheres.turns[pairs[:, 0]]
-    if cell is None or not cell.is_periodic:
+        return image + turns[pairs[:, 1]] - turns[pairs[:, 0]]
+    if cell is None:
         return np.zeros((len(pairs), 3), np.int64)
-    branch = spheres.position[pairs[:, 1]] - spheres.position[pairs[:, 0]]
+    branch = packing.position[pairs[:, 1]] - packing.position[pairs[:, 0]]
     image = cell.nearest_image(branch)
-    _refuse_ambiguous(pairs, branch + image @ cell.vectors, spheres)
+    _refuse_ambiguous(pairs, branch + image @ cell.vectors, packing)
     return image
 
 
-def _refuse_ambiguous(pairs: IntArray, branch: FloatArray, spheres: Spheres) -> None:
+def _refuse_ambiguous(pairs: IntArray, branch: FloatArray, packing: Packing) -> None:
     """An error if a pair touches through two images, of which the list cannot mean both."""
-    assert spheres.cell is not None
-    reach = spheres.radius[pairs].sum(axis=1)
-    close = np.flatnonzero(spheres.cell.lattice.shortest < 2 * reach)
+    assert packing.cell is not None
+    reach = packing.radius[pairs].sum(axis=1)
+    close = np.flatnonzero(packing.cell.lattice.shortest < 2 * reach)
     close = close[pairs[close, 0] != pairs[close, 1]]
     if close.size == 0:
         return
-    for step in spheres.cell.lattice.steps:
+    for step in packing.cell.lattice.steps:
         touches = np.linalg.norm(branch[close] + step, axis=1) < reach[close]
         if touches.any():
-            one, two = spheres.id[pairs[close[np.argmax(touches)]]]
+            one, two = packing.id[pairs[close[np.argmax(touches)]]]
             raise PackingError(
                 f"the grains {one} and {two} touch through more than one image, and the contact "
                 f"list does not say through which: the cell is too thin for this format; find the "
@@ -277,33 +263,33 @@ def _refuse_ambiguous(pairs: IntArray, branch: FloatArray, spheres: Spheres) -> 
             )
 
 
-def _refuse_itself(pairs: IntArray, image: IntArray, spheres: Spheres) -> None:
+def _refuse_itself(pairs: IntArray, image: IntArray, packing: Packing) -> None:
     itself = (pairs[:, 0] == pairs[:, 1]) & ~image.any(axis=1)
     if not np.any(itself):
         return
     advice = ""
-    if spheres.cell is not None and spheres.cell.is_periodic:
+    if packing.is_periodic:
         advice = (
             "; if it touches its own image, the list does not say which one: find the contacts by "
             'geometry (`contacts="geometric"`)'
         )
     raise PackingError(
-        f"{grains_named(spheres.id[pairs[:, 0]], itself)}: in contact with itself{advice}"
+        f"{grains_named(packing.id[pairs[:, 0]], itself)}: in contact with itself{advice}"
     )
 
 
-def _refuse_long(pairs: IntArray, length: FloatArray, spheres: Spheres) -> None:
+def _refuse_long(pairs: IntArray, length: FloatArray, packing: Packing) -> None:
     """An error if the centres of a listed contact are too far apart for a contact."""
-    radius = spheres.radius[pairs]
+    radius = packing.radius[pairs]
     # a gap of half a grain, by the smaller of the two
     excess = length - radius.sum(axis=1) - radius.min(axis=1)
     if not np.any(excess > 0):
         return
     worst = int(np.argmax(excess))
-    one, two = spheres.id[pairs[worst]]
+    one, two = packing.id[pairs[worst]]
     advice = (
         "is this the contact list of another step?"
-        if spheres.cell is not None and spheres.cell.is_periodic
+        if packing.is_periodic
         else "if the sample is periodic, name its cell (`cell` and `periodic`); "
         "otherwise the contact list belongs to another step"
     )
@@ -324,20 +310,14 @@ def warn_of_same_centre(pairs: IntArray, id: IntArray) -> None:
 
 def _first_of_each(pairs: IntArray, image: IntArray) -> npt.NDArray[np.intp]:
     """Rows of the first mention of each contact, whichever grain is named first."""
-    swapped = pairs[:, 0] > pairs[:, 1]
-    turned = np.where(swapped[:, None], -image, image)
+    low, high = pairs.min(axis=1), pairs.max(axis=1)
+    # a number for each image, and for the opposite one the same below zero
+    base = 2 * int(np.abs(image).max(initial=0)) + 1
+    code = image @ base ** np.arange(3)
     # a grain and its own image: the contact with the opposite image is the same one
-    itself = pairs[:, 0] == pairs[:, 1]
-    lead = np.where(turned[:, 0] != 0, turned[:, 0], turned[:, 1])
-    lead = np.where(lead != 0, lead, turned[:, 2])
-    turned = np.where((itself & (lead < 0))[:, None], -turned, turned)
-    # one number for each contact: rows, then image
-    reach = int(np.abs(turned).max(initial=0))
-    code = (turned + reach) @ (2 * reach + 1) ** np.arange(3)
-    key = (pairs.min(axis=1) * (pairs.max(initial=0) + 1) + pairs.max(axis=1)) * (
-        2 * reach + 1
-    ) ** 3 + code
-    _, first = np.unique(key, return_index=True)
+    swapped = (pairs[:, 0] > pairs[:, 1]) | ((pairs[:, 0] == pairs[:, 1]) & (code < 0))
+    contact = (low * (high.max(initial=0) + 1) + high) * base**3 + np.where(swapped, -code, code)
+    _, first = np.unique(contact, return_index=True)
     return np.sort(first)
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from scanfab.base.errors import Note, PackingError
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
-from scanfab.packing.packing import Packing
 from scanfab.packing.periodicity import fitting_periods
 from scanfab.packing.plane import FEWEST, space_of, spelt_plane
 from scanfab.packing.sample import Sample
+from scanfab.packing.window import SurfaceBox
 
 # names of columns that may say which spheres are one body, in lower case
 COLUMNS = (*CLUMP_COLUMNS, *MOLECULE_COLUMNS)
@@ -51,19 +55,14 @@ def refuse_impossible(sample: Sample) -> None:
     listed = packing.contacts is not None and packing.contacts.source == "file"
     if len(radius) < FEWEST or listed or packing.bodies is not None:
         return
-    # the box of the grains' surfaces, or the cell
-    reach, space = radius[:, None], packing.space
-    extents = (position + reach).max(axis=0) - (position - reach).min(axis=0)
-    box = float(np.prod(extents[list(space.along)]))
-    if packing.cell is not None and packing.is_periodic:
-        box = min(box, packing.cell.volume)
-    scale = np.cbrt(box) if space.dimension == 3 else np.sqrt(box)
-    solid = float(space.ball * np.sum((radius / scale) ** space.dimension))
+    extents = SurfaceBox.of(packing, sample.grains).extents[list(packing.space.along)]
+    # over the size of the box: volumes of many grains may be beyond all numbers
+    scale = np.exp(np.log(extents).mean())
+    solid = float(np.sum(packing.space.volume(radius / scale)))
     if solid >= SOLIDS:
         raise PackingError(
             f"the grains' volumes add up to {solid:.3g} times that of the box that they lie in "
-            f"(radii {_span(radius)}, centres within {_extent(position):.3g}): check the units of "
-            f"radius and position"
+            f"({_sizes(position, radius)}): check the units of radius and position"
         )
 
 
@@ -82,19 +81,13 @@ def doubts_of(
     bodies_are_named : bool, optional
         Whether the user has said which spheres are one body: that each is one, if none are.
     """
-    packing = sample.packing
-    if len(packing) < FEWEST:
+    if len(sample.packing) < FEWEST:
         return []
-    clumps = "" if bodies_are_named else _clumps(packing)
-    texts = {
-        "plane": _plane(packing),
-        "clumps": clumps,
-        "spread_bodies": _spread_bodies(packing),
-        "own_images": _own_images(packing),
-        "empty_period": _empty_period(packing) if cell_is_named else "",
-        "many_contacts": "" if clumps else _many_contacts(sample),
-        "no_contacts": _no_contacts(sample),
-    }
+    asked = {"clumps": not bodies_are_named, "empty_period": cell_is_named}
+    texts = {code: rule(sample) for code, rule in RULES.items() if asked.get(code, True)}
+    if texts.get("clumps"):
+        # the spheres of a clump overlap
+        texts["many_contacts"] = ""
     return [Note(code, text) for code, text in texts.items() if text]
 
 
@@ -111,12 +104,11 @@ def cell_doubt(sample: Sample, carries: str) -> str:
     """
     if carries == "cell" or sample.packing.is_periodic:
         return ""
-    periods = fitting_periods(sample.packing)
-    found = {axis: period for axis, period in zip("xyz", periods, strict=True) if period}
-    if not found:
+    periods = zip(fitting_periods(sample.packing), "xyz", strict=True)
+    lengths = ", ".join(f"{period:.4g} along {axis}" for period, axis in periods if period)
+    if not lengths:
         return ""
     lacks, cure = CELL_LACKS[carries]
-    lengths = ", ".join(f"{period:.4g} along {axis}" for axis, period in found.items())
     return (
         f"the sample looks periodic: grains of opposite faces touch at a period of {lengths} "
         f"(roughly); {lacks}: name it with {cure}"
@@ -131,8 +123,8 @@ def cell_hint(sample: Sample, carries: str) -> str:
     return f"{lacks}; {cure} if the sample is periodic"
 
 
-def _plane(packing: Packing) -> str:
-    plane = space_of(packing.position)
+def _read_as_spheres(sample: Sample) -> str:
+    packing, plane = sample.packing, space_of(sample.packing.position)
     if packing.space.is_plane or not plane.is_plane:
         return ""
     return (
@@ -141,88 +133,77 @@ def _plane(packing: Packing) -> str:
     )
 
 
-def _clumps(packing: Packing) -> str:
+def _clumps(sample: Sample) -> str:
+    """
+    A column that numbers clumps, where each sphere counts as a grain.
+
+    A clump has several spheres that lie close together. A number that many spheres all over the
+    sample have in common is that of a species or a molecule.
+    """
+    packing = sample.packing
     if packing.bodies is not None:
         return ""
-    for name in packing.columns:
-        found = _bodies(packing, name) if name.lower() in COLUMNS else None
-        if found is not None:
-            bodies, members = found
+    for name, values in packing.columns.items():
+        if name.lower() not in COLUMNS or values.ndim != 1 or values.dtype.kind not in "iuf":
+            continue
+        rows = np.flatnonzero(values > 0)
+        _, counts, extents = _extents_of(packing.position[rows], values[rows])
+        several = counts > 1
+        close = several & (extents.max(axis=1) < SMALL * np.ptp(packing.position, axis=0).max())
+        # a clump that a periodic face cuts seems as large as the sample
+        if several.any() and close.sum() >= 0.5 * several.sum():
             return (
-                f"the column {name} names {bodies} clumps of {members} spheres, but each sphere "
-                f"counts as a grain in contacts, coordination and rattlers (variants b and d): if "
-                f'the clumps are rigid, `bodies="{name}"` makes each of them one grain'
+                f"the column {name} names {several.sum()} clumps of {counts[several].sum()} "
+                f"spheres, but each sphere counts as a grain in contacts, coordination and "
+                f'rattlers (variants b and d): if the clumps are rigid, `bodies="{name}"` makes '
+                f"each of them one grain"
             )
     return ""
 
 
-def _spread_bodies(packing: Packing) -> str:
+def _spread_bodies(sample: Sample) -> str:
     """Bodies that a periodic face may cut, or whose column may number something else."""
-    bodies, cell = packing.bodies, packing.cell
+    bodies, cell, position = sample.packing.bodies, sample.packing.cell, sample.packing.position
     if bodies is None:
         return ""
-    position, periodic = packing.position, np.zeros(3, np.bool_)
-    if cell is not None and packing.is_periodic:
+    periodic = np.zeros(3, np.bool_)
+    if cell is not None and cell.is_periodic:
         # along the shortest vectors of the cell, in periods where these repeat
         position = (position + bodies.turns @ cell.vectors) @ np.linalg.inv(cell.short_vectors)
         periodic = np.array(cell.periodic)
     rows = np.flatnonzero(bodies.has_many)
-    heads, extents = _extents_of(position[rows], bodies.head[rows])
+    heads, _, extents = _extents_of(position[rows], bodies.head[rows])
     size = np.maximum(np.where(periodic, 1.0, np.ptp(position, axis=0)), TINY)
     wide = extents > SMALL * size
     # in a sample of few large clumps all are as long
     alone = (extents > LONG * np.median(extents, axis=0)) | wide.all(axis=1, keepdims=True)
-    spread = np.flatnonzero((wide & (periodic | alone)).any(axis=1))
+    spread = heads[(wide & (periodic | alone)).any(axis=1)]
     if spread.size == 0:
         return ""
-    cure = (
-        "their spheres are put together next to the first of them, which is right for bodies that "
-        "are shorter than half a period"
-        if periodic.any()
-        else "if the sample is periodic, name its cell (`cell`, `periodic`)"
-    )
+    where, cure = "sample", "if the sample is periodic, name its cell (`cell`, `periodic`)"
+    if periodic.any():
+        where = "cell"
+        cure = (
+            "their spheres are put together next to the first of them, which is right for bodies "
+            "that are shorter than half a period"
+        )
     return (
         f"{counted(len(spread), 'body', 'bodies')} of several spheres, such as number "
-        f"{bodies.number[heads[spread[0]]]}, reach through more than half of the "
-        f"{'cell' if periodic.any() else 'sample'}: {cure}; or are these no bodies (`bodies`)?"
+        f"{bodies.number[spread[0]]}, reach through more than half of the {where}: {cure}; or are "
+        f"these no bodies (`bodies`)?"
     )
 
 
-def _extents_of(position: FloatArray, body: IntArray) -> tuple[IntArray, FloatArray]:
-    """The numbers of some bodies, shape (B,), and their extents, shape (B, 3)."""
+def _extents_of(position: FloatArray, body: npt.NDArray[Any]) -> tuple[Any, IntArray, FloatArray]:
+    """The numbers of some bodies, how many spheres each has, and their extents, shape (B, 3)."""
     order = np.argsort(body, kind="stable")
-    along, names = position[order], body[order]
-    starts = np.flatnonzero(np.diff(names, prepend=names[0] - 1))
-    extents = np.maximum.reduceat(along, starts) - np.minimum.reduceat(along, starts)
-    return names[starts], extents
+    names, starts, counts = np.unique(body[order], return_index=True, return_counts=True)
+    along = position[order]
+    return names, counts, np.maximum.reduceat(along, starts) - np.minimum.reduceat(along, starts)
 
 
-def _bodies(packing: Packing, name: str) -> tuple[int, int] | None:
-    """
-    How many bodies a column names, and of how many spheres; None if it names none.
-
-    A body has several spheres that lie close together. A number that many spheres all over the
-    sample have in common is that of a species or a molecule.
-    """
-    values = packing.columns[name]
-    if values.ndim != 1 or values.dtype.kind not in "iuf":
-        return None
-    rows = np.flatnonzero(values > 0)
-    _, counts = np.unique(values[rows], return_counts=True)
-    several = counts > 1
-    if not several.any():
-        return None
-    _, extents = _extents_of(packing.position[rows], values[rows])
-    small = extents.max(axis=1) < SMALL * _extent(packing.position)
-    # a body that a periodic face cuts seems as large as the sample
-    if np.count_nonzero(small & several) < 0.5 * np.count_nonzero(several):
-        return None
-    return int(several.sum()), int(counts[several].sum())
-
-
-def _own_images(packing: Packing) -> str:
-    assert packing.contacts is not None
-    pairs = packing.contacts.pairs
+def _own_images(sample: Sample) -> str:
+    packing, pairs = sample.packing, sample.contacts.pairs
     itself = np.unique(pairs[pairs[:, 0] == pairs[:, 1], 0])
     if itself.size == 0 or packing.cell is None:
         return ""
@@ -234,21 +215,19 @@ def _own_images(packing: Packing) -> str:
     )
 
 
-def _empty_period(packing: Packing) -> str:
-    cell = packing.cell
+def _empty_period(sample: Sample) -> str:
+    cell = sample.packing.cell
     if cell is None:
         return ""
-    fractions = cell.fractional(packing.position)
-    largest = float(packing.radius.max())
-    for axis in np.flatnonzero(cell.periodic):
-        along = np.sort(fractions[:, axis])
-        gap = float(max(np.diff(along).max(), along[0] + 1.0 - along[-1]))
-        if gap > EMPTY and gap * cell.heights[axis] > 4.0 * largest:
-            return (
-                f"the grains fill {1.0 - gap:.0%} of the cell's period along {'xyz'[axis]} "
-                f"({cell.heights[axis]:.4g}), the rest of it is empty: is the sample periodic "
-                f"there, and with this period (`periodic`, `cell`)?"
-            )
+    fractions = np.sort(cell.fractional(sample.packing.position), axis=0)
+    gaps = np.diff(np.vstack([fractions, fractions[0] + 1.0]), axis=0).max(axis=0)
+    is_wide = (gaps > EMPTY) & (gaps * cell.heights > 4.0 * sample.packing.radius.max())
+    for axis in np.flatnonzero(is_wide & cell.periodic):
+        return (
+            f"the grains fill {1.0 - gaps[axis]:.0%} of the cell's period along {'xyz'[axis]} "
+            f"({cell.heights[axis]:.4g}), the rest of it is empty: is the sample periodic "
+            f"there, and with this period (`periodic`, `cell`)?"
+        )
     return ""
 
 
@@ -257,10 +236,9 @@ def _many_contacts(sample: Sample) -> str:
     mean = float(numbers.mean()) if numbers.size else 0.0
     if sample.contacts.source != "geometric" or mean < MANY_CONTACTS:
         return ""
-    radius = sample.packing.radius[sample.grains]
+    sizes = _sizes(sample.packing.position, sample.packing.radius[sample.grains])
     return (
-        f"{mean:.0f} contacts a grain by geometry (radii {_span(radius)}, centres within "
-        f"{_extent(sample.packing.position):.3g}): check the units of radius and position"
+        f"{mean:.0f} contacts a grain by geometry ({sizes}): check the units of radius and position"
     )
 
 
@@ -284,9 +262,18 @@ def _no_contacts(sample: Sample) -> str:
     )
 
 
-def _span(radius: FloatArray) -> str:
-    return f"{radius.min():.3g} to {radius.max():.3g}"
+def _sizes(position: FloatArray, radius: FloatArray) -> str:
+    extent = np.ptp(position, axis=0).max()
+    return f"radii {radius.min():.3g} to {radius.max():.3g}, centres within {extent:.3g}"
 
 
-def _extent(position: FloatArray) -> float:
-    return float(np.ptp(position, axis=0).max())
+# each says in a sentence what is doubtful, and nothing if nothing is
+RULES: dict[str, Callable[[Sample], str]] = {
+    "plane": _read_as_spheres,
+    "clumps": _clumps,
+    "spread_bodies": _spread_bodies,
+    "own_images": _own_images,
+    "empty_period": _empty_period,
+    "many_contacts": _many_contacts,
+    "no_contacts": _no_contacts,
+}

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
 
+from scanfab.base.errors import Note
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.packing import Packing
 from scanfab.packing.window import SurfaceBox
@@ -30,8 +31,7 @@ MOST_NAMED = 20
 SOME = 10_000
 
 
-@dataclass(frozen=True, eq=False)
-class Escaped:
+class Escaped(NamedTuple):
     """Which particles lie far away from all others."""
 
     grains: BoolArray
@@ -66,11 +66,12 @@ def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
     >>> np.flatnonzero(found.grains).tolist(), found.gap
     ([125], 15.0)
     """
-    left = grains.copy()
-    most = max(SHARE * _number(packing, np.flatnonzero(grains)), 1.0)
+    rows, left = np.flatnonzero(grains), grains.copy()
+    count = _number(packing, rows)
+    most = max(SHARE * count, 1.0)
     flown: list[int] = []
-    if _number(packing, np.flatnonzero(grains)) >= FEWEST:
-        far = _far(packing, grains)
+    if count >= FEWEST:
+        far = _far(packing, rows)
         for axis, sign in product(_open_axes(packing), (-1.0, 1.0)):
             while _number(packing, flown) <= most and (
                 group := _group_at_end(packing, left, axis, sign, far)
@@ -82,50 +83,38 @@ def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
     return Escaped(grains & ~left, gap, _number(packing, flown) > most)
 
 
+def notes_of_escaped(packing: Packing, grains: BoolArray, escaped: Escaped) -> list[Note]:
+    """What to tell of the grains that have escaped; nothing without any."""
+    rows = np.flatnonzero(escaped.grains)
+    if not rows.size:
+        return []
+    more = _number(packing, rows) - 1
+    place = ", ".join(f"{x:g}" for x in packing.position[rows[0]])
+    grain = f"grain {packing.id[rows[0]]} at ({place}){f' and {more} more' if more else ''}"
+    ids = ",".join(str(one) for one in packing.id[rows[:MOST_NAMED]])
+    cure = f'`boundary="id={ids}{",..." if len(rows) > MOST_NAMED else ""}"`'
+    text = (
+        f", so the sample's extents, RV and octants leave out what has flown away; "
+        f"in a and b it is still solid: {cure} takes it out"
+    )
+    if escaped.are_many:
+        boxes = [SurfaceBox.of(packing, chosen) for chosen in (grains, grains & ~escaped.grains)]
+        wide, narrow = (" x ".join(f"{x:.4g}" for x in box.high - box.low) for box in boxes)
+        text = (
+            f"; these are too many to be left out, so they widen the sample's extents, RV "
+            f"and octants: {wide} with them, {narrow} without; if they have flown away, {cure} "
+            f"takes them out"
+        )
+    return [Note(ESCAPED, f"{grain}: {escaped.gap:g} away from all others{text}")]
+
+
 def _number(packing: Packing, rows: IntArray | list[int]) -> int:
     """How many grains some spheres are, by their rows."""
     return len(rows) if packing.bodies is None else len(np.unique(packing.bodies.head[rows]))
 
 
-def told_of_escaped(packing: Packing, grains: BoolArray, escaped: Escaped, more: int) -> str:
-    """
-    What to tell of grains that have escaped.
-
-    Parameters
-    ----------
-    packing : Packing
-        One frame.
-    grains : ndarray of bool, shape (N,)
-        Which of its particles are grains.
-    escaped : Escaped
-        Those of them that flew away, at least one.
-    more : int
-        How many grains they are beside the first.
-    """
-    rows = np.flatnonzero(escaped.grains)
-    first = rows[0]
-    place = ", ".join(f"{x:g}" for x in packing.position[first])
-    others = f" and {more} more" if more else ""
-    found = f"grain {packing.id[first]} at ({place}){others}: {escaped.gap:g} away from all others"
-    ids = ",".join(str(one) for one in packing.id[rows[:MOST_NAMED]])
-    cure = f'`boundary="id={ids}{",..." if len(rows) > MOST_NAMED else ""}"`'
-    if not escaped.are_many:
-        return (
-            f"{found}, so the sample's extents, RV and octants leave out what has flown away; "
-            f"in a and b it is still solid: {cure} takes it out"
-        )
-    boxes = [SurfaceBox.of(packing, chosen) for chosen in (grains, grains & ~escaped.grains)]
-    wide, narrow = (" x ".join(f"{x:.4g}" for x in box.high - box.low) for box in boxes)
-    return (
-        f"{found}; these are too many to be left out, so they widen the sample's extents, RV "
-        f"and octants: {wide} with them, {narrow} without; if they have flown away, {cure} "
-        f"takes them out"
-    )
-
-
-def _far(packing: Packing, grains: BoolArray) -> float:
+def _far(packing: Packing, rows: IntArray) -> float:
     """The gap from which on a grain is far away."""
-    rows = np.flatnonzero(grains)
     some = rows[:: len(rows) // SOME + 1]
     distance, near = KDTree(packing.position[rows]).query(packing.position[some], k=2)
     gaps = distance[:, 1] - packing.radius[some] - packing.radius[rows[near[:, 1]]]
@@ -135,11 +124,8 @@ def _far(packing: Packing, grains: BoolArray) -> float:
 
 def _open_axes(packing: Packing) -> list[int]:
     """Axes along which nothing repeats: no image of a grain lies elsewhere along them."""
-    along = sorted(packing.space.along)
-    if packing.cell is None:
-        return along
-    repeats = packing.cell.vectors[list(np.flatnonzero(packing.cell.periodic))]
-    return [k for k in along if not np.any(repeats[:, k] != 0.0)]
+    periods = np.zeros((0, 3)) if packing.cell is None else packing.cell.lattice.vectors
+    return [k for k in sorted(packing.space.along) if not periods[:, k].any()]
 
 
 def _group_at_end(
@@ -163,7 +149,7 @@ def _group_at_end(
 def _gaps(packing: Packing, row: int, others: IntArray) -> FloatArray:
     """Gaps between the surface of a particle and those of others, nearest image."""
     branch = packing.position[others] - packing.position[row]
-    if packing.cell is not None and packing.is_periodic:
+    if packing.cell is not None:
         branch = branch + packing.cell.nearest_image(branch) @ packing.cell.vectors
     distance = np.sqrt(np.einsum("ij,ij->i", branch, branch))
     return np.asarray(distance - packing.radius[others] - packing.radius[row])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -21,31 +20,11 @@ from scanfab.packing.contacts import (
     ContactList,
     Contacts,
     ListedWallForces,
-    Spheres,
     WallForces,
     resolve_contacts,
     resolve_wall_forces,
 )
-from scanfab.packing.plane import cell_in_plane, flat_space, place_of, refuse_outside
-
-# rows whose temporary array stays in a cache: a new one for all would take longer to come by
-PART = 1 << 15
-
-
-def lies_within(cell: Cell, position: FloatArray, low: float, high: float) -> bool:
-    """
-    Whether all positions surely have low <= fraction < high along the cell's periodic vectors.
-
-    The fractions are linear, so the corners of the box around the positions settle it. False if
-    only those lie outside, or if a position is not a number.
-    """
-    if not cell.is_periodic or len(position) == 0:
-        return True
-    sides = [(column.min(), column.max()) for column in position.T]
-    if not np.all(np.isfinite(sides)):
-        return False
-    fractions = cell.fractional(list(product(*sides)))[:, list(cell.periodic)]
-    return bool(np.all((fractions >= low) & (fractions < high)))
+from scanfab.packing.plane import cell_in_plane, flat_space, refuse_outside
 
 
 class Packing:
@@ -133,9 +112,9 @@ class Packing:
         self.space: Space = space
         if cell is not None and self.space.is_plane:
             cell = cell_in_plane(cell, self.space)
-        turns: IntArray | None = None
+        self.cell, turns = cell, None
         self.position: FloatArray = centres
-        if cell is not None and not lies_within(cell, centres, 0.0, 1.0):
+        if cell is not None and cell.is_periodic:
             self.position, turns = cell.place(centres)
         self.position.flags.writeable = False
         self.columns: Mapping[str, npt.NDArray[Any]] = {
@@ -149,29 +128,28 @@ class Packing:
         self.wall_forces: WallForces | None = None
         if wall_forces is not None:
             self.wall_forces = resolve_wall_forces(wall_forces, self.position, cell)
-        self.cell = cell
         self.step = None if step is None else int(step)
         self.time = None if time is None else float(time)
         self.contacts: Contacts | None = None
         if contacts is not None:
             listed = contacts if isinstance(contacts, ContactList) else ContactList(contacts)
-            self.contacts = resolve_contacts(listed, self._spheres(turns))
+            self.contacts = resolve_contacts(listed, self, turns)
 
     def __len__(self) -> int:
         return len(self.radius)
 
     def __repr__(self) -> str:
-        radii = ""
+        what = counted(len(self), "particle")
         if len(self):
             low, high = self.radius.min(), self.radius.max()
-            radii = f" of radius {low:.4g}" + ("" if low == high else f" to {high:.4g}")
-        what = [counted(len(self), "particle") + radii]
-        what += [f"2D in {self.space}"] if self.space.is_plane else []
+            what += f" of radius {low:.4g}" + ("" if low == high else f" to {high:.4g}")
+        if self.space.is_plane:
+            what += f", 2D in {self.space}"
         if self.bodies is not None:
-            what += [f"parts of {counted(self.bodies.count(np.ones(len(self), bool)), 'grain')}"]
-        what.append("contacts not known" if self.contacts is None else self.contacts.in_words())
-        what += [] if self.step is None else [f"step {self.step}"]
-        return f"Packing: {', '.join(what)}" + ("" if self.cell is None else f"\n  {self.cell!r}")
+            what += f", parts of {counted(len(np.unique(self.bodies.head)), 'grain')}"
+        what += ", contacts not known" if self.contacts is None else f", {self.contacts.in_words()}"
+        what += "" if self.step is None else f", step {self.step}"
+        return f"Packing: {what}" + ("" if self.cell is None else f"\n  {self.cell!r}")
 
     @property
     def dimension(self) -> int:
@@ -181,7 +159,8 @@ class Packing:
     @property
     def place_across(self) -> float:
         """Of discs the coordinate that all their centres share, dump's length unit."""
-        return place_of(self.position, self.space) if len(self) else 0.0
+        assert self.space.across is not None
+        return float(self.position[0, self.space.across]) if len(self) else 0.0
 
     @property
     def is_periodic(self) -> bool:
@@ -211,12 +190,9 @@ class Packing:
             other.wall_contacts = _wall_contacts(wall_contacts, len(self))
             other.wall_forces = None
         if isinstance(contacts, ContactList):
-            contacts = resolve_contacts(contacts, self._spheres(None))
+            contacts = resolve_contacts(contacts, self, None)
         other.contacts = contacts
         return other
-
-    def _spheres(self, turns: IntArray | None) -> Spheres:
-        return Spheres(self.position, self.radius, self.id, self.cell, turns, self.bodies)
 
 
 def _centres(position: npt.ArrayLike, dim: int | Space | None) -> tuple[FloatArray, int | Space]:
@@ -266,16 +242,7 @@ def check_lengths(position: FloatArray, radius: FloatArray, id: IntArray) -> Non
 
 
 def _check_ids(id: IntArray) -> None:
-    """PackingError if an id occurs twice; without sorting if ids lie close together, as usual."""
-    if np.all(id[1:] > id[:-1]):
-        return
-    low, high = int(id.min()), int(id.max())
-    if high - low < 8 * id.size:
-        seen = np.zeros(high - low + 1, np.bool_)
-        for start in range(0, id.size, PART):
-            seen[id[start : start + PART] - low] = True
-        if np.count_nonzero(seen) == id.size:
-            return
+    """PackingError if an id occurs twice."""
     unique, counts = np.unique(id, return_counts=True)
     if unique.size < id.size:
         raise PackingError(

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from scanfab.base.typing import FloatArray
+from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.packing.packing import Packing
 
 # grains of a face that tell whether it fits
@@ -51,14 +50,17 @@ def _period(packing: Packing, axis: int) -> float | None:
     counts = ends - np.arange(len(lengths))
     counts[len(lengths) - ends > BEYOND * counts] = 0
     best = int(np.argmax(counts))
-    expected = share * _contacts_through(packing, 0.5 * (low + high), axis)
+    # contacts whose grains lie on both sides of the middle
+    assert packing.contacts is not None
+    is_above = along[packing.contacts.pairs] >= 0.5 * (low + high)
+    expected = share * np.count_nonzero(is_above[:, 0] != is_above[:, 1])
     if expected < FEWEST or counts[best] < max(FEWEST, FITS * expected):
         return None
     return float(np.median(lengths[best : ends[best]]))
 
 
 def _lengths(
-    packing: Packing, axis: int, is_low: npt.NDArray[np.bool_], is_high: npt.NDArray[np.bool_]
+    packing: Packing, axis: int, is_low: BoolArray, is_high: BoolArray
 ) -> tuple[FloatArray, float]:
     """
     For each pair of grains at opposite faces, the period at which they would touch.
@@ -84,10 +86,3 @@ def _lengths(
     along = packing.position[:, axis]
     apart: FloatArray = along[partners[meets]] - along[first[meets]] + np.sqrt(room[meets])
     return apart, len(one) / count
-
-
-def _contacts_through(packing: Packing, place: float, axis: int) -> int:
-    """Contacts whose grains lie on both sides of a plane."""
-    assert packing.contacts is not None
-    along = packing.position[packing.contacts.pairs, axis]
-    return int(np.count_nonzero((along.min(axis=1) < place) & (along.max(axis=1) >= place)))

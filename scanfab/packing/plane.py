@@ -6,7 +6,7 @@ import numpy as np
 
 from scanfab.base.errors import PackingError
 from scanfab.base.space import SPACE, Space
-from scanfab.base.typing import BoolArray, FloatArray
+from scanfab.base.typing import FloatArray
 from scanfab.packing.cell import Cell
 
 # centres below which to lie in one plane may be chance
@@ -27,7 +27,9 @@ def space_of(position: FloatArray) -> Space:
     >>> space_of(np.column_stack([line, line**2, np.ones(12)]))
     Space: the plane x-y
     """
-    shared = np.flatnonzero(_shared(position)) if len(position) >= FEWEST else np.arange(0)
+    if len(position) < FEWEST:
+        return SPACE
+    shared = np.flatnonzero((position == position[0]).all(axis=0))
     return Space(int(shared[0])) if len(shared) == 1 else SPACE
 
 
@@ -40,7 +42,7 @@ def flat_space(position: FloatArray) -> Space:
     PackingError
         If they do not share a coordinate.
     """
-    shared = np.flatnonzero(_shared(position)) if len(position) else np.arange(3)
+    shared = np.flatnonzero((position == position[:1]).all(axis=0))
     if len(shared) == 0:
         extents = ", ".join(f"{edge:.4g}" for edge in np.ptp(position, axis=0))
         raise PackingError(
@@ -53,7 +55,7 @@ def flat_space(position: FloatArray) -> Space:
 def spelt_plane(position: FloatArray, space: Space) -> str:
     """Where the plane of some centres lies: ``z = 0``."""
     assert space.across is not None
-    return f"{'xyz'[space.across]} = {place_of(position, space):g}"
+    return f"{'xyz'[space.across]} = {position[0, space.across]:g}"
 
 
 def refuse_outside(position: FloatArray, space: Space) -> None:
@@ -67,28 +69,15 @@ def refuse_outside(position: FloatArray, space: Space) -> None:
     """
     if space.across is None or not len(position):
         return
-    place, along = place_of(position, space), position[:, space.across]
-    if np.all(along == place):
+    along, name = position[:, space.across], "xyz"[space.across]
+    elsewhere = along[along != along[0]]
+    if not elsewhere.size:
         return
-    first = int(np.argmax(along != place))
-    name = "xyz"[space.across]
     raise PackingError(
         f"the series is read as discs in {space}, as its first frame has them, but here centres "
-        f"lie at {name} = {place:g} and at {name} = {along[first]:g}: `dim=3` reads all frames as "
-        f"spheres"
+        f"lie at {name} = {along[0]:g} and at {name} = {elsewhere[0]:g}: `dim=3` reads all "
+        f"frames as spheres"
     )
-
-
-def place_of(position: FloatArray, space: Space) -> float:
-    """The coordinate that the centres share, across their plane."""
-    assert space.across is not None
-    return float(position[0, space.across])
-
-
-def _shared(position: FloatArray) -> BoolArray:
-    """Which coordinates all centres have in common."""
-    few = np.all(position[:FEWEST] == position[0], axis=0)
-    return np.asarray(np.all(position == position[0], axis=0) if few.any() else few)
 
 
 def cell_in_plane(cell: Cell, space: Space) -> Cell:

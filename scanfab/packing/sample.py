@@ -17,7 +17,7 @@ from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, IntArray
 from scanfab.packing.boundary import BoundaryRule, select_boundary
 from scanfab.packing.contacts import Contacts
-from scanfab.packing.escaped import ESCAPED, Escaped, escaped_grains, told_of_escaped
+from scanfab.packing.escaped import Escaped, escaped_grains, notes_of_escaped
 from scanfab.packing.packing import Packing
 from scanfab.packing.rattlers import RattlerRule, Touching, count, installed_rules
 from scanfab.packing.search import find_contacts
@@ -35,12 +35,7 @@ class Variant:
     """Rattlers are void, and their contacts do not count."""
 
 
-VARIANTS = {
-    "a": Variant("a", in_window=False, without_rattlers=False),
-    "b": Variant("b", in_window=False, without_rattlers=True),
-    "c": Variant("c", in_window=True, without_rattlers=False),
-    "d": Variant("d", in_window=True, without_rattlers=True),
-}
+VARIANTS = {name: Variant(name, name in "cd", name in "bd") for name in "abcd"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,18 +165,8 @@ class Sample:
         return self.grains if self.escaped.are_many else self.grains & ~self.escaped.grains
 
     def doubts_of_escaped(self) -> list[Note]:
-        """
-        What to tell of grains that have escaped.
-
-        Returns
-        -------
-        list of Note
-            Empty without any.
-        """
-        if not self.escaped.grains.any():
-            return []
-        more = self.number(self.escaped.grains) - 1
-        return [Note(ESCAPED, told_of_escaped(self.packing, self.grains, self.escaped, more))]
+        """What to tell of grains that have escaped; nothing without any."""
+        return notes_of_escaped(self.packing, self.grains, self.escaped)
 
     @cached_property
     def rattlers(self) -> BoolArray:

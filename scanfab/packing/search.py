@@ -1,15 +1,17 @@
-"""Contacts from geometry, where the dump lists none."""
+"""Pairs of grains that touch, overlap or nearly touch, from geometry alone."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from scanfab.base.errors import PackingError, SettingsError
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.cell import Cell
-from scanfab.packing.contacts import Contacts, warn_of_same_centre
+from scanfab.packing.contacts import Contacts, branches, warn_of_same_centre
 from scanfab.packing.kernels import (
     Basis,
     Grid,
@@ -22,6 +24,10 @@ from scanfab.packing.kernels import (
     sort_pairs,
 )
 from scanfab.packing.packing import Packing
+
+if TYPE_CHECKING:
+    from scanfab.packing.sample import Sample, Variant
+    from scanfab.packing.window import Window
 
 # grains of one grid differ by no more than this factor: dust is not sought in bins of boulders
 CLASS_RATIO = 3.5
@@ -90,6 +96,77 @@ def find_contacts(packing: Packing, tolerance: float = 0.0) -> Packing:
         warn_of_same_centre(pairs[~sound], packing.id)
         pairs, image, normal, point = pairs[sound], image[sound], normal[sound], point[sound]
     return packing.with_contacts(Contacts(pairs, image, normal, point, None, "geometric"))
+
+
+class NearPairs(NamedTuple):
+    """
+    Pairs of a region's grains whose surfaces are near, and how much the grains shade.
+
+    Attributes
+    ----------
+    normal : ndarray, shape (M, 3)
+        Unit vectors between the centres of each pair.
+    overlap : ndarray, shape (M,)
+        r1 + r2 less the distance of the centres, dump's length unit; below 0 for a gap.
+    reduced_radius : ndarray, shape (M,)
+        r1 r2 / (r1 + r2), dump's length unit.
+    shadow : float
+        What lines of one direction meet of all grains: Σ π r², of discs Σ 2 r.
+    volume : float
+        Of the region, of discs its area.
+    space : Space
+        The plane in which discs lie.
+    """
+
+    normal: FloatArray
+    overlap: FloatArray
+    reduced_radius: FloatArray
+    shadow: float
+    volume: float
+    space: Space = SPACE
+
+
+def near_pairs(sample: Sample, variant: Variant, window: Window | None, gap: float) -> NearPairs:
+    """
+    The pairs of a variant's solids whose surfaces are no more than a gap apart.
+
+    Parameters
+    ----------
+    sample : Sample
+        Of spheres, without clumps.
+    variant : Variant
+        Whose solids.
+    window : Window or None
+        The RV, in which the pairs' middles and the grains' centres lie; None for a whole that
+        repeats along all vectors of its cell.
+    gap : float
+        Between surfaces, dump's length unit.
+
+    Returns
+    -------
+    NearPairs
+    """
+    packing = sample.packing
+    solid = sample.grains & ~sample.removed(variant)
+    position, radius = packing.position[solid], packing.radius[solid]
+    pairs, image = overlapping_pairs(position, radius + 0.5 * gap, 1.0, packing.cell)
+    one, two = pairs.T
+    branch = branches(position, pairs, image, packing.cell)
+    distance = np.linalg.norm(branch, axis=1)
+    normal = branch / np.where(distance > 0.0, distance, 1.0)[:, None]
+    overlap = radius[one] + radius[two] - distance
+    chosen = distance > 0.0
+    inside = sample.counted(variant, window)[solid]
+    if window is not None:
+        middle = position[one] + normal * (radius[one] - 0.5 * overlap)[:, None]
+        chosen &= window.contains(middle, packing)
+        volume = window.shape.volume
+    else:
+        assert packing.cell is not None
+        volume = packing.cell.volume
+    reduced = radius[one] * radius[two] / (radius[one] + radius[two])
+    found = normal[chosen], overlap[chosen], reduced[chosen]
+    return NearPairs(*found, packing.space.shadow(radius[inside]), volume, packing.space)
 
 
 def overlapping_pairs(

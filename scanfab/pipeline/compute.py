@@ -18,9 +18,9 @@ from typing import Any, NamedTuple
 from scanfab.base.errors import SKIPPED, Note, PackingError, ReadError, tell
 from scanfab.base.option import options_of, takes_options, unusable
 from scanfab.io.frame import Frame
+from scanfab.packing.bodies import Grouping, regrouped
 from scanfab.packing.cell import Cell
 from scanfab.packing.escaped import ESCAPED
-from scanfab.packing.groupings import Grouping, Groupings, grouping_of
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.cluster import DaskExecutor, DeadWorkersError
@@ -218,9 +218,11 @@ class _FrameJob:
         LOGGER.info("%s: frame %d: %d grains in %.2g s", self.source, self.number, grains, seconds)
         if self.observe is not None:
             self.observe(found)
-        packing = found.sample.packing
+        packing, grouping = found.sample.packing, None
+        if packing.bodies is not None:
+            grouping = Grouping(packing.id, packing.id[packing.bodies.head])
         cell = packing.cell if grains else None
-        return _Computed(self.number, found.rows, found.notes, cell, grouping_of(packing))
+        return _Computed(self.number, found.rows, found.notes, cell, grouping)
 
 
 def _here() -> tuple[str, int]:
@@ -239,8 +241,8 @@ class _Run:
         self.frames = frames
         self.has_grains = False
         self._flips = Flips(frames.settings.frames.step)
-        self._groupings = Groupings()
-        self._told_of_escaped = False
+        self._first_grouping: tuple[int, Grouping] | None = None
+        self._told_once: set[str] = set()
 
     def jobs(self, done: Container[int], observe: Observer | None) -> Iterator[_FrameJob | None]:
         """The chosen frames that are not done; None where one is still to come."""
@@ -275,12 +277,18 @@ class _Run:
         for warning in computed.heard:
             warnings.warn(warning, stacklevel=3)
         # a grain that flew away goes on flying: once a series is enough
-        notes = [one for one in computed.notes if one.code != ESCAPED or not self._told_of_escaped]
-        self._told_of_escaped |= any(one.code == ESCAPED for one in notes)
+        notes = [one for one in computed.notes if one.code not in {ESCAPED} & self._told_once]
+        self._told_once |= {one.code for one in notes}
         tell(notes, f"frame {computed.number}")
         tell(self._flips.notes(computed.number, computed.cell))
-        grouping = self._groupings.notes(computed.number, computed.grouping)
-        tell(grouping, f"frame {computed.number}")
+        if computed.grouping is None:
+            return
+        if self._first_grouping is None:
+            self._first_grouping = computed.number, computed.grouping
+        note = regrouped(*self._first_grouping, computed.grouping)
+        if note is not None and note.code not in self._told_once:
+            self._told_once.add(note.code)
+            tell([note], f"frame {computed.number}")
 
 
 @contextmanager

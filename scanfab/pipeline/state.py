@@ -15,6 +15,7 @@ from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.fabric.measured import ContactForces, SampleState
 from scanfab.fabric.state import love_weber
 from scanfab.packing.clump_volumes import lens_volumes, own_shares
+from scanfab.packing.contacts import branches
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample, Variant
 from scanfab.packing.window import Window
@@ -111,13 +112,9 @@ def _places(packing: Packing) -> FloatArray:
 
 def _branches(packing: Packing) -> FloatArray:
     """From the first grain's place to the second's, shape (M, 3)."""
-    contacts, places = packing.contacts, _places(packing)
+    contacts = packing.contacts
     assert contacts is not None
-    one, two = contacts.pairs.T
-    branch: FloatArray = places[two] - places[one]
-    if packing.cell is not None:
-        branch = branch + contacts.image @ packing.cell.vectors
-    return branch
+    return branches(_places(packing), contacts.pairs, contacts.image, packing.cell)
 
 
 def _stress(sample: Sample, window: Window | None) -> FloatArray | None:

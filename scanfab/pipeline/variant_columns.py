@@ -17,8 +17,8 @@ from scanfab.fabric.registry import GROUPS, OWN_FABRICS, checked_values
 from scanfab.fabric.spectrum import LONGEST_GAP, PREDICTED_ALPHA, predicted_alpha
 from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
 from scanfab.packing.columns import RV_COLUMN, sample_values
-from scanfab.packing.near import near_pairs
 from scanfab.packing.sample import Variant
+from scanfab.packing.search import near_pairs
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.state import contact_forces, doubts_of_state, sample_state

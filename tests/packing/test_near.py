@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from scanfab import Cell, Packing, Sample, Window, find_contacts, sphere
-from scanfab.packing.near import near_pairs
 from scanfab.packing.sample import VARIANTS
+from scanfab.packing.search import near_pairs
 
 
 @pytest.fixture(scope="module")
