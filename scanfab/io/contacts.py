@@ -135,7 +135,7 @@ def _grains_at(grains: GrainTable, points: FloatArray) -> IntArray:
         points, position = grains.cell.wrap(points), grains.cell.wrap(position)
         # rounding may put a point and its centre on opposite faces: images just outside help
         margin = min(SAME_PLACE * float(radius.max()), float(grains.cell.heights.min()))
-        images, of, _ = grains.cell.images(position, margin)
+        images, of = grains.cell.images(position, margin)
         position = np.concatenate([position, images])
         row = np.concatenate([row, of])
     distance, nearest = KDTree(position).query(points)

@@ -130,16 +130,17 @@ def enclosing_class(packing: Packing) -> str | None:
     All particles of the class lie farther out than nearly all others, measured in the box of the
     sample, round or square.
     """
-    columns = [name for name in packing.columns if name.lower() in CLASS_COLUMNS]
+    columns = {
+        name: values
+        for name, values in packing.columns.items()
+        if name.lower() in CLASS_COLUMNS and values.ndim == 1 and values.dtype.kind in "iuf"
+    }
     if len(packing) < 50 or not columns:
         return None
     low, high = packing.position.min(axis=0), packing.position.max(axis=0)
     scaled = (packing.position - 0.5 * (low + high)) / np.maximum(high - low, 1e-300)
     distances = np.linalg.norm(scaled, axis=1), np.abs(scaled).max(axis=1)
-    for name in columns:
-        values = packing.columns[name]
-        if values.ndim != 1 or values.dtype.kind not in "iuf":
-            continue
+    for name, values in columns.items():
         classes = np.unique(values[values == values])  # a side column may have gaps
         if not 2 <= classes.size <= 20:
             continue

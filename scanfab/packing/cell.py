@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 from itertools import product
 
@@ -18,15 +17,6 @@ from scanfab.packing.lattice import Lattice, reduced_lattice
 
 # longest periodic edge over the smallest height: the search for images cannot count further
 WIDEST = 1e9
-
-
-def _three_truths(periodic: Sequence[bool]) -> tuple[bool, bool, bool]:
-    if isinstance(periodic, str) or np.shape(periodic) != (3,):
-        raise PackingError(
-            f"periodic: expected three truth values, such as (True, True, False), "
-            f"found {periodic!r}"
-        )
-    return bool(periodic[0]), bool(periodic[1]), bool(periodic[2])
 
 
 class Cell:
@@ -67,20 +57,23 @@ class Cell:
     ) -> None:
         try:
             lattice = np.asarray(vectors, dtype=np.float64)
+            self.vectors: FloatArray = np.diag(lattice) if lattice.shape == (3,) else lattice
             self.origin: FloatArray = np.asarray(origin, dtype=np.float64)
+            fits = self.vectors.shape == (3, 3) and self.origin.shape == (3,)
         except (TypeError, ValueError):
+            fits = False
+        if not fits:
             raise PackingError(
                 f"a cell needs vectors of shape (3, 3) or (3,) and an origin of shape (3,), "
                 f"found {vectors!r} and {origin!r}"
-            ) from None
-        self.vectors: FloatArray = np.diag(lattice) if lattice.shape == (3,) else lattice
-        self.periodic = _three_truths(periodic)
-        self.space = space
-        if self.vectors.shape != (3, 3) or self.origin.shape != (3,):
-            raise PackingError(
-                f"a cell needs vectors of shape (3, 3) and an origin of shape (3,), "
-                f"not {self.vectors.shape} and {self.origin.shape}"
             )
+        if isinstance(periodic, str) or np.shape(periodic) != (3,):
+            raise PackingError(
+                f"periodic: expected three truth values, such as (True, True, False), "
+                f"found {periodic!r}"
+            )
+        self.periodic = bool(periodic[0]), bool(periodic[1]), bool(periodic[2])
+        self.space = space
         if not all(all_within(one, -MOST, MOST) for one in (self.vectors, self.origin)):
             raise PackingError(
                 f"the cell's vectors and origin must be finite numbers, none above {MOST:g}"
@@ -102,10 +95,8 @@ class Cell:
         else:
             shape = ", ".join(spelt_place(vector) for vector in self.vectors)
         along = [name for name, repeats in zip("xyz", self.periodic, strict=True) if repeats]
-        if len(along) == 3 or not along:
-            repeats = "periodic" if along else "not periodic"
-        else:
-            repeats = f"periodic along {' and '.join(along)}"
+        words = {3: "periodic", 0: "not periodic"}
+        repeats = words.get(len(along), f"periodic along {' and '.join(along)}")
         return f"Cell: {shape} from {spelt_place(self.origin)}, {repeats}"
 
     @property
@@ -116,8 +107,7 @@ class Cell:
     @property
     def heights(self) -> FloatArray:
         """Perpendicular distances between opposite faces, shape (3,), dump's length unit."""
-        heights: FloatArray = 1.0 / np.linalg.norm(np.linalg.inv(self.vectors), axis=0)
-        return heights
+        return np.asarray(1.0 / np.linalg.norm(np.linalg.inv(self.vectors), axis=0))
 
     @property
     def is_endless(self) -> bool:
@@ -130,8 +120,7 @@ class Cell:
         if self.space.across is None:
             return self.vectors
         inside = self.vectors[:, self.space.across] == 0.0
-        own: FloatArray = self.vectors[inside][:, list(self.space.along)]
-        return own
+        return self.vectors[np.ix_(inside, self.space.along)]
 
     @property
     def volume(self) -> float:
@@ -141,8 +130,7 @@ class Cell:
     @property
     def center(self) -> FloatArray:
         """The middle of the cell, shape (3,), dump's length unit."""
-        center: FloatArray = self.origin + 0.5 * self.vectors.sum(axis=0)
-        return center
+        return np.asarray(self.origin + 0.5 * self.vectors.sum(axis=0))
 
     def fractional(self, position: npt.ArrayLike) -> FloatArray:
         """
@@ -158,10 +146,8 @@ class Cell:
         ndarray, shape (N, 3)
             Dimensionless.
         """
-        fractions: FloatArray = (np.asarray(position, dtype=np.float64) - self.origin) @ (
-            np.linalg.inv(self.vectors)
-        )
-        return fractions
+        from_origin = np.asarray(position, dtype=np.float64) - self.origin
+        return np.asarray(from_origin @ np.linalg.inv(self.vectors))
 
     def place(self, position: npt.ArrayLike) -> tuple[FloatArray, IntArray]:
         """
@@ -232,7 +218,7 @@ class Cell:
 
     def images(
         self, position: FloatArray, margin: float
-    ) -> tuple[FloatArray, npt.NDArray[np.intp], IntArray]:
+    ) -> tuple[FloatArray, npt.NDArray[np.intp]]:
         """
         The periodic images of points that lie outside the cell, but within a margin of it.
 
@@ -249,24 +235,16 @@ class Cell:
             The images.
         row : ndarray of int, shape (K,)
             The point that each image repeats.
-        image : ndarray of int, shape (K, 3)
-            The lattice translation of each image.
         """
         fractions = self.fractional(position)
         reach = np.where(self.periodic, margin / self.heights, 0.0)
-        layers = [range(-int(n), int(n) + 1) for n in np.ceil(reach)]
-        # empty arrays of the right shape first, for the case without any image
-        positions, rows, images = [position[:0]], [np.arange(0)], [np.zeros((0, 3), np.int64)]
-        for shift in product(*layers):
-            if shift == (0, 0, 0):
-                continue
-            moved = fractions + shift
-            near = (moved >= -reach) & (moved <= 1.0 + reach)
-            chosen = np.flatnonzero(np.all(near | ~np.array(self.periodic), axis=1))
-            positions.append(position[chosen] + np.array(shift, dtype=float) @ self.vectors)
-            rows.append(chosen)
-            images.append(np.tile(np.array(shift, dtype=np.int64), (chosen.size, 1)))
-        return np.concatenate(positions), np.concatenate(rows), np.concatenate(images)
+        images, rows = [np.zeros((0, 3))], [np.arange(0)]
+        for shift in product(*(range(-int(n), int(n) + 1) for n in np.ceil(reach))):
+            if any(shift):
+                near = (fractions + shift >= -reach) & (fractions + shift <= 1.0 + reach)
+                rows.append(np.flatnonzero(np.all(near | ~np.array(self.periodic), axis=1)))
+                images.append(position[rows[-1]] + np.array(shift, np.float64) @ self.vectors)
+        return np.concatenate(images), np.concatenate(rows)
 
     def images_near_origin(
         self, position: FloatArray, reach: FloatArray

@@ -27,8 +27,7 @@ class Lattice:
     @property
     def heights(self) -> FloatArray:
         """Distances between neighbouring planes of the lattice in its span, shape (K,)."""
-        heights: FloatArray = 1.0 / np.linalg.norm(np.linalg.pinv(self.vectors), axis=0)
-        return heights
+        return np.asarray(1.0 / np.linalg.norm(np.linalg.pinv(self.vectors), axis=0))
 
     @property
     def shortest(self) -> float:
@@ -38,17 +37,18 @@ class Lattice:
     @property
     def steps(self) -> FloatArray:
         """Translations to the images all around, shape (3**K - 1, 3), dump's length unit."""
-        steps = [step for step in product((-1, 0, 1), repeat=len(self.vectors)) if any(step)]
-        return np.array(steps, dtype=np.float64).reshape(-1, len(self.vectors)) @ self.vectors
+        return self._shifts(np.ones(len(self.vectors), int))
 
     def within(self, length: float) -> FloatArray:
         """Translations that are shorter than a length, the shortest first, shape (T, 3)."""
-        most = np.floor(length / self.heights).astype(int)
-        steps = [step for step in product(*(range(-n, n + 1) for n in most)) if any(step)]
-        shifts = np.array(steps, dtype=np.float64).reshape(-1, len(self.vectors)) @ self.vectors
+        shifts = self._shifts(np.floor(length / self.heights).astype(int))
         lengths = np.linalg.norm(shifts, axis=1)
-        found: FloatArray = shifts[np.argsort(lengths, kind="stable")]
-        return found[: int(np.sum(lengths < length))]
+        return shifts[np.argsort(lengths, kind="stable")][: int(np.sum(lengths < length))]
+
+    def _shifts(self, most: IntArray) -> FloatArray:
+        """Translations by at most so many of each vector, but none by 0, shape (T, 3)."""
+        steps = [step for step in product(*(range(-n, n + 1) for n in most)) if any(step)]
+        return np.array(steps, dtype=np.float64).reshape(-1, len(self.vectors)) @ self.vectors
 
     @property
     def half_extent(self) -> float:

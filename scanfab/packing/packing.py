@@ -200,10 +200,10 @@ def _centres(position: npt.ArrayLike, dim: int | Space | None) -> tuple[FloatArr
     if dim not in (None, 2, 3) and not isinstance(dim, Space):
         raise PackingError(f"dim: expected 2 or 3, found {dim!r}")
     try:
-        shape = np.shape(position)
+        is_flat = np.shape(position)[1:] == (2,)
     except ValueError:
-        shape = ()  # rows of different lengths
-    if len(shape) != 2 or shape[1] != 2:
+        is_flat = False  # rows of different lengths
+    if not is_flat:
         return cast("position", position, np.float64, (None, 3)), dim or 3
     if dim == 3:
         raise PackingError("dim: expected 2, as the positions have two coordinates, found 3")
@@ -226,12 +226,11 @@ def check_lengths(position: FloatArray, radius: FloatArray, id: IntArray) -> Non
     if all_within(position, -MOST, MOST) and all_within(radius, LEAST, MOST):
         return
     finite = np.isfinite(position).all(axis=1) & np.isfinite(radius)
-    large = (np.abs(position) > MOST).any(axis=1) | (radius > MOST)
+    odd = (np.abs(position) > MOST).any(axis=1) | (radius > MOST) | (radius < LEAST)
     reasons = [
         (~finite, "position and radius must be finite numbers"),
         (radius <= 0, "the radius must be larger than zero"),
-        (radius < LEAST, f"a radius below {LEAST:g} cannot be a length"),
-        (large, f"a number above {MOST:g} cannot be a length"),
+        (odd, f"a radius below {LEAST:g} or a number above {MOST:g} cannot be a length"),
     ]
     wrong, reason = next((wrong, reason) for wrong, reason in reasons if wrong.any())
     first = int(np.argmax(wrong))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scanfab import Cell, ContactList, Packing, PackingError, find_contacts, sphere
+from scanfab import Cell, ContactList, Packing, find_contacts, sphere
 from scanfab.packing.bodies import bodies_of
 from scanfab.packing.rattlers import recursive
 from scanfab.packing.sample import VARIANTS, Sample
@@ -53,31 +53,6 @@ def test_ten_spheres_at_one_place_are_one_grain_and_no_warning():
     assert sample.contact_numbers.tolist() == [1] * 11
 
 
-def test_a_sphere_in_a_sphere_is_one_grain_whose_inner_one_touches_nothing():
-    sample = grains(row_of(0, 0.2, 1.8), [1, 1, 2], [1.0, 0.5, 1.0])
-    assert sample.contacts.pairs.tolist() == [[0, 2]]
-    assert sample.contact_numbers.tolist() == [1, 1, 1]
-    volume = np.array([1.0, 0.125])
-    assert sample.packing.bodies.place[0, 0] == pytest.approx(0.2 * volume[1] / volume.sum())
-
-
-def test_bodies_that_touch_in_three_points_are_neighbours_once():
-    corners = np.array([[0, 0, 0], [3, 0, 0], [0, 3, 0]], dtype=float)
-    sample = grains(np.vstack([corners, corners + np.array([0, 0, 1.9])]), [0, 0, 0, 1, 1, 1])
-    assert len(sample.contacts) == 3
-    assert sample.fabric_contacts(A, None).sum() == 3
-    assert sample.contact_numbers.tolist() == [1] * 6
-    assert sample.coordination(A, None) == 1.0
-    assert sample.rattlers.all()
-    assert sample.number(sample.rattlers) == 2
-
-
-def test_a_contact_with_a_wall_is_a_neighbour():
-    sample = grains(row_of(0, 3, 5), [0, 0, -1], 1.1, walls=[1, 1, 0])
-    assert sample.contact_numbers.tolist() == [3, 3, 1]
-    assert sample.rattlers.tolist() == [False, False, True]
-
-
 def test_a_rattler_goes_whole_with_the_contacts_of_all_its_spheres():
     """Bodies in a row, each of two spheres: the ends have one neighbour."""
     sample = grains(row_of(0, 2.5, 4.4, 7, 8.9, 11), [0, 0, 1, 1, 2, 2])
@@ -116,11 +91,6 @@ def test_contacts_of_a_file_within_a_body_do_not_exist():
     assert packing.contacts.pairs.tolist() == [[1, 2]]
     assert packing.contacts.force.tolist() == [[7, 0, 0]]
     assert packing.contacts.force_n.tolist() == [7]
-
-
-def test_a_sphere_in_contact_with_itself_stays_an_error():
-    with pytest.raises(PackingError, match="in contact with itself"):
-        Packing(row_of(0, 1.5), 1.0, bodies=[3, 3], contacts=[[0, 0]])
 
 
 def test_a_body_through_a_face_has_its_place_next_to_its_first_sphere():
@@ -188,61 +158,10 @@ def test_counts_rattlers_and_places_are_those_of_the_naive_twin(name, seed):
     assert left == held
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_any_bodies_in_an_open_sample_are_those_of_the_naive_twin(seed):
-    """Spheres of one body anywhere: what is one is told by the numbers alone, never by overlap."""
-    random = np.random.default_rng(seed)
-    position, radius = random.random((60, 3)) * 5, random.uniform(0.3, 0.7, 60)
-    number = random.integers(-1, 25, 60)
-    sample = grains(position, number, radius)
-    twin = NaiveBodies(position, radius, number)
-    assert len(sample.contacts) == twin.contacts
-    expected = twin.numbers([0] * 60)
-    assert sample.contact_numbers.tolist() == [expected[twin.body[row]] for row in range(60)]
-
-
-def test_the_order_of_the_spheres_does_not_matter():
-    """Whichever sphere is the first, a body shorter than half the cell is put together one way."""
-    random = np.random.default_rng(4)
-    position, radius, number = small_clumps(random, 30)
-    cell, turn = Cell(CELLS["tilted"]), random.permutation(len(number))
-    one = grains(position, number, radius, cell=cell)
-    two = grains(position[turn], number[turn], radius[turn], cell=cell)
-    assert len(one.contacts) == len(two.contacts)
-    assert one.contact_numbers[turn].tolist() == two.contact_numbers.tolist()
-    off = (one.packing.bodies.place[turn] - two.packing.bodies.place) @ np.linalg.inv(cell.vectors)
-    np.testing.assert_allclose(off, np.round(off), atol=1e-12)
-
-
-def test_shifting_all_of_a_periodic_sample_changes_no_count():
-    random = np.random.default_rng(8)
-    cell = Cell(CELLS["tilted"])
-    position, radius, number = small_clumps(random, 30)
-    found = []
-    for shift in ([0, 0, 0], [1.3, -4.1, 2.2], [55.0, 7.0, -31.0]):
-        sample = grains(position + shift, number, radius, cell=cell)
-        found.append((len(sample.contacts), sample.contact_numbers.tolist()))
-    assert found[0] == found[1] == found[2]
-
-
 @pytest.mark.parametrize("length", [1e-100, 1e100])
 def test_places_do_not_suffer_from_the_unit(length):
     bodies = bodies_of(np.array([1, 1]), row_of(0, 1) * length, np.array([1.0, 2.0]) * length, None)
     assert bodies.place[0, 0] / length == pytest.approx(8 / 9)
-
-
-def test_numbers_of_bodies_are_checked():
-    with pytest.raises(PackingError, match=r"bodies: expected shape \(2\)"):
-        Packing(row_of(0, 1), 1.0, bodies=[1])
-    with pytest.raises(PackingError, match="bodies"):
-        Packing(row_of(0, 1), 1.0, bodies=[0.5, 1])
-
-
-def test_a_packing_and_a_sample_say_how_many_grains_they_are():
-    packing = Packing(row_of(0, 1, 5), 1.0, bodies=[1, 1, 2])
-    assert repr(packing).startswith("Packing: 3 particles of radius 1, parts of 2 grains")
-    sample = Sample(find_contacts(packing), np.zeros(3, bool))
-    assert repr(sample) == "Sample: 2 grains, 2 rattlers (fewer than 2 neighbours)"
 
 
 def test_a_clump_of_many_spheres_that_flew_away_is_one_grain_that_did():

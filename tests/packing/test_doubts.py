@@ -120,46 +120,11 @@ def test_molecules_that_are_no_clumps_raise_no_doubt(loose, mol):
     assert doubts_of(sample_of(packing)) == []
 
 
-def test_a_sheet_of_discs_is_told_where_they_are_read_as_spheres():
-    sample = read(DISCS / "sheet.3000.lammpstrj", dim=3)
-    told = " ".join(note.text for note in doubts_of(sample))
-    assert "all 300 centres lie in the plane x-y (z = 0), but are taken for spheres" in told
-    refuse_impossible(sample)
-
-
-def test_discs_do_not_touch_their_images_across_the_plane():
-    with pytest.warns(scanfab.ScanfabNote, match=r"lie in the plane x-y \(z = 0\).*`dim=3`"):
-        sample = read(DISCS / "sheet.3000.lammpstrj")
-    refuse_impossible(sample)
-    assert doubts_of(sample) == []
-
-
-def test_grains_that_touch_themselves_are_named():
-    doubts = doubts_of(read(DISCS / "sheet.3000.lammpstrj", dim=3))
-    assert [one.code for one in doubts if one.text.startswith("300 grains touch")] == ["own_images"]
-
-
 @pytest.mark.parametrize("factor", [1e3, 30.0])
 def test_radii_in_another_unit_are_refused_if_far_too_large(loose, factor):
     packing = Packing(loose.position, loose.radius * factor)
     with pytest.raises(PackingError, match="check the units of radius and position"):
         refuse_impossible(sample_of(packing))
-
-
-def test_many_contacts_a_grain_ask_for_the_units(loose):
-    (doubt,) = [
-        one.text for one in doubts_of(sample_of(Packing(loose.position, loose.radius * 2.5)))
-    ]
-    assert "contacts a grain by geometry" in doubt
-    assert "check the units of radius and position" in doubt
-
-
-def test_no_contact_at_all_asks_for_the_units(loose):
-    (doubt,) = [
-        one.text for one in doubts_of(sample_of(Packing(loose.position, loose.radius * 1e-3)))
-    ]
-    assert doubt.startswith("no contact at all by geometry")
-    assert "check the units of radius and position" in doubt
 
 
 @pytest.mark.parametrize(("gap", "words"), [(2e-6, "4e-06"), (8e-4, "0.002"), (25.0, None)])
@@ -169,15 +134,6 @@ def test_a_tolerance_that_closes_the_gaps_is_named_where_they_are_narrow(gap, wo
     assert "no contact at all" in doubt
     assert (f"or use `contact_tolerance={words}`" in doubt) == (words is not None)
     assert ("contact_tolerance" in doubt) == (words is not None)
-
-
-@pytest.mark.parametrize("factor", [0.5, 0.9])
-def test_a_cloud_without_contacts_is_named_whether_it_is_a_gas_or_a_wrong_unit(loose, factor):
-    (doubt,) = [
-        one.text for one in doubts_of(sample_of(Packing(loose.position, loose.radius * factor)))
-    ]
-    assert doubt.startswith("no contact at all by geometry")
-    assert "right for a gas, else check the units" in doubt
 
 
 def test_contacts_among_the_boundary_alone_are_no_contacts_of_the_grains(loose):
@@ -225,3 +181,28 @@ def test_a_periodic_sample_with_its_cell_raises_no_doubt():
     cell = Cell([0.0286394, 0.0321223, 0.0354697])
     whole = sample_of(Packing(packing.position, packing.radius, cell=cell))
     assert cell_doubt(whole, "nothing") == cell_hint(whole, "nothing") == ""
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (2.5, "contacts a grain by geometry (radii"),
+        (1e-3, "no contact at all by geometry"),
+        (0.5, "right for a gas, else check the units of radius and position"),
+        (0.9, "right for a gas, else check the units of radius and position"),
+    ],
+)
+def test_many_contacts_and_none_ask_for_the_units(loose, factor, words):
+    packing = Packing(loose.position, loose.radius * factor)
+    (doubt,) = [one.text for one in doubts_of(sample_of(packing))]
+    assert words in doubt
+    assert "check the units of radius and position" in doubt
+
+
+def test_a_sheet_of_discs_is_told_where_they_are_read_as_spheres():
+    sheet = DISCS / "sheet.3000.lammpstrj"
+    doubts = {one.code: one.text for one in doubts_of(read(sheet, dim=3))}
+    assert doubts["plane"].startswith("all 300 centres lie in the plane x-y (z = 0), but are taken")
+    assert doubts["own_images"].startswith("300 grains touch themselves")
+    with pytest.warns(scanfab.ScanfabNote, match=r"lie in the plane x-y \(z = 0\).*`dim=3`"):
+        assert doubts_of(read(sheet)) == []

@@ -2,11 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from scanfab import Cell, Packing, PackingError, find_contacts
-from scanfab.packing.kernels import Basis, Grid, Pairs, fill_grid, pairs_within, sort_pairs
 from scanfab.packing.search import overlapping_pairs
 from tests.helpers import naive
 from tests.helpers.uncompiled import run_uncompiled
@@ -94,43 +91,6 @@ def test_periodic_contacts_equal_the_slow_twin():
         check_random_periodic(np.random.default_rng(seed))
 
 
-@given(
-    st.lists(
-        st.tuples(*3 * [st.integers(-6, 6)], st.integers(1, 5)),
-        max_size=15,
-        unique_by=lambda grain: grain[:3],
-    )
-)
-@settings(max_examples=100, deadline=None, derandomize=True)
-def test_open_contacts_equal_the_slow_twin_for_any_grains(grains):
-    # radii off the lattice: no ties, which rounding would decide
-    table = np.array(grains, dtype=float).reshape(-1, 4)
-    assert_open_contacts_equal(table[:, :3], 0.3017 * table[:, 3], 0.0)
-
-
-def test_contacts_with_a_size_ratio_of_fifty():
-    """Dust between boulders: the bins are as large as the boulders."""
-    random = np.random.default_rng(1)
-    position = random.random((250, 3)) * 6
-    radius = np.where(np.arange(250) < 5, 1.5, 0.03 * random.uniform(1, 5, 250))
-    assert_open_contacts_equal(position, radius, 0.0)
-
-
-def test_wide_tolerance_between_a_boulder_and_dust():
-    """A gap within the tolerance of the pair may be wider than the dust."""
-    assert_open_contacts_equal(np.array([[0.0, 0, 0], [0, 0, 1.15]]), np.array([1.0, 0.05]), 0.1)
-
-
-def test_grain_larger_than_half_the_cell_touches_its_own_images():
-    """Along x and y, and not along z, where the cell is longer."""
-    packing = Packing([[0.1, 0.2, 0.3]], 0.6, cell=Cell([1.0, 1.1, 2.0]))
-    contacts = find_contacts(packing).contacts
-    assert contacts.pairs.tolist() == [[0, 0], [0, 0]]
-    assert np.abs(contacts.image).tolist() == [[0, 1, 0], [1, 0, 0]] or np.abs(
-        contacts.image
-    ).tolist() == [[1, 0, 0], [0, 1, 0]]
-
-
 @pytest.mark.parametrize("edges", [(0.5, 0.5, 0.5), (0.7, 2.5, 8.0), (2.9, 2.9, 2.9)])
 def test_cell_thinner_than_three_bins(edges):
     """Edges of a fifth of a bin, and of less than three bins."""
@@ -138,52 +98,6 @@ def test_cell_thinner_than_three_bins(edges):
     position = random.random((4, 3)) * edges
     radius = np.array([0.5, 0.3, 0.1, 0.48])
     assert_periodic_contacts_equal(position, radius, edges, (True, True, True))
-
-
-def test_two_grains_may_touch_through_several_images():
-    """Two grains that span the cell: once inside it, and once through its face."""
-    packing = Packing([[0.5, 5, 5], [1.5, 5, 5]], 0.51, cell=Cell([2.0, 10.0, 10.0]))
-    contacts = find_contacts(packing).contacts
-    assert canonical(contacts) == {(0, 1, (0, 0, 0)), (0, 1, (-1, 0, 0))}
-
-
-OPEN = Basis(np.eye(3) / 4, np.zeros(3), np.zeros((3, 3)), np.zeros(3, np.bool_))
-
-
-def filled(position, radius, shape):
-    """A grid over the cube from 0 to 4."""
-    count, bins = len(position), np.array(shape)
-    grid = Grid(
-        np.empty((count, 4)),
-        np.empty(count, np.int32),
-        np.zeros(np.prod(bins) + 1, np.int64),
-        bins,
-        np.ones(3, np.int64),
-    )
-    fill_grid(position, radius, np.arange(count, dtype=np.int32), OPEN, grid)
-    return grid
-
-
-def test_pairs_beyond_the_room_are_counted_but_not_written():
-    grid = filled(np.full((4, 3), 1.0), np.ones(4), (1, 1, 1))
-    pairs = Pairs(np.full((2, 2), -1, np.int32), np.full((2, 3), 7, np.int16), 1000)
-    assert pairs_within(grid, OPEN, 1.0, pairs, 0) == 6
-    assert pairs.rows.tolist() == [[0, 1], [0, 2]]
-    assert not pairs.image.any()
-
-
-def test_pairs_are_sorted_by_first_and_then_by_second():
-    random = np.random.default_rng(0)
-    pairs = Pairs(
-        random.integers(0, 9, (50, 2)).astype(np.int32),
-        random.integers(-1, 2, (50, 3)).astype(np.int16),
-        1000,
-    )
-    rows, image = np.empty((50, 2), np.int64), np.empty((50, 3), np.int64)
-    sort_pairs(pairs, 9, rows, image)
-    assert rows.tolist() == sorted(pairs.rows.tolist())
-    before = np.hstack([pairs.rows, pairs.image]).tolist()
-    assert sorted(np.hstack([rows, image]).tolist()) == sorted(before)
 
 
 def test_a_grain_of_many_cells_is_a_mistake_of_units():
@@ -236,18 +150,6 @@ def test_grains_on_top_of_one_another_are_refused_before_all_pairs_are_tried(siz
         find_contacts(Packing(position, radius))
     few = find_contacts(Packing(position[:900], radius[:900])).contacts
     assert len(few) == 900 * 899 // 2
-
-
-def test_bins_list_every_sphere_once_in_its_bin():
-    position = np.random.default_rng(0).random((200, 3)) * 4
-    shape = (6, 4, 2)
-    grid = filled(position, np.ones(200), shape)
-    assert sorted(grid.row) == list(range(200))
-    np.testing.assert_array_equal(grid.spheres[:, :3], position[grid.row])
-    for x, y, z in np.ndindex(*shape):
-        place = (x * 4 + y) * 2 + z
-        inside = grid.spheres[grid.start[place] : grid.start[place + 1], :3]
-        assert np.all(np.floor(inside / 4 * shape) == [x, y, z])
 
 
 def test_contacts_equal_the_slow_twin_uncompiled():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scanfab import Cell, ContactList, Packing, PackingError, ReadError, find_contacts
+from scanfab import ContactList, Packing, PackingError, ReadError, find_contacts
 from scanfab.packing.rattlers import count, force, installed_rules, recursive
 from scanfab.packing.sample import Sample
 from tests.helpers import naive
@@ -51,17 +51,6 @@ def test_of_a_ring_with_a_tail_the_ring_stays():
     assert found(network([*ring, *tail], 7, least=3)) == list(range(7))
 
 
-def test_what_touches_through_two_images_is_held_twice():
-    assert found(network([(0, 1)], 2)) == [0, 1]
-    periodic = find_contacts(Packing([[1, 1, 1]], 0.6, cell=Cell([1.0, 4.0, 4.0])))
-    assert found(Sample(periodic, np.zeros(1, bool), 2, recursive)) == []
-
-
-def test_without_contacts_all_grains_are_rattlers_and_none_if_none_are_asked_for():
-    assert found(network([], 3, boundary=[1])) == [0, 2]
-    assert found(network([], 3, least=0)) == []
-
-
 def random_network(seed):
     random = np.random.default_rng(seed)
     size = int(random.integers(5, 40))
@@ -92,16 +81,6 @@ def test_every_grain_left_is_held_by_what_is_left(least):
     left = sample.grains & ~sample.rattlers
     assert np.all(sample.contact_numbers_without_rattlers[left] >= least)
     assert not np.any(sample.rattlers & boundary)
-
-
-def test_contacts_that_do_not_count_are_taken_off():
-    """What a rule by force needs: here those of which a force says so."""
-
-    def forceless(touching):
-        weak = np.asarray(touching.contacts.pairs[:, 0] == 2)
-        return touching.grains & (touching.numbers_without(weak) < touching.min_contacts)
-
-    assert found(network(row(6), 6, rule=forceless)) == [0, 2, 3, 5]
 
 
 def test_a_rule_says_nothing_of_boundary_particles():

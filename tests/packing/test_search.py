@@ -1,10 +1,24 @@
 """Contacts of lattices and chains, and contacts that are listed more than once."""
 
+import itertools
+
 import numpy as np
 import pytest
 
-from scanfab import Cell, ContactList, Packing, compute, contact_fabric, find_contacts
-from tests.helpers.lattices import face_centred_cubic, shaken_cubic, simple_cubic
+from scanfab import (
+    Cell,
+    ContactList,
+    Packing,
+    Sample,
+    Window,
+    compute,
+    contact_fabric,
+    find_contacts,
+    sphere,
+)
+from scanfab.packing.sample import VARIANTS
+from scanfab.packing.search import near_pairs
+from tests.helpers.lattices import face_centred_cubic, simple_cubic
 
 TOLERANCE = 1e-4
 
@@ -51,24 +65,6 @@ def test_all_contacts_along_one_axis(axis):
     assert tensor.axial(np.eye(3)[axis]) == pytest.approx(1.0)
 
 
-def test_contacts_along_a_slanted_axis():
-    axis = np.array([1.0, 2.0, 2.0]) / 3
-    packing = find_contacts(Packing(np.outer(np.arange(6), axis), 0.5), TOLERANCE)
-    tensor = contact_fabric(packing.contacts.normal)
-    assert tensor.matrix == pytest.approx(np.outer(axis, axis), abs=1e-12)
-
-
-def test_contact_listed_twice_or_from_both_sides_counts_once():
-    found = find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 5)))
-    pairs = found.contacts.pairs
-    again = np.concatenate([pairs, pairs[:10], pairs[:, ::-1]])
-    options = {"spacing": 0.2, "directions": "lebedev:5", "cutoff": 0.2}
-    once = compute(found, **options)
-    twice = compute(found.with_contacts(ContactList(again, source="geometric")), **options)
-    assert len(pairs) > 50
-    assert twice.rows == once.rows
-
-
 def test_periodic_contact_listed_twice_or_from_both_sides_counts_once():
     """Through a face, and with an own image."""
     packing = periodic(simple_cubic(2), [2, 2, 2])
@@ -95,3 +91,57 @@ def test_tolerance_is_relative_to_the_sum_of_the_radii(gap, contacts):
     lattice = simple_cubic(3)
     packing = find_contacts(Packing(lattice.position * (1 + gap) * 1e-6, 0.5e-6), TOLERANCE)
     assert len(packing.contacts) == contacts
+
+
+@pytest.fixture(scope="module")
+def sample():
+    random = np.random.default_rng(4)
+    cell = Cell(np.array([[6.0, 0, 0], [1.5, 6.0, 0], [0, 0.5, 5.0]]))
+    position = random.random((60, 3)) @ cell.vectors
+    packing = Packing(position, random.uniform(0.3, 0.6, 60), cell=cell)
+    return Sample(find_contacts(packing), boundary=np.zeros(60, bool))
+
+
+def every_pair(packing, chosen, gap):
+    """Normals, overlaps and middles of pairs of the chosen grains, one after the other."""
+    found = []
+    rows = np.flatnonzero(chosen)
+    shifts = [
+        np.array(one) @ packing.cell.vectors for one in itertools.product((-1, 0, 1), repeat=3)
+    ]
+    for one, two in itertools.combinations(rows, 2):
+        for shift in shifts:
+            branch = packing.position[two] + shift - packing.position[one]
+            distance = np.linalg.norm(branch)
+            overlap = packing.radius[one] + packing.radius[two] - distance
+            if overlap > -gap:
+                middle = packing.position[one] + branch / distance * (
+                    packing.radius[one] - overlap / 2
+                )
+                found.append((overlap, *branch / distance, *middle))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("variant", ["a", "b"])
+def test_pairs_of_a_tilted_cell(sample, variant):
+    solid = ~sample.removed(VARIANTS[variant])
+    expected = every_pair(sample.packing, solid, 0.25)
+    found = near_pairs(sample, VARIANTS[variant], None, 0.25)
+    assert len(expected) > 20
+    order = np.argsort(found.overlap)
+    expected = expected[np.argsort(expected[:, 0])]
+    np.testing.assert_allclose(found.overlap[order], expected[:, 0], atol=1e-12)
+    turned = np.einsum("ci,ci->c", found.normal[order], expected[:, 1:4])
+    np.testing.assert_allclose(np.abs(turned), 1.0, atol=1e-12)
+    assert found.volume == pytest.approx(180.0)
+    assert found.shadow == pytest.approx(np.pi * np.sum(sample.packing.radius[solid] ** 2))
+
+
+def test_pairs_of_an_rv_have_their_middles_in_it(sample):
+    window = Window(np.array([3.0, 3.0, 2.5]), sphere(2.0))
+    found = near_pairs(sample, VARIANTS["c"], window, 0.25)
+    middles = every_pair(sample.packing, sample.grains, 0.25)[:, 4:]
+    assert len(found.overlap) == window.contains(middles, sample.packing).sum()
+    inside = window.contains(sample.packing.position, sample.packing)
+    assert found.shadow == pytest.approx(np.pi * np.sum(sample.packing.radius[inside] ** 2))
+    assert found.volume == pytest.approx(4 / 3 * np.pi * 8)

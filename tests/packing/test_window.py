@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, SettingsError, box, compute, sphere
-from scanfab.packing.window import SurfaceBox, Window
-from tests.helpers.lattices import shaken_cubic
+from scanfab import Cell, Packing, SettingsError, box, sphere
+from scanfab.packing.window import SurfaceBox, Window, inner_ellipsoid
+from tests.helpers.lattices import ball_points, rotation
 
 CELL = Cell([10.0, 8.0, 6.0], origin=(-1.0, 2.0, 3.0))
 ALL = np.ones(4, bool)
@@ -35,40 +35,6 @@ def test_distance_is_to_the_nearest_image():
     assert window.contains(points, packing).tolist() == [True, True, True, False]
 
 
-def test_faces_that_do_not_repeat_are_not_looked_through():
-    packing = Packing([[0, 3, 4]], 1.0, cell=Cell([10.0, 8, 6], periodic=(True, False, False)))
-    window = Window(np.array([0.5, 0.5, 0.5]), sphere(1.0))
-    points = np.array([[9.9, 0.5, 0.5], [0.5, 7.9, 0.5], [0.5, 0.5, 5.9]])
-    assert window.contains(points, packing).tolist() == [True, False, False]
-
-
-def test_default_center_is_the_middle_of_the_surfaces():
-    assert SurfaceBox.of(four_grains(), ALL).center == pytest.approx([4.75, 3.625, 4.0])
-
-
-def test_smallest_extent_is_that_of_the_surfaces():
-    assert SurfaceBox.of(four_grains(), ALL).smallest_extent == pytest.approx(9.25)
-
-
-def test_boundary_does_not_count_for_center_and_extent():
-    grains = np.array([True, True, False, True])
-    assert SurfaceBox.of(four_grains(), grains).center == pytest.approx([4.75, 0.0, 4.0])
-    assert SurfaceBox.of(four_grains(), grains).smallest_extent == pytest.approx(2.0)
-
-
-def test_periodic_cell_gives_center_and_extent():
-    packing = Packing([[0, 3, 4]], 1.0, cell=CELL)
-    assert SurfaceBox.of(packing, np.ones(1, bool)).center == pytest.approx([4.0, 6.0, 6.0])
-    assert SurfaceBox.of(packing, np.ones(1, bool)).smallest_extent == pytest.approx(6.0)
-
-
-def test_only_periodic_vectors_of_a_cell_give_center_and_extent():
-    """Along the others it is the grains: here from 2 to 4."""
-    packing = Packing([[0, 3, 4]], 1.0, cell=Cell([10.0, 80.0, 6.0], (True, False, True)))
-    assert SurfaceBox.of(packing, np.ones(1, bool)).center == pytest.approx([5.0, 3.0, 3.0])
-    assert SurfaceBox.of(packing, np.ones(1, bool)).smallest_extent == pytest.approx(2.0)
-
-
 @pytest.mark.parametrize(
     ("center", "radius", "fits"),
     [
@@ -87,18 +53,6 @@ def test_window_must_not_meet_its_own_image(center, radius, fits):
     else:
         with pytest.raises(SettingsError, match="wider than the cell's shortest period"):
             window.check_fits(packing)
-
-
-def test_window_may_reach_beyond_faces_that_do_not_repeat():
-    packing = Packing([[0, 3, 4]], 1.0, cell=Cell([10.0, 8, 6], periodic=(True, False, False)))
-    Window(np.array([5.0, 0.0, 0.0]), sphere(4.9)).check_fits(packing)
-    Window(np.array([5.0, 0.0, 0.0]), sphere(4.9)).check_fits(four_grains())
-
-
-def test_window_wider_than_the_cell_stops_the_computation():
-    packing = Packing(*shaken_cubic(np.random.default_rng(0), 4), cell=Cell([4.0, 4, 4]))
-    with pytest.raises(SettingsError, match="choose a smaller `rv`"):
-        compute(packing, variants="c", rv=1.1)
 
 
 def test_room_around_the_window_is_to_the_nearest_surface_that_is_no_periodic_face():
@@ -126,3 +80,67 @@ def test_room_around_a_window_is_that_of_its_own_box():
     flat = replace(box([8.0, 8.0, 1.0]), low=np.array([-4.0, -4, -0.5]), high=np.array([4.0, 4, 3]))
     surfaces = SurfaceBox(np.array([-5.0, -6.0, -1.0]), np.array([5.5, 6.0, 3.2]), None)
     assert surfaces.room_around(Window(np.zeros(3), flat)) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("packing", "grains", "center", "extent"),
+    [
+        (four_grains(), [1, 1, 1, 1], [4.75, 3.625, 4.0], 9.25),
+        (four_grains(), [1, 1, 0, 1], [4.75, 0.0, 4.0], 2.0),  # without one that is boundary
+        (Packing([[0, 3, 4]], 1.0, cell=CELL), [1], [4.0, 6.0, 6.0], 6.0),
+        # along y it is the grain: from 2 to 4
+        (
+            Packing([[0, 3, 4]], 1.0, cell=Cell([10.0, 80.0, 6.0], (True, False, True))),
+            [1],
+            [5.0, 3.0, 3.0],
+            2.0,
+        ),
+    ],
+)
+def test_center_and_extent_are_those_of_the_surfaces_or_of_the_periodic_cell(
+    packing, grains, center, extent
+):
+    surfaces = SurfaceBox.of(packing, np.array(grains, bool))
+    assert surfaces.center == pytest.approx(center)
+    assert surfaces.smallest_extent == pytest.approx(extent)
+
+
+def test_that_of_a_stretched_and_turned_ball_is_stretched_and_turned_likewise():
+    random = np.random.default_rng(0)
+    points, turn = ball_points(random, 20_000, 10.0), rotation(random)
+    stretched = points * [1.0, 1.5, 0.7] @ turn
+    found = inner_ellipsoid(stretched, 0.0)
+    isotropic, deviator, level = found.shape.quadric
+    form = (isotropic * np.eye(3) + deviator) / level
+    half = np.linalg.eigvalsh(form)[::-1] ** -0.5
+    assert half == pytest.approx([7.0, 10.0, 15.0], rel=0.05)
+    assert np.abs(turn @ form @ turn.T - np.diag(np.diag(turn @ form @ turn.T))).max() < 2e-4
+
+
+def test_it_touches_the_hull_moved_inwards_by_the_largest_radius():
+    from scipy.spatial import ConvexHull
+
+    random = np.random.default_rng(1)
+    points = ball_points(random, 300, 5.0) * [1.0, 1.2, 0.8]
+    found = inner_ellipsoid(points, 0.6)
+    isotropic, deviator, level = found.shape.quadric
+    inverse = level * np.linalg.inv(isotropic * np.eye(3) + deviator)
+    facets = ConvexHull(points - found.center).equations
+    # how far the ellipsoid reaches along each normal
+    reach = np.sqrt(np.einsum("fi,ij,fj->f", facets[:, :3], inverse, facets[:, :3]))
+    room = -facets[:, 3] - 0.6 - reach
+    assert room.min() == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        np.zeros((0, 3)),
+        np.zeros((3, 3)),
+        np.random.default_rng(0).random((50, 3)) * [1.0, 1.0, 0.0],
+        np.random.default_rng(0).random((50, 3)),
+    ],
+    ids=["none", "one place", "flat", "small"],
+)
+def test_what_is_flat_or_small_has_none(points):
+    assert inner_ellipsoid(points, 1.0) is None
