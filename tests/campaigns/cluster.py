@@ -26,7 +26,7 @@ from tests.helpers.dask_cluster import DaskCluster
 from tests.helpers.interruptions import PROGRAM, write_series
 
 FRAMES = 12
-WORDS = ("compute", "dumps", "--tolerance", "6e-4", "--quiet", "-o", "t.csv")
+WORDS = ("compute", "dumps", "--tolerance", "2e-3", "--quiet", "-o", "t.csv")
 
 
 class Campaign:
