@@ -217,7 +217,7 @@ def test_what_cannot_be_resumed_names_arguments(short_series, tmp_path):
     [
         ({"toleranc": 1e-3}, TypeError, "compute_file has no option 'toleranc': did you mean 'tol"),
         ({"fields": "alpha"}, scanfab.SettingsError, "fields: there is no column 'alpha'"),
-        ({"radius": -1}, scanfab.SettingsError, "radius: expected a length above 0, found -1"),
+        ({"radius": -1}, scanfab.SettingsError, "radius: expected a .* above 0, found -1"),
         ({"output": "table.doc"}, scanfab.SettingsError, "results can be written as .csv"),
         ({"manifest": "none/here.json"}, scanfab.SettingsError, "none"),
         ({"vtk": "v", "cutoff": "1rmin", "cutoffs": "1,2"}, scanfab.SettingsError, "one cut-off"),
