@@ -5,8 +5,9 @@ Random mutants of scanfab, one at a time, and whether its tests catch them.
 
 REPO is a scratch copy: its files are changed and restored. PYTHON has scanfab[test] installed from
 it. The same seed gives the same mutants of the same code; shard I/K takes every K-th of them, so
-that several copies can work at once. Results are lines of JSON. About 45 s a mutant on one core; a
-mutant that runs into its time limit is not killed yet.
+that several copies can work at once. Results are lines of JSON in --out; mutants that are there are
+not tried again. About 45 s a mutant on one core; a mutant that runs into its time limit is not
+killed yet.
 """
 
 from __future__ import annotations
@@ -39,6 +40,8 @@ COMPARED = {
     ast.GtE: (ast.Gt, ast.LtE), ast.Eq: (ast.NotEq,), ast.NotEq: (ast.Eq,),
     ast.Is: (ast.IsNot,), ast.IsNot: (ast.Is,), ast.In: (ast.NotIn,), ast.NotIn: (ast.In,),
 }  # fmt: skip
+GENERIC = {"tuple", "list", "dict", "type", "Literal", "Callable", "Iterator", "Sequence"}
+TYPES = re.compile(r"\bNone\b|\b[A-Z][a-z]|\b(str|int|float|bool)\b")
 
 
 def is_text(node):
@@ -52,6 +55,19 @@ def name_of(call):
     return f.attr if isinstance(f, ast.Attribute) else f.id if isinstance(f, ast.Name) else ""
 
 
+def swapped(values, i):
+    """A list with two neighbours in each other's place."""
+    return [*values[:i], values[i + 1], values[i], *values[i + 2 :]]
+
+
+def changed(node, **fields):
+    """A copy of a node with other fields."""
+    new = copy.copy(node)
+    for name, value in fields.items():
+        setattr(new, name, value)
+    return new
+
+
 class Sites(ast.NodeVisitor):
     """All mutants of a file: kind, node, text in its place."""
 
@@ -59,29 +75,25 @@ class Sites(ast.NodeVisitor):
         self.found = []  # (kind, node, text)
         self.known = [set()]  # names stored before, for each function
 
-    def add(self, kind, node, text):
-        self.found.append((kind, node, text))
-
-    def expression(self, kind, node, new):
-        self.add(kind, node, f"({ast.unparse(new)})")
+    def add(self, kind, node, new):
+        """A text or a node in the place of another node; an expression in brackets."""
+        text = new if isinstance(new, str) else ast.unparse(new)
+        inner = isinstance(new, ast.BinOp | ast.BoolOp | ast.Compare)
+        self.found.append((kind, node, f"({text})" if inner else text))
 
     # what is left alone
     def visit_Raise(self, node): ...
-    def visit_Import(self, node): ...
-    def visit_ImportFrom(self, node): ...
-    def visit_JoinedStr(self, node): ...
-    def visit_Assert(self, node): ...
+
+    visit_Import = visit_ImportFrom = visit_JoinedStr = visit_Assert = visit_Raise
 
     def visit_FunctionDef(self, node):
         if node.name in QUIET:
             return
         a = node.args
         self.known.append({x.arg for x in a.posonlyargs + a.args + a.kwonlyargs})
-        for default in [*a.defaults, *a.kw_defaults]:
-            if default is not None:
-                self.visit(default)
-        for one in node.body:
-            self.visit(one)
+        for one in [*a.defaults, *a.kw_defaults, *node.body]:
+            if one is not None:
+                self.visit(one)
         self.known.pop()
 
     visit_AsyncFunctionDef = visit_FunctionDef
@@ -123,9 +135,7 @@ class Sites(ast.NodeVisitor):
         self.add("drop", node, "pass")
         other = ARITHMETIC.get(type(node.op))
         if other and not is_text(node.value):
-            new = copy.deepcopy(node)
-            new.op = other()
-            self.add("arithmetic", node, ast.unparse(new))
+            self.add("arithmetic", node, changed(node, op=other()))
         self.generic_visit(node)
 
     def visit_Expr(self, node):
@@ -136,25 +146,11 @@ class Sites(ast.NodeVisitor):
         self.generic_visit(node)
 
     def visit_Return(self, node):
-        v = node.value
-        if v is None:
+        if node.value is None:
             return
-        if isinstance(v, ast.Compare | ast.BoolOp) or (
-            isinstance(v, ast.UnaryOp) and isinstance(v.op, ast.Not)
-        ):
-            self.add("return", node, f"return not ({ast.unparse(v)})")
-        elif isinstance(v, ast.Constant) and isinstance(v.value, bool):
-            self.add("return", node, f"return {not v.value}")
-        elif isinstance(v, ast.Tuple) and len(v.elts) > 1:
-            new = copy.deepcopy(v)
-            new.elts[0], new.elts[1] = new.elts[1], new.elts[0]
-            self.add("return", node, f"return {ast.unparse(new)}")
-        elif isinstance(v, ast.IfExp):
-            new = copy.deepcopy(v)
-            new.body, new.orelse = new.orelse, new.body
-            self.add("return", node, f"return {ast.unparse(new)}")
-        elif not is_text(v) and not (isinstance(v, ast.Constant) and v.value is None):
-            self.add("return", node, "return None")
+        text = other_return(node.value)
+        if text is not None:
+            self.add("return", node, f"return {text}")
         self.generic_visit(node)
 
     def condition(self, test):
@@ -178,27 +174,21 @@ class Sites(ast.NodeVisitor):
         if other and not any(
             is_text(x) or isinstance(x, ast.List | ast.Tuple | ast.ListComp) for x in sides
         ):
-            types = isinstance(node.op, ast.BitOr) and re.search(
-                r"\bNone\b|\b[A-Z][a-z]|\b(str|int|float|bool)\b", ast.unparse(node)
-            )
+            types = isinstance(node.op, ast.BitOr) and TYPES.search(ast.unparse(node))
             if not types:
-                new = copy.deepcopy(node)
-                new.op = other()
-                self.expression("arithmetic", node, new)
+                self.add("arithmetic", node, changed(node, op=other()))
         self.generic_visit(node)
 
     def visit_BoolOp(self, node):
-        new = copy.deepcopy(node)
-        new.op = ast.Or() if isinstance(node.op, ast.And) else ast.And()
-        self.expression("negate", node, new)
+        other = ast.Or() if isinstance(node.op, ast.And) else ast.And()
+        self.add("negate", node, changed(node, op=other))
         self.generic_visit(node)
 
     def visit_Compare(self, node):
         for i, op in enumerate(node.ops):
             for other in COMPARED.get(type(op), ()):
-                new = copy.deepcopy(node)
-                new.ops[i] = other()
-                self.expression("comparison", node, new)
+                ops = [*node.ops[:i], other(), *node.ops[i + 1 :]]
+                self.add("comparison", node, changed(node, ops=ops))
         self.generic_visit(node)
 
     def visit_Constant(self, node):
@@ -217,80 +207,91 @@ class Sites(ast.NodeVisitor):
         if not any(isinstance(x, ast.Starred) for x in args) and name_of(node) != "isinstance":
             for i in range(len(args) - 1):
                 if ast.unparse(args[i]) != ast.unparse(args[i + 1]):
-                    new = copy.deepcopy(node)
-                    new.args[i], new.args[i + 1] = new.args[i + 1], new.args[i]
-                    self.add("arguments", node, ast.unparse(new))
+                    self.add("arguments", node, changed(node, args=swapped(args, i)))
         self.generic_visit(node)
 
     def visit_Subscript(self, node):
         # a type in its brackets, as in tuple[int, int]
-        if isinstance(node.value, ast.Name) and node.value.id in (
-            "tuple", "list", "dict", "type", "Literal", "Callable", "Iterator", "Sequence",
-        ):  # fmt: skip
-            return
-        self.generic_visit(node)
+        if not (isinstance(node.value, ast.Name) and node.value.id in GENERIC):
+            self.generic_visit(node)
+
+
+def other_return(value):
+    """What a function returns instead; None if nothing else makes sense."""
+    if isinstance(value, ast.Compare | ast.BoolOp) or (
+        isinstance(value, ast.UnaryOp) and isinstance(value.op, ast.Not)
+    ):
+        return f"not ({ast.unparse(value)})"
+    if isinstance(value, ast.Constant) and isinstance(value.value, bool):
+        return str(not value.value)
+    if isinstance(value, ast.Tuple) and len(value.elts) > 1:
+        return ast.unparse(changed(value, elts=swapped(value.elts, 0)))
+    if isinstance(value, ast.IfExp):
+        return ast.unparse(changed(value, body=value.orelse, orelse=value.body))
+    is_none = isinstance(value, ast.Constant) and value.value is None
+    return None if is_text(value) or is_none else "None"
 
 
 def code_lines(text):
     return sum(bool(x.strip()) and not x.strip().startswith("#") for x in text.splitlines())
 
 
-class Mutants:
-    def __init__(self, repo, only):
-        self.files = {}
-        for room in only:
-            for path in sorted((repo / "scanfab" / room).rglob("*.py")):
-                text = path.read_text()
-                sites = Sites()
-                sites.visit(ast.parse(text))
-                kinds = {}
-                for kind, node, new in sites.found:
-                    kinds.setdefault(kind, []).append((node, new))
-                if kinds:
-                    name = str(path.relative_to(repo))
-                    self.files[name] = (code_lines(text), text, kinds)
+def sites_of(repo, rooms):
+    """Of each file: its lines of code, its text, and its mutants by kind."""
+    files = {}
+    for path in (x for room in rooms for x in (repo / "scanfab" / room).rglob("*.py")):
+        text, sites, kinds = path.read_text(), Sites(), {}
+        sites.visit(ast.parse(text))
+        for kind, node, new in sites.found:
+            kinds.setdefault(kind, []).append((node, new))
+        if kinds:
+            files[str(path.relative_to(repo))] = (code_lines(text), text, kinds)
+    return files
 
-    def draw(self, rng):
-        names = sorted(self.files)
-        name = rng.choices(names, [self.files[x][0] for x in names])[0]
-        _, text, kinds = self.files[name]
-        kind = rng.choice(sorted(kinds))
-        node, new = rng.choice(kinds[kind])
-        lines = text.encode().splitlines(keepends=True)
-        start = sum(map(len, lines[: node.lineno - 1])) + node.col_offset
-        end = sum(map(len, lines[: node.end_lineno - 1])) + node.end_col_offset
-        raw = text.encode()
-        old = raw[start:end].decode()
-        mutated = (raw[:start] + new.encode() + raw[end:]).decode()
-        ast.parse(mutated)
-        short = " ".join(old.split())
-        return {
-            "file": name, "line": node.lineno, "kind": kind,
-            "change": f"{short[:160]}  ->  {' '.join(new.split())[:160]}",
-        }, mutated  # fmt: skip
+
+def draw(files, rng):
+    """A mutant, and the text of its file."""
+    names = sorted(files)
+    name = rng.choices(names, [files[x][0] for x in names])[0]
+    _, text, kinds = files[name]
+    kind = rng.choice(sorted(kinds))
+    node, new = rng.choice(kinds[kind])
+    lines = text.encode().splitlines(keepends=True)
+    start = sum(map(len, lines[: node.lineno - 1])) + node.col_offset
+    end = sum(map(len, lines[: node.end_lineno - 1])) + node.end_col_offset
+    raw = text.encode()
+    mutated = (raw[:start] + new.encode() + raw[end:]).decode()
+    ast.parse(mutated)
+    change = [" ".join(x.split())[:160] for x in (raw[start:end].decode(), new)]
+    return {
+        "file": name, "line": node.lineno, "kind": kind, "change": "  ->  ".join(change)
+    }, mutated  # fmt: skip
+
+
+def drawn(files, number, seed):
+    """So many different mutants; the same seed gives the same ones of the same code."""
+    rng, found = random.Random(seed), {}
+    while len(found) < number:
+        what, text = draw(files, rng)
+        found.setdefault((what["file"], text), (what, text))
+    return [*found.values()]
 
 
 def stages(repo, name):
-    """Tests of the room, those of the module first; then what reaches it."""
+    """Tests near the module, then those of the room, then what reaches it."""
     parts = Path(name).with_suffix("").parts[1:]
     room, module = parts[0], ".".join(("scanfab", *parts))
-    tests = sorted((repo / "tests" / room).rglob("test_*.py"))
-    near = [x for x in tests if x.stem == f"test_{parts[-1]}"]
-    last = re.compile(rf"\b{re.escape(module)}\b")
-    near += [x for x in tests if x not in near and last.search(x.read_text())]
-    if len(parts) > 2:  # those of pipeline/maps are test_map.py and its like
-        folder = f"test_{parts[-2].rstrip('s')}"
-        near += [x for x in tests if x not in near and x.stem.startswith(folder)]
-    # those that name most of what the module gives
+    # tests that say the module's name, or name the most of what it gives
+    texts = {x: x.read_text() for x in sorted((repo / "tests" / room).rglob("test_*.py"))}
+    near = [x for x in texts if x.stem == f"test_{parts[-1]}"]
+    near += [x for x in texts if x not in near and re.search(rf"\b{module}\b", texts[x])]
     words = re.findall(r"^(?:def|class) ([a-z]\w*)", (repo / name).read_text(), re.MULTILINE | re.I)
     named = re.compile(rf"\b({'|'.join(words)})\b") if words else re.compile("(?!)")
-    counts = {x: len(set(named.findall(x.read_text()))) for x in tests if x not in near}
+    counts = {x: len(set(named.findall(texts[x]))) for x in texts if x not in near}
     near += sorted((x for x in counts if counts[x]), key=lambda x: -counts[x])[:3]
-    if name.endswith("pipeline/cluster.py"):
-        # the rest of the room by itself, as its tests begin no cluster
-        near = sorted((repo / "tests/pipeline/cluster").glob("test_*.py"))
-    else:
-        near = [x for x in near if x.parent.name != "cluster"]
+    # schedulers of a cluster start for each of its tests: minutes
+    of_cluster = name.endswith("pipeline/cluster.py")
+    near = [x for x in near if (x.parent.name == "cluster") == of_cluster]
     near = [str(x.relative_to(repo)) for x in near]
     # pytest would take a folder and its own file as the folder, in its usual order
     first = [f"tests/{room}", *(f"--ignore={x}" for x in near)]
@@ -306,10 +307,8 @@ def is_kernel(name):
 
 def run_tests(repo, python, paths, limit, jobs):
     words = [python, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider"]
-    # schedulers of a cluster start for each of its tests: minutes
-    cluster = "tests/pipeline/cluster"
-    if "tests/pipeline" in paths and not any(x.startswith(cluster) for x in paths):
-        words.append(f"--ignore={cluster}")
+    if "tests/pipeline" in paths:
+        words.append("--ignore=tests/pipeline/cluster")
     words += ["-n", str(jobs)] if jobs > 1 else ["-p", "no:xdist", "-v"]
     env = {**os.environ, "PYTHONPATH": str(repo), "PYTHONDONTWRITEBYTECODE": "1"}
     began = time.time()
@@ -348,69 +347,58 @@ def judge(repo, python, name, limit, jobs):
     return "survived", len(spent), "", spent
 
 
+def tried(given, repo, what, text):
+    """A mutant in the copy, and what its tests say."""
+    path = repo / what["file"]
+    before = path.read_text()
+    # kernels compile for minutes
+    limit = given.limit * (2 if is_kernel(what["file"]) else 1)
+    try:
+        path.write_text(text)
+        verdict, stage, by, spent = judge(repo, given.python, what["file"], limit, given.jobs)
+    finally:
+        path.write_text(before)
+    return {**what, "verdict": verdict, "stage": stage, "by": by, "s": spent}
+
+
 def main():
     a = argparse.ArgumentParser()
     a.add_argument("repo", type=Path)
     a.add_argument("python")
     a.add_argument("number", type=int)
     a.add_argument("seed", type=int)
-    a.add_argument("--out", type=Path, default=Path("mutants.jsonl"))
+    a.add_argument(
+        "--out", type=Path, default=Path("mutants.jsonl"), help="has those not to repeat"
+    )
     a.add_argument("--shard", default="0/1")
     a.add_argument("--jobs", type=int, default=2, help="pytest -n; 1 runs without xdist")
-    a.add_argument("--limit", type=float, default=240)
-    a.add_argument("--kernel-limit", type=float, default=480)
+    a.add_argument("--limit", type=float, default=240, help="seconds of a mutant; of kernels twice")
     a.add_argument("--until", help="HH:MM after which no mutant is begun")
     a.add_argument("--only", default=",".join(ROOMS))
-    a.add_argument("--skip-done", type=Path, action="append", default=[], help="results to skip")
     a.add_argument("--list", action="store_true", help="only tell them")
-    a.add_argument("--what", help="run only mutants whose 'file:line: change' has this in it")
     given = a.parse_args()
     repo = given.repo.resolve()
     shard, of = map(int, given.shard.split("/"))
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # restores the file
-    done = {
-        json.loads(x)["number"]
-        for file in given.skip_done if file.exists() for x in file.read_text().splitlines()
-    }  # fmt: skip
-    rng, mutants = random.Random(given.seed), Mutants(repo, given.only.split(","))
-    drawn, seen = [], set()
-    while len(drawn) < given.number:
-        what, text = mutants.draw(rng)
-        key = (what["file"], text)
-        if key not in seen:
-            seen.add(key)
-            drawn.append((what, text))
-    for number, (what, text) in enumerate(drawn):
+    earlier = given.out.read_text().splitlines() if given.out.exists() else []
+    done = {(x["seed"], x["number"]) for x in map(json.loads, earlier)}
+    files = sites_of(repo, given.only.split(","))
+    for number, (what, text) in enumerate(drawn(files, given.number, given.seed)):
         words = f"{what['file']}:{what['line']}: {what['change']}"
         if given.list:
             print(number, what["kind"], words)
             continue
-        if number % of != shard or number in done or (given.what and given.what not in words):
+        if number % of != shard or (given.seed, number) in done:
             continue
         if given.until and datetime.now().strftime("%H:%M") >= given.until:
             break
         if what["kind"] == "arguments" and re.match(r"(max|min)\(", what["change"]):
             print(number, "equivalent", words, flush=True)  # NaN aside
             continue
-        path = repo / what["file"]
-        before = path.read_text()
-        limit = given.kernel_limit if is_kernel(what["file"]) else given.limit
-        try:
-            path.write_text(text)
-            verdict, stage, by, spent = judge(repo, given.python, what["file"], limit, given.jobs)
-        finally:
-            path.write_text(before)
-        result = {
-            "number": number,
-            **what,
-            "verdict": verdict,
-            "stage": stage,
-            "by": by,
-            "s": spent,
-        }
+        result = {"seed": given.seed, "number": number, **tried(given, repo, what, text)}
         with given.out.open("a") as file:
             file.write(json.dumps(result) + "\n")
-        print(number, verdict, spent, words, "|", by, flush=True)
+        print(number, result["verdict"], result["s"], words, "|", result["by"], flush=True)
 
 
 if __name__ == "__main__":

@@ -33,7 +33,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # where its helpers do the damage
 sys.path[:1] = [str(Path.cwd()), str(ROOT)]
 
-from tests.helpers.versions import BASE, installed_base, packed  # noqa: E402
+from tests.helpers import versions  # noqa: E402
 
 SECONDS = 10
 OUT = Path("mutate_findings")
@@ -107,7 +107,10 @@ def task_read(listed: list[list[Any]]) -> None:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
-                frames = [packed(frame.read()) for frame in scanfab.read_series(source, **options)]
+                frames = [
+                    versions.packed(frame.read())
+                    for frame in scanfab.read_series(source, **options)
+                ]
                 told = any(issubclass(w.category, scanfab.ScanfabWarning) for w in caught)
                 answer = "warned" if told else json.dumps(frames)
             except scanfab.ScanfabError:
@@ -137,7 +140,7 @@ def main() -> None:
     """Damage, read by both versions, count."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("readers", nargs="*")
-    parser.add_argument("--base", default=BASE)
+    parser.add_argument("--base", default=versions.BASE)
     parser.add_argument("--keep", type=Path, default=ROOT / "build" / "same_tables")
     parser.add_argument("--runs", type=int, default=40, help="damages of each file")
     parser.add_argument("--seed", type=int, default=0)
@@ -149,49 +152,42 @@ def main() -> None:
     if given.task == "damage":
         print(json.dumps(task_damage(*json.load(sys.stdin))))
         return
-    checkout, base = installed_base(given.base, given.keep.resolve())
+    checkout, base = versions.installed_base(given.base, given.keep.resolve())
     with tempfile.TemporaryDirectory() as folder:
-        done = subprocess.run(
-            [base, __file__, "--task", "damage"],
-            input=json.dumps([folder, given.runs, given.seed, given.readers]), text=True,
-            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, cwd=checkout, check=True,
-        )  # fmt: skip
-        listed = [Damaged._make(one) for one in json.loads(done.stdout)]
+        words = (folder, given.runs, given.seed, given.readers)
+        made = versions.ask(base, __file__, "damage", *words, tree=checkout)
+        listed = [Damaged._make(one) for one in made]
         before, after = (answers(python, listed) for python in (base, Path(sys.executable)))
         sys.exit(report(listed, before, after))
 
 
 def report(listed: list[Damaged], before: list[str], after: list[str]) -> bool:
     """Print the counts; whether this version is worse."""
-    sound = {
-        one.path: pair
-        for one, *pair in zip(listed, before, after, strict=True)
-        if one.kind == "sound"
-    }
+    pairs = list(zip(listed, zip(before, after, strict=True), strict=True))
+    sound = {one.path: pair for one, pair in pairs if one.kind == "sound"}
     total, silent, worse = Counter(), (Counter(), Counter()), False
-    for one, *pair in zip(listed, before, after, strict=True):
-        group = one.format, one.kind
-        total[group] += one.kind != "sound"
-        for k, answer in enumerate(pair):
-            is_read = answer[:1] == "["
-            silent[k][group] += is_read and answer != sound[one.sound][k]
-        name = Path(one.path).name
-        if pair[1].startswith("FAILED"):
-            worse = True
-            print(f"{one.format}: {name}: {pair[1]}")
-            OUT.mkdir(exist_ok=True)
-            shutil.copy(one.path, OUT / f"{one.format}_{name}")
+    for one, pair in pairs:
+        if one.kind == "sound":
             continue
-        is_silent = pair[1][:1] == "[" and pair[1] != sound[one.sound][1]
-        if is_silent and (one.kind == "cut" or pair[0][:1] != "["):
-            print(f"{one.format}: {name}: read in silence, before: {pair[0][:7]}")
+        group, name = f"{one.format} {one.kind}", Path(one.path).name
+        total[group] += 1
+        # read, with other values than the sound file
+        hidden = [pair[k][:1] == "[" and pair[k] != sound[one.sound][k] for k in (0, 1)]
+        for k in (0, 1):
+            silent[k][group] += hidden[k]
+        fault = ""
+        if pair[1].startswith("FAILED"):
+            worse, fault = True, pair[1]
+        elif hidden[1] and (one.kind == "cut" or pair[0][:1] != "["):
+            fault = f"read in silence, before: {pair[0][:7]}"
+        if fault:
+            print(f"{one.format}: {name}: {fault}")
             OUT.mkdir(exist_ok=True)
             shutil.copy(one.path, OUT / f"{one.format}_{name}")
-    for group in total:
-        if total[group]:
-            one, two = (count[group] for count in silent)
-            worse = worse or two > one
-            print(f"{' '.join(group)}: {total[group]} files, silent {one} -> {two}", flush=True)
+    for group, number in total.items():
+        one, two = (count[group] for count in silent)
+        worse = worse or two > one
+        print(f"{group}: {number} files, silent {one} -> {two}", flush=True)
     print(f"all: {total.total()} files, silent {silent[0].total()} -> {silent[1].total()}")
     return worse
 

@@ -22,8 +22,10 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+import warnings
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +34,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # where its helpers make the sound files
 sys.path[:1] = [str(Path.cwd()), str(ROOT)]
 
-from tests.helpers.versions import BASE, installed_base, packed  # noqa: E402
+from tests.helpers import versions  # noqa: E402
 
 # each version is the one that its environment has installed, not the one of this tree
 del sys.path[:2]
@@ -161,75 +163,60 @@ def unnamed_options(base: Path) -> set[str]:
 MAIN = "from scanfab.cli.main import main; main()"
 
 
-def in_one_process(python: Path, task: str, *words: str) -> Any:
-    """The answer of this file's task in another environment."""
-    done = subprocess.run(
-        [python, __file__, "--task", task], input=json.dumps(words), text=True,
-        cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=True,
-    )  # fmt: skip
-    return json.loads(done.stdout)
-
-
 # --- the tasks, in the environment of either version
 
 
-def read_all(source: str, **options: Any) -> Any:
-    """The packings of a source as digests, or the kind of its error."""
-    import warnings
-
+def outcome(action: Callable[[], Any]) -> Any:
+    """What an action gives, without its warnings, or the kind of its error."""
     import scanfab
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            return [packed(frame.read()) for frame in scanfab.read_series(source, **options)]
+            return action()
         except scanfab.ScanfabError as error:
             return type(error).__name__
         except Exception as error:
             return f"TRACEBACK {error!r}"
 
 
-def task_read(*files: str) -> None:
+def read_all(source: str, **options: Any) -> Any:
+    """The packings of a source as digests, or the kind of its error."""
+    import scanfab
+
+    return outcome(
+        lambda: [versions.packed(one.read()) for one in scanfab.read_series(source, **options)]
+    )
+
+
+def task_read(*files: str) -> dict[str, Any]:
     """Each source, as it is and with a format's name where there is one behind a tab."""
     found = {}
     for line in files:
         source, _, format = line.partition("\t")
         found[line] = read_all(source, **({"format": format} if format else {}))
-    print(json.dumps(found))
+    return found
 
 
-def task_convert(folder: str, *sources: str) -> None:
-    """Each source in every format; what is read back from each, and the error of each."""
-    import warnings
-    from importlib.metadata import entry_points
-
+def task_convert(folder: str, *sources: str) -> dict[str, Any]:
+    """Each source in every format; what is read back from each, or the error of writing it."""
     import scanfab
 
     found: dict[str, Any] = {}
-    endings = {"csv": ".csv", "tsv": ".tsv", "parquet": ".parquet", "xyz": ".xyz", "npz": ".npz",
-               "vtp": ".vtp", "on-dem": ".vtkhdf", "lammps": ".lammpstrj",
-               "lammps-data": ".data"}  # fmt: skip
-    assert set(endings) == {one.name for one in entry_points(group="scanfab.writers")}
+    special = {"on-dem": "vtkhdf", "lammps": "lammpstrj", "lammps-data": "data"}
     for k, source in enumerate(sources):
-        for name, ending in endings.items():
-            out = Path(folder) / f"{k}_{name}" / f"frame{ending}"
+        for name in sorted(one.name for one in entry_points(group="scanfab.writers")):
+            out = Path(folder) / f"{k}_{name}" / f"frame.{special.get(name, name)}"
             out.parent.mkdir(parents=True, exist_ok=True)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                try:
-                    frame = scanfab.read_series(source)[-1]
-                    scanfab.convert(frame.read(), out, to=name)
-                except (scanfab.ScanfabError, IndexError) as error:
-                    found[f"{source} {name}"] = type(error).__name__
-                    continue
-                except Exception as error:
-                    found[f"{source} {name}"] = f"TRACEBACK {error!r}"
-                    continue
-            found[f"{source} {name}"] = read_all(str(out))
-    print(json.dumps(found))
+
+            def convert(source: str = source, out: Path = out, name: str = name) -> None:
+                scanfab.convert(scanfab.read_series(source)[-1].read(), out, to=name)
+
+            found[f"{source} {name}"] = outcome(convert) or read_all(str(out))
+    return found
 
 
-def task_sound(folder: str) -> None:
+def task_sound(folder: str) -> list[str]:
     """The sound files of the tests, each format in a folder of its own; run in the base's tree."""
     sys.path.insert(0, str(Path.cwd()))
     from tests.helpers import fuzzing, sound_files
@@ -242,7 +229,7 @@ def task_sound(folder: str) -> None:
             for file, content in sound_files.seeds(name, Path(made)):
                 (own / file).write_bytes(content)
         files += [f"{path}\t{name}" for path in sorted(own.iterdir())]
-    print(json.dumps(files))
+    return files
 
 
 # --- holding the answers against one another
@@ -300,23 +287,18 @@ def run_commands(python: Path, out: Path) -> dict[str, tuple[int, str]]:
     ball = pyvista.Sphere(radius=0.006, theta_resolution=12, phi_resolution=12)
     meshio.write(out / "ball.stl", meshio.Mesh(ball.points, [("triangle", ball.regular_faces)]))
 
-    def one(name: str, words: list[str]) -> tuple[int, str]:
+    def one(words: list[str]) -> tuple[int, str]:
         words = [word.format(out=out) for word in words]
         done = subprocess.run([python, "-P", "-c", MAIN, *words], cwd=ROOT, capture_output=True,
                               text=True, check=False)  # fmt: skip
         print(".", end="", file=sys.stderr, flush=True)
         return done.returncode, done.stdout
 
-    listed = list(commands())
-    made_of_tables = [k for k, (_, words) in enumerate(listed) if words[0] in MADE_OF_TABLES]
-    first = listed[: made_of_tables[0]]
-    with ThreadPoolExecutor(2) as pool:
-        found = dict(zip(dict(first), pool.map(lambda a: one(*a), first), strict=True))
-        rest = listed[made_of_tables[0] :]
-        merged = [one_ for one_ in rest if one_[1][0] in ("compute",)]
-        found |= dict(zip(dict(merged), pool.map(lambda a: one(*a), merged), strict=True))
-        rest = [one_ for one_ in rest if one_[1][0] != "compute"]
-        found |= dict(zip(dict(rest), pool.map(lambda a: one(*a), rest), strict=True))
+    found: dict[str, tuple[int, str]] = {}
+    for of_tables in (False, True):
+        wave = {n: words for n, words in commands() if (words[0] in MADE_OF_TABLES) == of_tables}
+        with ThreadPoolExecutor(2) as pool:
+            found |= dict(zip(wave, pool.map(one, wave.values()), strict=True))
     return found
 
 
@@ -352,16 +334,17 @@ def held_commands(python: Path, base: Path, folder: Path) -> Iterator[str]:
 def main() -> None:
     """Make the base, ask both versions, print the differences."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--base", default=BASE)
+    parser.add_argument("--base", default=versions.BASE)
     parser.add_argument("--keep", type=Path, default=ROOT / "build" / "same_tables")
     parser.add_argument("--also", type=Path, nargs="*", default=[])
     parser.add_argument("--only", nargs="+", default=["read", "converted", "commands"])
     parser.add_argument("--task", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.task:
-        globals()[f"task_{given.task}"](*json.load(sys.stdin))
+        tasks = {"read": task_read, "convert": task_convert, "sound": task_sound}
+        print(json.dumps(tasks[given.task](*json.load(sys.stdin))))
         return
-    checkout, base = installed_base(given.base, given.keep.resolve())
+    checkout, base = versions.installed_base(given.base, given.keep.resolve())
     this = Path(sys.executable)
     found: list[str] = []
     with tempfile.TemporaryDirectory() as name:
@@ -369,13 +352,13 @@ def main() -> None:
         if {"read", "converted"} & set(given.only):
             sources = every_source(checkout, base, folder, given.also)
         if "read" in given.only:
-            answers = [in_one_process(python, "read", *sources) for python in (base, this)]
+            answers = [versions.ask(python, __file__, "read", *sources) for python in (base, this)]
             found += differences("read", *answers)
             print(f"read: {len(sources)} sources", flush=True)
         if "converted" in given.only:
             plain = [one for one in sources if "\t" not in one and not one.endswith(PACKED)]
             answers = [
-                in_one_process(python, "convert", str(folder / f"converted_{k}"), *plain)
+                versions.ask(python, __file__, "convert", str(folder / f"converted_{k}"), *plain)
                 for k, python in enumerate((base, this))
             ]
             found += differences("converted", *answers)
@@ -391,11 +374,7 @@ PACKED = (".gz", ".bz2", ".xz", ".lz4", ".zst")
 
 def every_source(checkout: Path, base: Path, folder: Path, also: list[Path]) -> list[str]:
     """Folders and files to read, with the name of a format where it is known."""
-    done = subprocess.run(
-        [base, __file__, "--task", "sound"], input=json.dumps([str(folder / "sound")]), text=True,
-        cwd=checkout, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=True,
-    )  # fmt: skip
-    sound = json.loads(done.stdout)
+    sound = versions.ask(base, __file__, "sound", str(folder / "sound"), tree=checkout)
     samples = sorted((ROOT / DATA).rglob("*"))
     folders = [str(path) for path in sorted((ROOT / DATA).iterdir()) if path.is_dir()]
     files = [str(path) for path in samples if path.is_file() and path.parent.name != "paper"]

@@ -113,48 +113,40 @@ class Browser:
 
     def touch(self, *fingers: tuple[int, int, int, int]) -> None:
         """Fingers press at places of the window, move by so much, and let go."""
-        self._ask("POST", "/actions", {"actions": [_finger(*one) for one in enumerate(fingers)]})
+        touch = {"type": "pointer", "parameters": {"pointerType": "touch"}}
+        self._act(
+            *({**touch, "id": f"finger {k}", "actions": _moves(*f)} for k, f in enumerate(fingers))
+        )
         self._ask("DELETE", "/actions")
+
+    def drag(self, x: int, y: int, dx: int, dy: int) -> None:
+        """Press at a place of the window, move, and let go."""
+        mouse = {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}}
+        self._act({**mouse, "actions": _moves(x, y, dx, dy)})
 
     def wheel(self, x: int, y: int, down: int) -> None:
         """Turn the wheel at a place of the window."""
         turn = {"type": "scroll", "x": x, "y": y, "deltaX": 0, "deltaY": down, "duration": 0}
-        self._ask(
-            "POST", "/actions", {"actions": [{"type": "wheel", "id": "w", "actions": [turn]}]}
-        )
+        self._act({"type": "wheel", "id": "w", "actions": [turn]})
 
     def press(self, key: str) -> None:
         """Press a key of the keyboard."""
         presses = [{"type": kind, "value": key} for kind in ("keyDown", "keyUp")]
-        self._ask("POST", "/actions", {"actions": [{"type": "key", "id": "k", "actions": presses}]})
+        self._act({"type": "key", "id": "k", "actions": presses})
 
-    def picture(self) -> bytes:
-        """The window as PNG."""
-        return base64.b64decode(self._ask("GET", "/screenshot"))
+    def _act(self, *actions: dict[str, Any]) -> None:
+        self._ask("POST", "/actions", {"actions": list(actions)})
 
     def printed(self) -> bytes:
         """The page as PDF."""
         return base64.b64decode(self._ask("POST", "/print", {"background": True}))
 
-    def drag(self, x: int, y: int, dx: int, dy: int) -> None:
-        """Press at a place of the window, move, and let go."""
-        moves = [
-            {"type": "pointerMove", "duration": 0, "x": x, "y": y},
-            {"type": "pointerDown", "button": LEFT},
-            {"type": "pointerMove", "duration": 100, "x": x + dx, "y": y + dy},
-            {"type": "pointerUp", "button": LEFT},
-        ]
-        mouse = {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}}
-        self._ask("POST", "/actions", {"actions": [{**mouse, "actions": moves}]})
 
-
-def _finger(number: int, place: tuple[int, int, int, int]) -> dict[str, Any]:
-    x, y, dx, dy = place
-    moves = [
+def _moves(x: int, y: int, dx: int, dy: int) -> list[dict[str, Any]]:
+    """What a mouse or a finger does to drag something."""
+    return [
         {"type": "pointerMove", "duration": 0, "x": x, "y": y},
         {"type": "pointerDown", "button": LEFT},
         {"type": "pointerMove", "duration": 200, "x": x + dx, "y": y + dy},
         {"type": "pointerUp", "button": LEFT},
     ]
-    touch = {"type": "pointer", "parameters": {"pointerType": "touch"}}
-    return {**touch, "id": f"finger {number}", "actions": moves}

@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
+from importlib.metadata import entry_points
 from pathlib import Path
 from random import Random
 
@@ -17,25 +18,7 @@ from scanfab.io.reader import ReadOptions, reader_for, reader_named
 from scanfab.io.series import Series
 from tests.helpers.sound_files import companion_grains, entry
 
-READERS = (
-    "edem",
-    "esys",
-    "gsd",
-    "kratos",
-    "lammps",
-    "lf-dem",
-    "liggghts",
-    "mercurydpm",
-    "mfix",
-    "musen",
-    "npz",
-    "on-dem",
-    "pfc",
-    "table",
-    "vtk",
-    "xyz",
-    "yade",
-)
+READERS = sorted(one.name for one in entry_points(group="scanfab.readers"))
 NAMES = (
     "f_1.txt",
     "f_1.vtk",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -26,6 +27,15 @@ def installed_base(commit: str, kept: Path) -> tuple[Path, Path]:
         words = ["-m", "pip", "install", "--quiet", f"{checkout}[test]"]
         subprocess.run([python, *words], check=True)
     return checkout, python
+
+
+def ask(python: Path, script: str, task: str, *words: Any, tree: Path = ROOT) -> Any:
+    """What a script's task answers to some words, in another environment and a tree of its own."""
+    done = subprocess.run(
+        [python, script, "--task", task], input=json.dumps(words), text=True, cwd=tree,
+        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=True,
+    )  # fmt: skip
+    return json.loads(done.stdout)
 
 
 def digest(value: Any) -> Any:
