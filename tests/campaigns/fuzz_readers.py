@@ -13,14 +13,14 @@ from __future__ import annotations
 
 import argparse
 import hashlib
-import mmap
 import os
-import struct
 import subprocess
 import sys
 import tempfile
 import time
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from random import Random
 
@@ -33,7 +33,6 @@ SECONDS, MEGABYTES = 10, 1024
 RUNS_OF_A_PROCESS = 5_000
 LONGEST = 20_000
 KEPT_OF_A_KIND = 3
-COUNTER = struct.Struct("<q")
 RAM = Path("/dev/shm")
 
 
@@ -64,14 +63,14 @@ def supervise(reader: str, runs: int, out: Path, only: list[str], minutes: float
         folder = Path(name)
         (folder / "corpus").mkdir()
         while done < runs and time.monotonic() - began < 60 * minutes:
-            (folder / "count").write_bytes(COUNTER.pack(0))
+            (folder / "count").write_text("0")
             chunk = min(runs - done, RUNS_OF_A_PROCESS)
             command = [sys.executable, __file__, reader, f"--runs={chunk}", f"--out={out}"]
             with open(out / "log.report", "ab") as log:
                 code = subprocess.call(
                     [*command, f"--process={folder}", "--only", *only], stdout=log, stderr=log
                 )
-            executed = COUNTER.unpack((folder / "count").read_bytes())[0]
+            executed = int((folder / "count").read_text())
             done, ended = done + executed, ended + (code != 0)
             if executed == 0:
                 sys.exit(f"{reader}: the process ends at once, see {out / 'log.report'}")
@@ -110,17 +109,9 @@ def fuzz(reader: str, runs: int, out: Path, folder: Path, only: tuple[str, ...])
         )
         return (head + fuzzing.mutate(data[2:], random))[:most]
 
-    options = {
-        "runs": runs,
-        "timeout": SECONDS,
-        "rss_limit_mb": MEGABYTES,
-        "max_len": LONGEST,
-        "artifact_prefix": f"{out}/process.",
-    }
-    arguments = [f"-{name}={value}" for name, value in options.items()]
-    atheris.Setup(
-        [sys.argv[0], *arguments, str(folder / "corpus")], execution, custom_mutator=mutate
-    )
+    arguments = [f"-runs={runs}", f"-timeout={SECONDS}", f"-rss_limit_mb={MEGABYTES}"]
+    arguments += [f"-max_len={LONGEST}", f"-artifact_prefix={out}/process.", f"{folder}/corpus"]
+    atheris.Setup([sys.argv[0], *arguments], execution, custom_mutator=mutate)
     atheris.Fuzz()
 
 
@@ -142,15 +133,14 @@ class _Execution:
 
     def __init__(self, fuzzing, reader: str, out: Path, folder: Path) -> None:
         self.fuzzing, self.reader, self.out, self.folder = fuzzing, reader, out, folder
-        with open(folder / "count", "r+b") as file:
-            self.counter = mmap.mmap(file.fileno(), COUNTER.size)
-        self.printed = tempfile.TemporaryFile()  # noqa: SIM115
+        self.counter = os.open(folder / "count", os.O_WRONLY)
+        self.printed = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115
         self.count, self.peak = 0, _peak()
 
     def __call__(self, data: bytes) -> None:
         fuzzing = self.fuzzing
         self.count += 1
-        self.counter[:] = COUNTER.pack(self.count)
+        os.pwrite(self.counter, b"%20d" % self.count, 0)
         if len(data) < 2:
             return
         name = fuzzing.NAMES[data[0] % len(fuzzing.NAMES)]
@@ -159,15 +149,15 @@ class _Execution:
         path.write_bytes(data[2:])
         options = fuzzing.OPTIONS[data[1] % len(fuzzing.OPTIONS)]
         began = time.monotonic()
-        silence = _Silence(self.printed)
+        said: list[bytes] = []
         try:
-            with silence:
+            with _silence(self.printed) as said:
                 fuzzing.read_everything(path, self.reader, options)
         except (Exception, SystemExit) as error:
             _keep(self.out, data, path.suffix, error)
         finally:
             path.unlink()
-        self._check(data, path.suffix, time.monotonic() - began, silence.said)
+        self._check(data, path.suffix, time.monotonic() - began, b"".join(said))
 
     def _check(self, data: bytes, suffix: str, seconds: float, said: bytes) -> None:
         """Nothing printed, not slow, and no memory: libFuzzer asks for it once a second only."""
@@ -211,31 +201,27 @@ def _keep(out: Path, data: bytes, suffix: str, error: BaseException) -> None:
     )
 
 
-class _Silence:
-    """Keeps what is printed, by Python or C++, for one execution."""
-
-    def __init__(self, file) -> None:
-        self.file, self.said = file.fileno(), b""
-
-    def __enter__(self) -> _Silence:
+@contextmanager
+def _silence(file) -> Iterator[list[bytes]]:
+    """What Python or C++ prints meanwhile is listed."""
+    said: list[bytes] = []
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept = {number: os.dup(number) for number in (1, 2)}
+    for number in kept:
+        os.dup2(file.fileno(), number)
+    try:
+        yield said
+    finally:
         sys.stdout.flush()
         sys.stderr.flush()
-        self.kept = os.dup(1), os.dup(2)
-        os.dup2(self.file, 1)
-        os.dup2(self.file, 2)
-        return self
-
-    def __exit__(self, *_) -> None:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        for number, kept in zip((1, 2), self.kept, strict=True):
-            os.dup2(kept, number)
-            os.close(kept)
-        size = os.lseek(self.file, 0, os.SEEK_CUR)
-        if size:
-            self.said = os.pread(self.file, size, 0)
-            os.ftruncate(self.file, 0)
-            os.lseek(self.file, 0, os.SEEK_SET)
+        for number, copy in kept.items():
+            os.dup2(copy, number)
+            os.close(copy)
+        file.seek(0)
+        said += filter(None, [file.read()])
+        file.seek(0)
+        file.truncate()
 
 
 if __name__ == "__main__":
