@@ -103,7 +103,9 @@ def main() -> None:
     asked = parser.parse_args()
     pythons = {"this": sys.executable, "other": asked.other}
     ways = {name: partial(compiled_first, python) for name, python in pythons.items()}
-    rows = [row("compiled first", samples(ways, asked.cold, warm=False, clock=None))]
+    rows = []
+    if asked.cold:
+        rows.append(row("compiled first", samples(ways, asked.cold, warm=False, clock=None)))
     with tempfile.TemporaryDirectory() as one, tempfile.TemporaryDirectory() as two:
         both = {
             name: Checkout(python, cache)
