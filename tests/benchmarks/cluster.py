@@ -1,12 +1,12 @@
 """
 Workers of a Dask cluster beside threads of one process: wall time, and time of processors.
 
-python tests/benchmarks/cluster.py [--turns 7] [--frames 8] [--edge 20]
+python tests/benchmarks/cluster.py [--turns 7] [--frames 8] [--edge 10]
 
 Two clusters of separate processes, of one worker and of two with one thread each, and one and two
 threads of this process take turns. Each way is taken once before, so that kernels are loaded and
 connections stand. Processor time is user and system time of this process, of the schedulers and of
-the workers.
+the workers. Frames have so many grains along an edge.
 """
 
 from __future__ import annotations
@@ -30,11 +30,8 @@ import scanfab  # noqa: E402
 from tests.benchmarks.timing import samples, table  # noqa: E402
 from tests.helpers.dask_cluster import DaskCluster  # noqa: E402
 from tests.helpers.interruptions import write_series  # noqa: E402
-from tests.helpers.lattices import shaken_cubic  # noqa: E402
 
-SCAN = {"spacing": "0.3rmin", "cutoff": "0.2rmin"}
-MANY: dict[str, Any] = {"directions": 100, **SCAN}
-HUGE: dict[str, Any] = {"directions": 200, "spacing": "0.2rmin", "cutoff": "0.2rmin"}
+SCAN: dict[str, Any] = {"directions": 100, "spacing": "0.3rmin", "cutoff": "0.2rmin"}
 TITLES = ["wall", "of one thread's (quarters)", "processor: here", "schedulers", "workers", "all"]
 
 
@@ -42,17 +39,6 @@ def used(processes: list[Any]) -> float:
     """Seconds of the processor that processes have used."""
     times = [psutil.Process(one.pid).cpu_times() for one in processes]
     return float(sum(one.user + one.system for one in times))
-
-
-def sources(folder: Path, frames: int, edge: int) -> dict[str, Any]:
-    """Many small frames as dumps, and a huge one, with their options."""
-    dumps = write_series(folder / "dumps", frames, 10)
-    packing = shaken_cubic(np.random.default_rng(0), edge)
-    np.savez(folder / "huge.npz", position=packing.position, radius=packing.radius)
-    return {
-        "many frames": (scanfab.read_series(dumps), MANY),
-        "one frame": (scanfab.read_series(folder / "huge.npz"), HUGE),
-    }
 
 
 def rows(turns: dict[str, np.ndarray]) -> list[list[str]]:
@@ -68,12 +54,12 @@ def rows(turns: dict[str, np.ndarray]) -> list[list[str]]:
 
 
 def main() -> None:
-    """Both cases, all ways in turns."""
+    """All ways in turns."""
     warnings.simplefilter("ignore")
     parser = argparse.ArgumentParser()
     parser.add_argument("--turns", type=int, default=7)
     parser.add_argument("--frames", type=int, default=8)
-    parser.add_argument("--edge", type=int, default=20)
+    parser.add_argument("--edge", type=int, default=10)
     asked = parser.parse_args()
     ways: dict[str, dict[str, Any]] = {f"`--workers {n}`": {"workers": n} for n in (1, 2)}
     with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
@@ -82,8 +68,7 @@ def main() -> None:
             (Path(name) / workers).mkdir()
             clusters.append(stack.enter_context(DaskCluster(Path(name) / workers, count)))
             executor = stack.enter_context(scanfab.dask_executor(clusters[-1].address))
-            while len(executor.workers()) < count:
-                time.sleep(0.1)
+            executor.client.wait_for_workers(count)
             ways[f"cluster, {workers}"] = {"executor": executor}
 
         def clocks() -> np.ndarray:
@@ -91,11 +76,9 @@ def main() -> None:
             workers = used([worker for one in clusters for worker in one.workers])
             return np.array([time.perf_counter(), time.process_time(), schedulers, workers])
 
-        for case, (series, words) in sources(Path(name), asked.frames, asked.edge).items():
-            runs = {
-                way: partial(scanfab.compute, series, **words, **more) for way, more in ways.items()
-            }
-            print(f"\n{table([case, *TITLES], rows(samples(runs, asked.turns, clock=clocks)))}")
+        series = scanfab.read_series(write_series(Path(name) / "dumps", asked.frames, asked.edge))
+        runs = {way: partial(scanfab.compute, series, **SCAN, **more) for way, more in ways.items()}
+        print(table(["way", *TITLES], rows(samples(runs, asked.turns, clock=clocks))))
 
 
 if __name__ == "__main__":
