@@ -141,14 +141,13 @@ class Contacts:
         ndarray of int, shape (K, 2)
             Rows of the grains' first spheres.
         """
-        pairs, image = self.pairs, self.image
-        if without is not None:
-            # np.compress is several times as fast as to index with a mask
-            pairs, image = (np.compress(~without, one, axis=0) for one in (pairs, image))
+        # rows are several times as fast to index with as a mask
+        rows = slice(None) if without is None else np.flatnonzero(~without)
+        pairs = self.pairs[rows]
         if bodies is None:
             return pairs
         heads = bodies.head[pairs]
-        return heads[_first_of_each(heads, bodies.image(pairs, image))]
+        return heads[_first_of_each(heads, bodies.image(pairs, self.image[rows]))]
 
 
 def branches(

@@ -114,7 +114,7 @@ class Packing:
             cell = cell_in_plane(cell, self.space)
         self.cell, turns = cell, None
         self.position: FloatArray = centres
-        if cell is not None and cell.is_periodic:
+        if cell is not None and not cell.surely_holds(centres):
             self.position, turns = cell.place(centres)
         self.position.flags.writeable = False
         self.columns: Mapping[str, npt.NDArray[Any]] = {
@@ -242,9 +242,9 @@ def check_lengths(position: FloatArray, radius: FloatArray, id: IntArray) -> Non
 
 def _check_ids(id: IntArray) -> None:
     """PackingError if an id occurs twice."""
-    unique, counts = np.unique(id, return_counts=True)
-    if unique.size < id.size:
+    ordered = np.sort(id)
+    again = ordered[1:][ordered[1:] == ordered[:-1]]
+    if again.size:
         raise PackingError(
-            f"the id {unique[np.argmax(counts > 1)]} occurs twice: "
-            f"{unique.size} ids for {id.size} grains"
+            f"the id {again[0]} occurs twice: {id.size - again.size} ids for {id.size} grains"
         )

@@ -196,12 +196,12 @@ def overlapping_pairs(
     count = len(radius)
     if count == 0:
         return np.zeros((0, 2), np.int64), np.zeros((0, 3), np.int64)
-    basis, vectors = _basis(position, cell)
+    basis = _basis(position, cell)
     moved, turns = position, np.empty((0, 3), np.int64)
     if basis.repeats.any():
         moved, turns = np.empty((count, 3)), np.empty((count, 3), np.int64)
         move_into_basis(position, basis, moved, turns)
-    grids = list(_grids(moved, radius, scale, basis, vectors))
+    grids = list(_grids(moved, radius, scale, basis))
     room, most = USUAL_CONTACTS * count, MOST_CONTACTS * count
     while True:
         pairs = Pairs(np.empty((room, 2), np.int32), np.empty((room, 3), np.int16), most)
@@ -228,12 +228,8 @@ def overlapping_pairs(
     return rows, image
 
 
-def _basis(position: FloatArray, cell: Cell | None) -> tuple[Basis, FloatArray]:
-    """
-    What is cut into bins: the cell by its shortest vectors, closed by the grains' own box.
-
-    The basis's vectors come with it, shape (3, 3).
-    """
+def _basis(position: FloatArray, cell: Cell | None) -> Basis:
+    """What is cut into bins: the cell by its shortest vectors, closed by the grains' own box."""
     lattice = np.zeros((0, 3)) if cell is None else cell.lattice.vectors
     repeating = len(lattice)
     # what does not repeat is orthogonal to what does
@@ -251,7 +247,7 @@ def _basis(position: FloatArray, cell: Cell | None) -> tuple[Basis, FloatArray]:
     start[repeating:] = low / size
     lattice_rows = np.zeros((3, 3))
     lattice_rows[:repeating] = lattice
-    return Basis(inverse, start, lattice_rows, np.arange(3) < repeating), vectors
+    return Basis(inverse, start, lattice_rows, np.arange(3) < repeating)
 
 
 def _extents(position: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -273,9 +269,7 @@ def _extents(position: FloatArray, directions: FloatArray) -> tuple[FloatArray, 
     return np.maximum(low, least - width), np.minimum(high, most + width)
 
 
-def _grids(
-    position: FloatArray, radius: FloatArray, scale: float, basis: Basis, vectors: FloatArray
-) -> Iterator[Grid]:
+def _grids(position: FloatArray, radius: FloatArray, scale: float, basis: Basis) -> Iterator[Grid]:
     """Grids of grains of like size, the largest grains first."""
     largest, smallest = float(radius.max()), float(radius.min())
     if largest <= CLASS_RATIO * smallest:
@@ -284,16 +278,16 @@ def _grids(
         number = np.floor(np.log(largest / radius) / np.log(CLASS_RATIO)).astype(np.int64)
         order = np.argsort(number, kind="stable").astype(np.int32)
         classes = np.split(order, np.cumsum(np.bincount(number))[:-1])
-    heights = 1.0 / np.linalg.norm(np.linalg.inv(vectors), axis=0)
     for rows in classes:
         if len(rows):
-            grid = _empty_grid(len(rows), 2 * scale * float(radius[rows].max()), heights, basis)
+            grid = _empty_grid(len(rows), 2 * scale * float(radius[rows].max()), basis)
             fill_grid(position, radius, rows, basis, grid)
             yield grid
 
 
-def _empty_grid(count: int, edge: float, heights: FloatArray, basis: Basis) -> Grid:
+def _empty_grid(count: int, edge: float, basis: Basis) -> Grid:
     """A grid of bins that are no thinner than an edge, about as many as there are grains."""
+    heights = 1.0 / np.linalg.norm(basis.inverse, axis=0)
     cells = np.where(basis.repeats, edge / heights, 0.0)
     if np.any(cells > MOST_CELLS):
         raise PackingError(
