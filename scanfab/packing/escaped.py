@@ -6,7 +6,6 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from scanfab.base.errors import Note
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
@@ -71,8 +70,13 @@ def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
     most = max(SHARE * count, 1.0)
     flown: list[int] = []
     if count >= FEWEST:
-        far = _far(packing, rows)
-        for axis, sign in product(_open_axes(packing), (-1.0, 1.0)):
+        ends = list(product(_open_axes(packing), (-1.0, 1.0)))
+        least = RADII * float(packing.radius[rows].max())
+        # nearly always nothing is even that far away; SciPy takes longer to load than that to see
+        if not any(_group_at_end(packing, left, *end, least) for end in ends):
+            ends = []
+        far = _far(packing, rows) if ends else least
+        for axis, sign in ends:
             while _number(packing, flown) <= most and (
                 group := _group_at_end(packing, left, axis, sign, far)
             ):
@@ -115,6 +119,8 @@ def _number(packing: Packing, rows: IntArray | list[int]) -> int:
 
 def _far(packing: Packing, rows: IntArray) -> float:
     """The gap from which on a grain is far away."""
+    from scipy.spatial import KDTree
+
     some = rows[:: len(rows) // SOME + 1]
     distance, near = KDTree(packing.position[rows]).query(packing.position[some], k=2)
     gaps = distance[:, 1] - packing.radius[some] - packing.radius[rows[near[:, 1]]]
