@@ -12,7 +12,7 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.io.files import first_bytes
 from scanfab.io.reader import Snapshot
-from scanfab.io.text import Columns, Layout, is_number, read_rows, text_of, words_of
+from scanfab.io.text import Columns, CutError, Layout, is_number, read_rows, text_of, words_of
 
 # bytes of a file that are looked at, and the rows among them
 HEAD, SAMPLE = 1 << 18, 20
@@ -80,6 +80,8 @@ def text_table(path: Path, skip: int) -> TextTable:
     if not any(is_number(word, comma) for word in rows[0]):
         names = [word.strip() for word in words_of(texts[0].strip().rstrip(separator), separator)]
         first, rows = numbers[1] if len(numbers) > 1 else first + 1, rows[1:]
+        if not rows and not head.endswith(b"\n"):
+            raise CutError(f"{path}: the file ends within its line of names: it is incomplete")
         width = len(rows[0]) if rows else len(names)
     elif first > skip:
         names = _names_in_comment(lines[first - 1], width)

@@ -49,7 +49,6 @@ MOST_DIRECTIONS, ROUNDS = 2905, 5
 # how likely chance alone makes any two steps of a ladder differ, and how sure standard errors of 16
 # replicates are
 CHANCE, FREEDOM = 0.05, 30
-# what findings say of the paper
 PAPER = {"spacing": " (the paper: 0.1)", "rv": " (the paper: 0.67 to 0.7)"}
 
 

@@ -110,7 +110,7 @@ def test_globs_in_quotes_are_expanded(folder, capsys):
     assert run(["inspect", f"{folder}/dump_*.txt", "--json"]) == 0
     assert len(capsys.readouterr().out.splitlines()) == 2
     assert run(["inspect", f"{folder}/grains_*.txt"]) == 2
-    assert "grains_*.txt' matches nothing: there is no file" in capsys.readouterr().err
+    assert "grains_*.txt: matches nothing: there is no file" in capsys.readouterr().err
 
 
 @pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
