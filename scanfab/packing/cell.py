@@ -156,6 +156,16 @@ class Cell:
         The corners of the box around the positions settle it, as fractions are linear; in a tilted
         cell the box may reach beyond the cell though no position does. To place them all would take
         ten times as long, and three times their memory.
+
+        Parameters
+        ----------
+        position : ndarray, shape (N, 3)
+            Dump's length unit.
+
+        Returns
+        -------
+        bool
+            False where the box does not settle it, too.
         """
         if len(position) == 0:
             return True

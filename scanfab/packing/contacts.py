@@ -116,7 +116,13 @@ class Contacts:
         return f"Contacts: {self.in_words()}"
 
     def in_words(self) -> str:
-        """How many there are, and where they come from."""
+        """
+        How many there are, and where they come from.
+
+        Returns
+        -------
+        str
+        """
         whence = "from file" if self.source == "file" else "by geometry"
         forces = "" if self.force is None else " with forces"
         if self.force is None and self.force_n is not None:

@@ -165,7 +165,14 @@ class Sample:
         return self.grains if self.escaped.are_many else self.grains & ~self.escaped.grains
 
     def doubts_of_escaped(self) -> list[Note]:
-        """What to tell of grains that have escaped; nothing without any."""
+        """
+        What to tell of grains that have escaped.
+
+        Returns
+        -------
+        list of Note
+            Empty without any.
+        """
         return notes_of_escaped(self.packing, self.grains, self.escaped)
 
     @cached_property

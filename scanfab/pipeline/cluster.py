@@ -236,7 +236,8 @@ class DaskExecutor(Executor):
         from distributed.scheduler import KilledWorker
 
         try:
-            found = sent.result()
+            # it is there; without a limit Dask would wait for ever if the scheduler stops just now
+            found = sent.result(timeout=SILENCE)
         except ScanfabError:
             raise
         except KilledWorker as error:
@@ -246,6 +247,7 @@ class DaskExecutor(Executor):
             ) from None
         except Exception as error:
             if sent.status != "error" or self.client.status != "running":
+                self._is_silent |= isinstance(error, TimeoutError)
                 raise self._gone() from None
             text = f"{job}: {type(error).__name__} at a worker: {error}"
             if isinstance(error, ImportError):

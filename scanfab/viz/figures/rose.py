@@ -226,10 +226,11 @@ def _draw_rings(
         if ring.curve is None:
             # closed: the last point is followed by the first
             theta, value, error = (np.append(a, a[:1]) for a in (theta, value, error))
-        else:
+        line = look["ls"] if ring.curve is None else "none"
+        style = {**look, "ls": line, "elinewidth": 0.5, "capsize": 0}
+        axes.errorbar(np.radians(theta), value, error, **style)
+        if ring.curve is not None:
             axes.plot(np.radians(AROUND), ring.curve(AROUND), color=look["color"], ls=look["ls"])
-            look = {**look, "ls": "none"}
-        axes.errorbar(np.radians(theta), value, error, elinewidth=0.5, capsize=0, **look)
     axes.plot(np.radians(AROUND), np.ones_like(AROUND), color="0.4", lw=0.6)
     middle, circles = _scale(reach)
     axes.set_ylim(middle, 1.0 + 1.1 * reach)

@@ -111,7 +111,9 @@ def test_the_bytes_are_those_of_one_core(cluster, folder, is_same, words):
     assert compute(*words, "--scheduler-file", str(cluster.file)) == 0
     assert is_same(*words)
     one, other = (json.loads(Path(f"{n}.csv.manifest.json").read_text()) for n in ("one", "t"))
-    assert one == other
+    # workers that are late to come are a warning of the cluster alone
+    late = [text for text in other["warnings"] if "has no workers yet" in text]
+    assert {**one, "warnings": [*one["warnings"], *late]} == other
 
 
 def test_every_executor_serves(executor, folder):
