@@ -17,7 +17,7 @@ LEAST, MOST = 1e-100, 1e100
 
 
 def doubles(values: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
-    """Numbers of eight bytes, without a word of what is no number: of four bytes there are more."""
+    """Numbers of eight bytes; a signalling NaN of four bytes draws no warning."""
     with np.errstate(invalid="ignore"):
         return values.astype(np.float64, copy=False)
 
@@ -26,6 +26,7 @@ def cast(
     name: str, values: npt.ArrayLike, dtype: type | None, shape: tuple[Any, ...]
 ) -> npt.NDArray[Any]:
     """An array of the given type and shape (None: any length; ...: any further dimensions)."""
+    spelt = ", ".join("N" if n is None else "..." if n is ... else str(n) for n in shape)
     try:
         array = np.asarray(values)
         if array.size == 0 and shape[0] is None:
@@ -34,22 +35,18 @@ def cast(
         shared = array.flags.owndata and not array.flags.writeable
         numbers = array.astype(array.dtype if dtype is None else dtype, copy=not shared)
     except (TypeError, ValueError) as error:
-        raise PackingError(f"{name}: expected numbers of shape {_spell(shape)}: {error}") from None
+        raise PackingError(f"{name}: expected numbers of shape ({spelt}): {error}") from None
     wanted, found = shape, numbers.shape
     if shape[-1] is ...:
         wanted, found = shape[:-1], found[: len(shape) - 1]
     if len(found) != len(wanted) or any(
         want not in (None, have) for have, want in zip(found, wanted, strict=True)
     ):
-        raise PackingError(f"{name}: expected shape {_spell(shape)}, found {numbers.shape}")
+        raise PackingError(f"{name}: expected shape ({spelt}), found {numbers.shape}")
     if dtype is np.int64 and array.dtype.kind == "f" and not np.array_equal(array, numbers):
         raise PackingError(f"{name}: expected whole numbers")
     numbers.flags.writeable = False
     return numbers
-
-
-def _spell(shape: tuple[Any, ...]) -> str:
-    return "(" + ", ".join("N" if n is None else "..." if n is ... else str(n) for n in shape) + ")"
 
 
 def all_within(values: npt.NDArray[np.float64], least: float, most: float) -> bool:

@@ -1,9 +1,9 @@
 """
 Convex regions about the origin: what lies in them, and how much of them.
 
-A region is the image of a body under a linear map. The map makes every ellipsoid of the ball of
-radius 1, every box of a cube, and carries over what is known of the body in closed form: a window
-that deforms with its sample needs no formula of its own. The bodies are in shapes.py.
+A region is the image of a body under a linear map. The map makes every ellipsoid from the ball of
+radius 1 and every box from a cube, and it carries over the closed formulas of the body, so that a
+window that deforms with its sample needs no formula of its own.
 
 A region in a plane is spanned by the map's first two columns; the third is the unit normal. Its
 volume is an area, and its areas are lengths.
@@ -16,55 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scanfab.base.bodies import AXES, POINTS, Hull, Product, on_circle, on_sphere
 from scanfab.base.typing import BoolArray, FloatArray
 
-# steps towards the nearest place of a region, and what of a distance is rounding
+# steps towards the nearest place of a region, and the share of a distance that may be rounding
 STEPS, ROUNDING = 200, 1e-12
-# points of curved surfaces, and directions over which a shadow is averaged
-POINTS, POINTS_OF_A_RIM, AXES = 2000, 128, 200
-
-
-def on_sphere() -> FloatArray:
-    """Points of the sphere of radius 1 along a spiral; all have a like share of its surface."""
-    z = 1.0 - (2.0 * np.arange(POINTS) + 1.0) / POINTS
-    turn = np.arange(POINTS) * np.pi * (3.0 - np.sqrt(5.0))
-    across = np.sqrt(1.0 - z**2)
-    return np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
-
-
-def on_circle() -> FloatArray:
-    """Points of the circle of radius 1 about z."""
-    turn = np.arange(POINTS_OF_A_RIM) * 2.0 * np.pi / POINTS_OF_A_RIM
-    return np.column_stack([np.cos(turn), np.sin(turn), np.zeros(POINTS_OF_A_RIM)])
-
-
-class Body:
-    """A convex body with the origin inside, by its constants and three functions of its own."""
-
-    planes: FloatArray
-    """Of its flat faces: rows n, d with the body on the side n·x < d, shape (P, 4)."""
-    form: FloatArray = np.zeros(3)
-    """Of its curved face, x·M x < 1: the diagonal of M, shape (3,); zeros without one."""
-    volume: float
-    """With edges and radii of the body itself."""
-    outline: FloatArray
-    """Points of its surface whose hull it is; of a curved one nearly; shape (K, 3)."""
-    is_symmetric: bool = True
-    """Whether with x also -x lies in it."""
-    is_flat: bool = False
-    """Whether it lies in a plane; what lies above and below it counts as inside."""
-
-    def support(self, along: FloatArray) -> FloatArray:
-        """The place in the body that is furthest along each vector, shape (N, 3)."""
-        raise NotImplementedError
-
-    def reach(self, frame: FloatArray) -> float:
-        """No place of its image, frame @ x, is further away from the origin."""
-        return float(np.linalg.norm(self.outline @ frame.T, axis=1).max())
-
-    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-        """As :meth:`scanfab.Convex.overlap`, moved by ``length * shift``, shifts of any length."""
-        raise NotImplementedError
 
 
 class Quadric(NamedTuple):
@@ -111,7 +67,7 @@ class Convex:
         Radius of the ball about the origin that holds the region; of a sphere its own.
     size : str
         How messages tell its size, for instance ``radius 2``.
-    body : Body
+    body : Product or Hull
         What it is the image of.
     frame : ndarray, shape (3, 3)
         It holds the places frame @ x with x in the body.
@@ -132,7 +88,7 @@ class Convex:
     high: FloatArray
     reach: float
     size: str
-    body: Body
+    body: Product | Hull
     frame: FloatArray
 
     def __repr__(self) -> str:
@@ -357,7 +313,7 @@ class Convex:
         return image_of(self.body, gradient @ self.frame, f"deformed, first {self.size}")
 
 
-def image_of(body: Body, frame: FloatArray, size: str) -> Convex:
+def image_of(body: Product | Hull, frame: FloatArray, size: str) -> Convex:
     """The places frame @ x with x in the body."""
     inverse = np.linalg.inv(frame)
     planes = np.column_stack([body.planes[:, :3] @ inverse, body.planes[:, 3]])

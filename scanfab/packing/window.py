@@ -13,7 +13,7 @@ import numpy as np
 from scanfab.base.arrays import cast
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
-from scanfab.base.shapes import ellipse, ellipsoid
+from scanfab.base.shapes import ellipsoid
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import BoolArray, FloatArray
@@ -321,6 +321,5 @@ def inner_ellipsoid(position: FloatArray, largest: float, space: Space = SPACE) 
     if scale <= 0.0:
         return None
     semi_axes = scale * np.sqrt(variance)
-    if space.is_plane:
-        return Window(center, ellipse(semi_axes, space, axes.T @ space.basis[:2]))
-    return Window(center, ellipsoid(semi_axes, axes.T))
+    turn = axes.T @ space.basis[: space.dimension]
+    return Window(center, ellipsoid(semi_axes, turn, space))

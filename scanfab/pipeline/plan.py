@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from scanfab.base.convex import Convex
 from scanfab.base.errors import Note, SettingsError
-from scanfab.base.shapes import circle
+from scanfab.base.shapes import sphere
 from scanfab.base.space import SPACE, Space
 from scanfab.packing.doubts import refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample, SampleRule
@@ -261,7 +261,7 @@ def _scanned(box: SurfaceBox, shape: Convex | None) -> tuple[float, float, float
     """
     reach = 0.5 * box.smallest_extent if shape is None else shape.reach
     if box.space.is_plane:
-        shape = shape or circle(reach, box.space)
+        shape = shape or sphere(reach, box.space)
     elif shape is None or shape.is_sphere:
         return reach, math.pi * reach**2, reach
     area = shape.mean_shadow

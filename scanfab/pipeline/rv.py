@@ -86,17 +86,17 @@ def _window(sample: Sample, settings: Settings, part: FloatArray, middle: FloatA
 
 def _shape(settings: Settings, part: FloatArray, space: Space) -> tuple[Convex, FloatArray | None]:
     """The shape, in a plane a flat one, and its centre if a file says where it is."""
-    kind, sizes, is_plane = settings.rv_shape, settings.rv_size, space.is_plane
+    kind, sizes = settings.rv_shape, settings.rv_size
     part = part[sorted(space.along)]
     if kind == "sphere":
         radius = settings.rv_radius or float(part.min())
-        return shapes.circle(radius, space) if is_plane else shapes.sphere(radius), None
+        return shapes.sphere(radius, space), None
     if kind == "box":
         edges = sizes or 2.0 * part
-        return shapes.rectangle(edges, space) if is_plane else shapes.box(edges), None
+        return shapes.box(edges, None, space), None
     if kind == "ellipsoid":
         axes = sizes or part
-        return shapes.ellipse(axes, space) if is_plane else shapes.ellipsoid(axes), None
+        return shapes.ellipsoid(axes, None, space), None
     if kind == "cylinder":
         axis = settings.rv_axis or settings.axis
         radius, height = sizes or _cylinder_within(part, axis)

@@ -5,8 +5,7 @@ from math import asin, hypot, pi, sqrt
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, Sample, Window, compute, find_contacts
-from scanfab.base.shapes import circle, ellipse, rectangle
+from scanfab import Cell, Packing, Sample, Window, box, compute, ellipsoid, find_contacts, sphere
 from scanfab.base.space import Space
 from scanfab.fabric.void import void_fabric
 from scanfab.pipeline.measurement import solids_of
@@ -19,9 +18,9 @@ from tests.helpers import naive_plane
 
 XY = Space(2)
 WINDOWS = {
-    "circle": (circle(4.0, XY), naive_plane.in_circle(4.0)),
-    "box": (rectangle([7.0, 4.0], XY), naive_plane.in_box(3.5, 2.0)),
-    "ellipse": (ellipse([4.5, 2.5], XY), naive_plane.in_ellipse(4.5, 2.5)),
+    "circle": (sphere(4.0, XY), naive_plane.in_circle(4.0)),
+    "box": (box([7.0, 4.0], None, XY), naive_plane.in_box(3.5, 2.0)),
+    "ellipse": (ellipsoid([4.5, 2.5], None, XY), naive_plane.in_ellipse(4.5, 2.5)),
 }
 ANGLES = (0.1, 0.9, 2.0, 2.7)
 
@@ -81,7 +80,7 @@ def poisson(random, density, reach):
 @pytest.mark.parametrize("cutoff", [0.0, 0.7, 1.6])
 def test_empty_circle(cutoff):
     """ℓ = (R²(π/2 - asin(c/2R)) + (c/2)√(R² - c²/4)) / √(R² - c²/4)."""
-    found = mean_lengths(solids_in([], circle(1.0, XY)), along(*ANGLES), 0.005, cutoff, "c")
+    found = mean_lengths(solids_in([], sphere(1.0, XY)), along(*ANGLES), 0.005, cutoff, "c")
     h = sqrt(1 - cutoff**2 / 4)
     assert agrees(found, (pi / 2 - asin(cutoff / 2) + cutoff / 2 * h) / h)
 
@@ -89,7 +88,7 @@ def test_empty_circle(cutoff):
 def test_discs_without_overlap_in_a_circle():
     """ℓ = (πR² - Σπr²)/(2R + Σ2r) in every direction, whatever the arrangement."""
     discs = separate(np.random.default_rng(3), 30, 8.0)
-    found = mean_lengths(solids_in(discs, circle(8.0, XY)), along(*ANGLES), 0.01, 0.0, "c")
+    found = mean_lengths(solids_in(discs, sphere(8.0, XY)), along(*ANGLES), 0.01, 0.0, "c")
     r = np.array(discs)[:, 2]
     assert agrees(found, (pi * 64 - np.sum(pi * r**2)) / (16 + np.sum(2 * r)))
 
@@ -131,7 +130,7 @@ def fine_length(solids, triad, cutoff, spacing=0.05, grids=400):
 def test_poisson_discs(edge):
     """ℓ = c + 1/β with β = 2ρ⟨r⟩; clipped to a window c + A1/(A0 + βA1)."""
     random, density, cutoff, found = np.random.default_rng(11), 0.6, 0.5, []
-    window = circle(5.0, XY)
+    window = sphere(5.0, XY)
     for _ in range(60):
         position, radius = flat(poisson(random, density, 25.0))
         packing = Packing(position, radius, dim=2)
