@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import shutil
 import subprocess
 import tempfile
@@ -155,27 +154,6 @@ class Projected:
         return list_per_line(self.u, self.v, self.depth, self.radius, *self.grid, CUTOFF)
 
 
-def floor_in_c(projected: Projected, folder: Path):
-    """The same loop compiled by gcc; None if there is none."""
-    if shutil.which("gcc") is None:
-        return None
-    library = folder / "floor.so"
-    # the order of a sum may be any, as for Numba
-    flags = ["-O3", "-march=native", "-fno-math-errno", "-fassociative-math", "-fno-signed-zeros"]
-    flags += ["-fno-trapping-math", "-ffinite-math-only", "-shared", "-fPIC"]
-    command = ["gcc", *flags, str(HERE / "floor.c"), "-o", str(library), "-lm"]
-    subprocess.run(command, check=True)
-    function = ctypes.CDLL(str(library)).floor_c
-    double = ctypes.c_double
-    function.restype = double
-    arrays = [
-        one.ctypes.data_as(ctypes.c_void_p) for one in (projected.u, projected.v, projected.radius)
-    ]
-    first, spacing, lines, window = projected.grid
-    rest = (double(first), double(spacing), ctypes.c_long(lines), double(window))
-    return lambda: function(ctypes.c_long(projected.u.size), *arrays, *rest)
-
-
 def embree(projected: Projected, folder: Path):
     """A way that returns Embree's own seconds, without the time to load; None if there is none."""
     program = folder / "embree"
@@ -202,9 +180,6 @@ def chords(repeats: int) -> str:
     }
     note = f"\n\n{len(solids.radius):,} grains reach into the RV; {count:,} chords."
     with tempfile.TemporaryDirectory() as name:
-        in_c = floor_in_c(projected, Path(name))
-        if in_c is not None:
-            ways["the same floor in C, gcc -O3 -march=native"] = in_c
         seconds = interleaved(ways, repeats, clock=time.process_time)
         rays = embree(projected, Path(name))
         if rays is None:

@@ -1,10 +1,9 @@
-"""What a scan costs by its variants, edge rule, blocks and window, and in a periodic cell."""
+"""What a scan costs by its variants, edge rule and window, and in a periodic cell."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -13,10 +12,8 @@ from scipy.spatial import ConvexHull
 
 from scanfab.base.convex import Convex
 from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron, sphere
-from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import DirectionRule, direction_rule
 from scanfab.scan.edges import EDGES
-from scanfab.scan.gaps import scan_gaps
 from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.scan import ScanSums, scan_lines
 from scanfab.scan.solids import Solids
@@ -76,32 +73,6 @@ def edges(repeats: int) -> str:
             rows.append((f"{size:g}", f"{spacing:g}", *ratios))
     titles = [f"`{edge}` over `{EDGES[0]}`" for edge in EDGES[1:]]
     return table(["radius of the RV", "spacing of lines", *titles], rows)
-
-
-def maps(repeats: int) -> str:
-    """Blocks of all grains beside the same lines without any."""
-    position, radius = dense(PAPER)
-    solids = Solids(position, radius, np.zeros(PAPER, bool))
-    reach = float(np.abs(position).max() + radius.max())
-    grid = Blocks(np.full(3, -reach), 2 * reach * np.eye(3), (10, 10, 10))
-    kinds = {
-        "octants": Blocks.about(np.zeros(3), 2 * reach),
-        "a grid of 1,000 blocks": grid,
-        "10 shells": replace(grid, parts=(1, 1, 1), radius=reach, shells=10),
-    }
-    rows = []
-    for spacing, directions in ((0.3, 16), (1.0, 100), (1.5, 200)):
-        words: Any = {"spacing": spacing, "variants": "a", "replicates": range(directions)}
-        ways: dict[str, Any] = {"none": partial(scan_lines, solids, ONE_AXIS, cutoff=CUTOFF)}
-        for name, one in kinds.items():
-            ways[name] = partial(scan_gaps, solids, ONE_AXIS, cutoffs=[CUTOFF], blocks=(one, one))
-        ways = {name: partial(way, **words) for name, way in ways.items()}
-        seconds = interleaved(ways, repeats, clock=time.process_time)
-        rows += [
-            (f"{name}, lines {spacing:g} mean radii apart", ratio)
-            for name, ratio in over_first(seconds)[1:]
-        ]
-    return table(["blocks", "of none"], rows)
 
 
 def shapes() -> dict[str, Convex]:
@@ -164,7 +135,6 @@ def periodic(repeats: int) -> str:
 SECTIONS = {
     "variants": variants,
     "edges": edges,
-    "maps": maps,
     "windows": windows,
     "periodic": periodic,
 }
