@@ -128,45 +128,34 @@ def _text(data: bytes, name: str) -> str:
         raise ReadError(f"{name}: expected a table as text or Parquet, found other bytes") from None
 
 
-class JsonArray(OwnFormat):
-    """One array of objects."""
+class Json(OwnFormat):
+    """An object a row: all in one array, or one a line (JSON lines)."""
 
-    suffix = ".json"
-    description = "one array of objects; a missing value is null"
-    start = b"["
+    def __init__(self, suffix: str, start: bytes, description: str) -> None:
+        self.suffix, self.start, self.description = suffix, start, description
+        self.is_array = start == b"["
 
     def read(self, data: bytes, name: str) -> list[dict[str, Any]]:
         """The objects."""
+        text = _text(data, name)
         try:
-            rows = self._parsed(_text(data, name))
+            lines = [text] if self.is_array else filter(str.strip, text.split("\n"))
+            rows = [json.loads(line) for line in lines]
+            rows = list(rows[0]) if self.is_array else rows
         except (ValueError, RecursionError) as error:  # also an integer of too many digits
             raise ReadError(f"{name}: cannot be read as JSON: {error}") from None
         if not all(isinstance(row, dict) for row in rows):
             raise ReadError(f"{name}: expected JSON objects, one for each row")
         return rows
 
-    def _parsed(self, text: str) -> list[Any]:
-        return list(json.loads(text))
-
-    def write(self, stream: IO[str], rows: Rows, columns: Columns) -> None:
-        """Write an object a line between brackets."""
-        lines = ",\n".join(json_line(row) for row in rows)
-        stream.write(f"[\n{lines}\n]\n" if lines else "[]\n")
-
-
-class JsonLines(JsonArray):
-    """One object a line."""
-
-    suffix = ".jsonl"
-    description = "JSON lines: one object a line"
-    start = b"{"
-
-    def _parsed(self, text: str) -> list[Any]:
-        return [json.loads(line) for line in text.split("\n") if line.strip()]
-
     def write(self, stream: IO[str], rows: Rows, columns: Columns) -> None:
         """Write an object a line; there is no header."""
-        stream.writelines(json_line(row) + "\n" for row in rows)
+        lines = map(json_line, rows)
+        if not self.is_array:
+            stream.writelines(line + "\n" for line in lines)
+        else:
+            text = ",\n".join(lines)
+            stream.write(f"[\n{text}\n]\n" if text else "[]\n")
 
 
 def json_line(row: Mapping[str, Any]) -> str:
@@ -227,8 +216,8 @@ def data_frame(rows: Sequence[Mapping[str, Any]], columns: Columns) -> polars.Da
 OWN_FORMATS: tuple[TableFormat, ...] = (
     SeparatedText(".csv", ",", "comma-separated values; a missing value is an empty cell"),
     SeparatedText(".tsv", "\t", "the same with tabs"),
-    JsonArray(),
-    JsonLines(),
+    Json(".json", b"[", "one array of objects; a missing value is null"),
+    Json(".jsonl", b"{", "JSON lines: one object a line"),
     Parquet(),
 )
 

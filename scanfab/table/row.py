@@ -234,23 +234,21 @@ def with_error(value: float | None, error: float | None) -> str:
 
 def _lines(rows: Rows, names: Sequence[str]) -> list[list[str]]:
     """Titles, and the cells of each row; dots for the rows in the middle of a long table."""
+
+    def cell(row: Mapping[str, Any], name: str) -> str:
+        value = row.get(name)
+        if name in ANISOTROPIES:
+            # the error of the scan alone would say too little
+            return with_error(number_of(row, name), total_error(row, name))
+        return "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
+
     shown = list(names[:MOST_COLUMNS])
     if any(name in names for name in ANISOTROPIES):
         same = [name for name in OFTEN_SAME if len({row.get(name) for row in rows}) <= 1]
         shown = [name for name in SHOWN if name in names and name not in same]
     is_long = len(rows) > 2 * ENDS + 1
     at_ends = [*rows[:ENDS], *rows[-ENDS:]] if is_long else rows
-    lines = [[_cell(row, name) for name in shown] for row in at_ends]
+    lines = [[cell(row, name) for name in shown] for row in at_ends]
     if is_long:
         lines.insert(ENDS, ["..."] * len(shown))
     return [[SHOWN.get(name, name) for name in shown], *lines]
-
-
-def _cell(row: Mapping[str, Any], name: str) -> str:
-    value = row.get(name)
-    if name in ANISOTROPIES:
-        # the error of the scan alone would say too little
-        return with_error(number_of(row, name), total_error(row, name))
-    if isinstance(value, float):
-        return f"{value:.3g}"
-    return "-" if value is None else str(value)

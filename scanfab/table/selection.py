@@ -79,7 +79,11 @@ def choose_rows(
         if cutoff is not None:
             named[number] = name, _of_cutoff(name, rows, cutoff)
     if labels:
-        return [_labelled(rows, label) for (_, rows), label in zip(named, labels, strict=True)]
+        for (_, rows), label in zip(named, labels, strict=True):
+            several = len({row["source"] for row in rows}) > 1
+            for row in rows:
+                row["source"] = f"{label}, {row['source']}" if several else label
+        return [rows for _, rows in named]
     return _each_once(named)
 
 
@@ -126,12 +130,6 @@ def _of_cutoff(name: str, rows: Rows, cutoff: float) -> Rows:
         elif row.get("cutoff") is None:
             kept.setdefault((row["source"], row["frame"], variant_of(row)), row)
     return list(kept.values())
-
-
-def _labelled(rows: Rows, label: str) -> Rows:
-    """Rows by the label; the sources of a table of several stay behind it."""
-    several = len({row["source"] for row in rows}) > 1
-    return [{**row, "source": f"{label}, {row['source']}" if several else label} for row in rows]
 
 
 def _each_once(tables: Sequence[tuple[str, Rows]]) -> list[Rows]:

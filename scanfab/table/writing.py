@@ -66,23 +66,6 @@ class Excerpt:
                 raise SettingsError(f"fields: the column {name} is named more than once")
         return cls(names, digits)
 
-    def for_format(self, table_format: TableFormat, columns: Sequence[Column]) -> Excerpt:
-        """
-        The same without the columns of lists, for a format whose cells hold one value.
-
-        Raises
-        ------
-        SettingsError
-            If all that is asked for are lists.
-        """
-        if getattr(table_format, "holds_lists", False):
-            return self
-        kept = tuple(one.name for one in self.columns(columns) if one.kind is not list)
-        if columns and not kept:
-            lists = ", ".join(one.name for one in self.columns(columns))
-            raise SettingsError(f"fields: {lists} are lists of numbers: write .json or .jsonl")
-        return replace(self, fields=kept)
-
     def columns(self, columns: Sequence[Column]) -> list[Column]:
         """Those that are written, in their order."""
         by_name = {column.name: column for column in columns}
@@ -123,9 +106,20 @@ def write_to(
     columns: Sequence[Column],
     excerpt: Excerpt = ALL,
 ) -> None:
-    """Write rows to a stream, which is of text or of bytes, as the format has it."""
-    excerpt = excerpt.for_format(table_format, columns)
-    table_format.write(stream, map(excerpt.of, rows), excerpt.columns(columns))
+    """
+    Write rows to a stream, which is of text or of bytes, as the format has it.
+
+    A format whose cells hold one value leaves out the columns of lists; SettingsError if all that
+    is asked for are lists.
+    """
+    asked = excerpt.columns(columns)
+    if not getattr(table_format, "holds_lists", False):
+        kept = [one for one in asked if one.kind is not list]
+        if asked and not kept:
+            lists = ", ".join(one.name for one in asked)
+            raise SettingsError(f"fields: {lists} are lists of numbers: write .json or .jsonl")
+        asked, excerpt = kept, replace(excerpt, fields=tuple(one.name for one in kept))
+    table_format.write(stream, map(excerpt.of, rows), asked)
 
 
 def check_output(path: Path) -> None:

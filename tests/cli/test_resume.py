@@ -18,7 +18,7 @@ from scanfab.cli.main import run
 from scanfab.pipeline import measurement
 from scanfab.pipeline.part import PartFile
 from scanfab.pipeline.record import read_manifest
-from scanfab.table.formats import OWN_FORMATS, JsonArray
+from scanfab.table.formats import OWN_FORMATS, Json
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.interruptions import PROGRAM, interrupted_at_row, write_series
 from tests.helpers.truth import SAMPLE_DATA
@@ -177,7 +177,7 @@ def test_a_failure_behind_the_last_frame_says_so(compute, capsys, monkeypatch):
     def full(*_):
         raise OSError(28, os.strerror(28))
 
-    monkeypatch.setattr(JsonArray, "write", full)
+    monkeypatch.setattr(Json, "write", full)
     assert compute("table.json")[0] == 1
     said = "stopped after the last frame, before the table was complete; the same command with"
     assert said in capsys.readouterr().err
