@@ -36,7 +36,7 @@ def test_of_a_series_and_its_frames(tmp_path):
     assert repr(last) == f"Frame 2 of {series.name}: dump_20.txt, step 20"
     again = scanfab.read_series(tmp_path)
     (tmp_path / "dump_0.txt").unlink()
-    assert repr(again[0]) == f"Frame 0 of {series.name}: dump_0.txt, damaged"
+    assert repr(again[0]) == f"Frame 0 of {series.name}: dump_0.txt, step 0, damaged"
 
 
 PAIRS, ROW = [[0, 1]], [[0, 0, 0], [1, 0, 0], [2.1, 0, 0]]

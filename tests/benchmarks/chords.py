@@ -1,4 +1,4 @@
-"""The sweep of one direction against its floor, a list per line, and Embree."""
+"""The sweep of one direction against its floor and Embree."""
 
 from __future__ import annotations
 
@@ -80,58 +80,6 @@ def floor(u, v, radius, first, spacing, lines, window):
     return total, count
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def list_chords(u, v, depth, radius, first, spacing, lines, window, filled, starts, ends):
-    """Put each line's chords behind one another; with no room for them, only count."""
-    for k in range(u.size):
-        low, high = chord_rows(v[k], radius[k], first, spacing, lines)
-        for row in range(low, high):
-            y = first + row * spacing
-            left, right, reach2 = chord_span(u[k], v[k], radius[k], y, first, spacing, window)
-            for line in range(row * lines + left, row * lines + right):
-                if starts.size > 0:
-                    du = first - u[k] + spacing * (line - row * lines)
-                    half = np.sqrt(max(reach2 - du * du, 0.0))
-                    starts[filled[line]] = depth[k] - half
-                    ends[filled[line]] = depth[k] + half
-                filled[line] += 1
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def merge(starts, ends, half, cutoff):
-    """Length and number of the kept gaps of a line."""
-    length, kept, solid = 0.0, 0, -half
-    for k in np.argsort(starts):
-        gap = min(starts[k], half) - solid
-        if gap >= cutoff:
-            length, kept = length + gap, kept + 1
-        solid = max(solid, ends[k])
-    if half - solid >= cutoff:
-        length, kept = length + half - solid, kept + 1
-    return length, kept
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def list_per_line(u, v, depth, radius, first, spacing, lines, window, cutoff):
-    """Lists of the chords of every line, sorted and merged; length and number of kept gaps."""
-    filled, none = np.zeros(lines * lines, np.int64), np.empty(0)
-    list_chords(u, v, depth, radius, first, spacing, lines, window, filled, none, none)
-    stops = np.cumsum(filled)
-    filled = stops - filled
-    starts, ends = np.empty(stops[-1]), np.empty(stops[-1])
-    list_chords(u, v, depth, radius, first, spacing, lines, window, filled, starts, ends)
-    length, kept, begin = 0.0, 0, 0
-    for line in range(lines * lines):
-        x, y = first + line % lines * spacing, first + line // lines * spacing
-        half2 = window * window - x * x - y * y
-        if half2 > 0.0:
-            part = slice(begin, stops[line])
-            found = merge(starts[part], ends[part], np.sqrt(half2), cutoff)
-            length, kept = length + found[0], kept + found[1]
-        begin = stops[line]
-    return length, kept
-
-
 class Projected:
     """The spheres along the axis, and the grid over the window."""
 
@@ -150,9 +98,6 @@ class Projected:
         with ThreadPoolExecutor(threads) as pool:
             return list(pool.map(lambda _: self.floor(), range(DIRECTIONS)))
 
-    def list_per_line(self):
-        return list_per_line(self.u, self.v, self.depth, self.radius, *self.grid, CUTOFF)
-
 
 def embree(projected: Projected, folder: Path):
     """A way that returns Embree's own seconds, without the time to load; None if there is none."""
@@ -169,14 +114,13 @@ def embree(projected: Projected, folder: Path):
 
 
 def chords(repeats: int) -> str:
-    """One direction in one thread: the scan, its floor, a list per line, and Embree."""
+    """One direction in one thread: the scan, its floor, and Embree."""
     solids = rv_solids()
     projected = Projected(solids)
     count = projected.floor()[1]
     ways = {
         "scanfab, variant c": partial(sweep, solids),
         FLOOR: projected.floor,
-        "list per line, sorted and merged (Numba)": projected.list_per_line,
     }
     note = f"\n\n{len(solids.radius):,} grains reach into the RV; {count:,} chords."
     with tempfile.TemporaryDirectory() as name:
