@@ -1,4 +1,4 @@
-"""The sweep of one direction against its floor and Embree."""
+"""The sweep of one direction against its floor and Embree, and what a scan's options cost."""
 
 from __future__ import annotations
 
@@ -9,15 +9,21 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numba import njit
+from scipy.spatial import ConvexHull
 
-from scanfab.base.shapes import sphere
+from scanfab.base.convex import Convex
+from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron, sphere
+from scanfab.scan.directions import DirectionRule
+from scanfab.scan.edges import EDGES
+from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.lines import line_triads
+from scanfab.scan.scan import ScanSums, scan_lines
 from scanfab.scan.solids import Solids
-from tests.benchmarks.packings import PAPER, dense, solids_near
-from tests.benchmarks.scans import CLOSE, CUTOFF, ONE_AXIS, sweep
+from tests.benchmarks.packings import PAPER, copied, dense, solids_near, tenth
 from tests.benchmarks.timing import interleaved, table
 
 HERE = Path(__file__).parent
@@ -25,6 +31,16 @@ HERE = Path(__file__).parent
 DIRECTIONS = 16
 EMBREE = "Embree 3, 16 rays a packet, all hits"
 FLOOR = "floor: only the square roots (Numba)"
+
+
+CLOSE, CUTOFF = 0.05, 0.5
+ONE_AXIS = DirectionRule("one", np.array([[0.36, 0.48, 0.8]]), np.ones(1), None, turned=False)
+
+
+def sweep(solids: Solids, variants: str = "c", directions: int = 1, **options: Any) -> ScanSums:
+    """A scan with one replicate for each direction."""
+    options = {"spacing": CLOSE, "cutoff": CUTOFF, **options}
+    return scan_lines(solids, ONE_AXIS, variants=variants, replicates=range(directions), **options)
 
 
 def rv_solids() -> Solids:
@@ -150,4 +166,49 @@ def threads(repeats: int) -> str:
     return table(["two threads", "of one"], [(n, f"{one:.2f}") for n, one in gain.items()])
 
 
-SECTIONS = {"chords": chords, "threads": threads}
+def shapes() -> dict[str, Convex]:
+    """Windows of one volume, that of a sphere of ten mean radii."""
+    corners = np.random.default_rng(0).normal(size=(20, 3))
+    corners /= np.linalg.norm(corners, axis=1, keepdims=True)
+    found = {
+        "cube": box([1.0, 1.0, 1.0]),
+        "cylinder, oblique": cylinder(1.0, 4.0, [1, 2, 3]),
+        "ellipsoid": ellipsoid([1.0, 1.0, 2.0]),
+        "polyhedron of 36 faces": polyhedron(corners, ConvexHull(corners).simplices)[0],
+    }
+    volume = sphere(10.0).volume
+    return {
+        name: shape.deformed(np.cbrt(volume / shape.volume) * np.eye(3))
+        for name, shape in found.items()
+    }
+
+
+def scans(repeats: int) -> str:
+    """What a chord costs by variants, edge rule and window, and in a cell that repeats."""
+    position, radius, edge = copied(2)
+    removed = tenth(len(radius))
+    medium = CellGrains(position, radius, removed, np.diag([edge] * 3), np.ones(3, bool))
+    ball, rules = sphere(10.0), [f"RV of 10 mean radii, `{rule}`" for rule in EDGES]
+    solids = {
+        "all grains, a": (Solids(position, radius, removed), "a"),
+        "all grains, ab": (Solids(position, radius, removed), "ab"),
+        "the same in a cell that repeats, ab": (
+            Solids(position, radius, removed, None, medium), "ab",
+        ),
+        **{name: (solids_near(ball, rule), "c") for name, rule in zip(rules, EDGES, strict=True)},
+        **{f"{name} of its volume": (solids_near(one), "c") for name, one in shapes().items()},
+    }  # fmt: skip
+    columns = []
+    for spacing, directions in ((CLOSE, 2), (1.5, 800)):
+        words: Any = {"spacing": spacing, "directions": directions}
+        ways = {name: partial(sweep, *one, **words) for name, one in solids.items()}
+        chords = {name: int(way().chords.sum()) for name, way in ways.items()}
+        # `start` has chords beyond the window as well, which count as its cost
+        chords |= dict.fromkeys(rules, chords[rules[0]])
+        seconds = interleaved(ways, repeats, clock=time.process_time)
+        columns.append([f"{1e9 * seconds[name] / chords[name]:.2f}" for name in ways])
+    titles = ["scan", f"ns a chord, lines {CLOSE} mean radii apart", "1.5 mean radii apart"]
+    return table(titles, list(zip(solids, *columns, strict=True)))
+
+
+SECTIONS = {"chords": chords, "threads": threads, "scans": scans}
