@@ -1,4 +1,4 @@
-"""Arrays as the package wants them: cast and checked once, at the border."""
+"""Casting and checking of arrays, once, where they enter the package."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scanfab.base.errors import PackingError
 from scanfab.base.typing import IntArray
 
-# lengths from LEAST to MOST: the cubes of these are still numbers
+# lengths lie between these, so that their cubes are still finite and above 0
 LEAST, MOST = 1e-100, 1e100
 
 
@@ -31,7 +31,7 @@ def cast(
         array = np.asarray(values)
         if array.size == 0 and shape[0] is None:
             array = np.zeros((0, *shape[1:]))  # an empty list
-        # nobody can change an array that is read-only and no view of another
+        # a read-only array that is no view of another can be shared, as nobody can change it
         shared = array.flags.owndata and not array.flags.writeable
         numbers = array.astype(array.dtype if dtype is None else dtype, copy=not shared)
     except (TypeError, ValueError) as error:
@@ -50,7 +50,7 @@ def cast(
 
 
 def all_within(values: npt.NDArray[np.float64], least: float, most: float) -> bool:
-    """Whether all are numbers from least to most; without a temporary array."""
+    """Whether all values lie from least to most; NaN does not. Makes no temporary array."""
     return values.size == 0 or bool(values.min() >= least and values.max() <= most)
 
 
@@ -62,7 +62,7 @@ def grains_named(id: IntArray, wrong: npt.NDArray[np.bool_]) -> str:
 
 
 def concatenated(parts: Sequence[Any]) -> Any:
-    """Arrays, or dataclasses and dicts of arrays, as one that has those of all parts in order."""
+    """Joins arrays end to end; in dicts and dataclasses, each array with its namesakes."""
     first = parts[0]
     if isinstance(first, np.ndarray):
         return np.concatenate(parts)

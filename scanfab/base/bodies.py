@@ -27,7 +27,7 @@ VOLUME_OF_BALL = {0: 1.0, 2: math.pi, 3: 4.0 / 3.0 * math.pi}
 
 
 def on_sphere() -> FloatArray:
-    """Points of the sphere of radius 1 along a spiral; all have a like share of its surface."""
+    """Points of the sphere of radius 1 along a spiral, with nearly equal shares of its surface."""
     z = 1.0 - (2.0 * np.arange(POINTS) + 1.0) / POINTS
     turn = np.arange(POINTS) * np.pi * (3.0 - np.sqrt(5.0))
     across = np.sqrt(1.0 - z**2)
@@ -50,7 +50,7 @@ class Product:
 
     def __init__(self, is_round: int, edges: int) -> None:
         self.is_round, size = is_round, is_round + edges
-        """Of how many axes the ball or disc is."""
+        """The number of axes of the ball (3) or disc (2); 0 without one."""
         axes = np.eye(3)[is_round:size]
         self.planes = np.column_stack([np.concatenate([axes, -axes]), np.ones(2 * edges)])
         self.form = np.repeat([1.0, 0.0], [is_round, 3 - is_round])
@@ -58,7 +58,7 @@ class Product:
         self.is_flat, self.size = size == 2, size
         self.outline = {0: np.zeros((1, 3)), 2: on_circle(), 3: on_sphere()}[is_round]
         for axis in axes:
-            # one way and back, so that the corners of a square follow one another around it
+            # forwards and backwards, so that the corners of a square come in order around it
             self.outline = np.concatenate([self.outline + axis, self.outline[::-1] - axis])
 
     def support(self, along: FloatArray) -> FloatArray:
@@ -110,7 +110,7 @@ class Hull:
     outline: FloatArray
     planes: FloatArray
     areas: FloatArray
-    """Of the face in each plane, shape (P,)."""
+    """The area of the face in each plane, shape (P,)."""
     volume: float
 
     is_symmetric, is_flat, form = False, False, np.zeros(3)
@@ -148,7 +148,7 @@ class Hull:
         sides = np.array([u / np.linalg.norm(u), np.cross(axis, u / np.linalg.norm(u))])
         across = self.outline @ sides.T
         low, extent = across.min(axis=0), np.ptp(across, axis=0)
-        # lines at irrational steps: no row of them meets an edge all along
+        # lines at irrational steps, so that no row of them runs along an edge
         number = np.arange(lines)
         places = np.column_stack([(number + 0.5) / lines, number * 0.6180339887498949 % 1.0])
         feet = (low + places * extent) @ sides

@@ -1,4 +1,4 @@
-"""The shapes of windows: by their sizes, or by their surface."""
+"""The shapes of windows, made from their sizes or from a surface."""
 
 from __future__ import annotations
 
@@ -170,9 +170,9 @@ def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatAr
     Parameters
     ----------
     points : ndarray, shape (N, 3)
-        Those at one place count as one.
+        Points at the same place count as one.
     triangles : ndarray of int, shape (T, 3)
-        Rows of the points, in whatever sense of turn.
+        Rows of the points, in either orientation.
 
     Returns
     -------
@@ -184,8 +184,7 @@ def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatAr
     Raises
     ------
     SettingsError
-        If the surface is flat, not closed or not convex, or has more faces than lines should be
-        cut by.
+        If the surface is flat, not closed or not convex, or has more than 1000 faces.
 
     Examples
     --------
@@ -201,7 +200,7 @@ def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatAr
     rows, triangles = np.unique(triangles, return_inverse=True)
     points = np.asarray(points, dtype=float)[rows]
     tolerance = TOLERANCE * float(np.abs(points).max(initial=0.0))
-    # numbers about the middle lose less by rounding
+    # coordinates about the middle lose less by rounding
     middle = points.mean(axis=0) if len(points) else np.zeros(3)
     points = points - middle
     try:
@@ -236,7 +235,7 @@ def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatAr
     volume = np.abs(np.linalg.det(corners))
     centroid = volume @ corners.sum(axis=1) / (4.0 * volume.sum())
     planes[:, 3] -= planes[:, :3] @ centroid
-    # each of its triangles belongs to the plane that faces its way
+    # each triangle belongs to the plane whose normal is nearest to its own
     sides = corners[:, 1:] - corners[:, :1]
     each = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     face = np.argmax(hull.equations[:, :3] @ planes[:, :3].T, axis=1)

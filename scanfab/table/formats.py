@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Rows = Iterable[Mapping[str, Any]]
 Columns = Sequence[Column]
 
-# cells of these columns stay words, even if they look like numbers: a source may be called 2024
+# cells of these columns stay texts even if they look like numbers: a source may be called 2024
 TEXT_COLUMNS = {one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind is str}
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
@@ -59,7 +59,7 @@ class TableFormat(Protocol):
 
 
 class OwnFormat:
-    """What the formats of the package share: they are told by the first characters of a file."""
+    """Base of the formats of the package, which are recognised by the first characters."""
 
     is_text = holds_lists = True
     start = b""
@@ -70,7 +70,7 @@ class OwnFormat:
 
 
 class SeparatedText(OwnFormat):
-    """CSV or TSV; any text that is no other format is read as one of them."""
+    """CSV or TSV; a text of no other format is read as one of the two."""
 
     holds_lists = False
 
@@ -129,7 +129,7 @@ def _text(data: bytes, name: str) -> str:
 
 
 class Json(OwnFormat):
-    """An object a row: all in one array, or one a line (JSON lines)."""
+    """An object for each row, all in one array or each on a line of its own (JSON lines)."""
 
     def __init__(self, suffix: str, start: bytes, description: str) -> None:
         self.suffix, self.start, self.description = suffix, start, description
@@ -192,8 +192,8 @@ def data_frame(rows: Sequence[Mapping[str, Any]], columns: Columns) -> polars.Da
     """
     Rows, whose values are of Python's own kinds, as a data frame of polars.
 
-    A column has the kind that is declared, or, in tables of other programs, one that holds all its
-    values: fractions among the counts, words among the numbers.
+    A column has its declared kind. In tables of other programs, where fractions stand among counts
+    or words among numbers, it has a kind that holds all its values.
     """
     import polars
 
@@ -236,7 +236,7 @@ def foreign_formats() -> tuple[TableFormat, ...]:
 
 
 def known_formats() -> dict[str, TableFormat]:
-    """All formats by suffix; the own ones cannot be replaced."""
+    """All formats by suffix; other packages cannot replace those of this one."""
     return {one.suffix: one for one in (*OWN_FORMATS, *foreign_formats()[::-1], *OWN_FORMATS)}
 
 
@@ -250,7 +250,7 @@ def format_of(path: Path) -> TableFormat:
         If there is none.
     """
     suffix = path.suffix.lower()
-    # other packages are asked only where they are needed, which takes a while
+    # looking for the formats of other packages takes a while, so it is done only if needed
     found = {one.suffix: one for one in OWN_FORMATS}.get(suffix) or known_formats().get(suffix)
     if found is None:
         raise SettingsError(
@@ -272,7 +272,7 @@ def read_rows(path: Path | str, *, whole: bool = False) -> list[dict[str, Any]]:
     path : path
         A file, or ``-`` for standard input.
     whole : bool, optional
-        Refuse a text whose last line has no end: a number there reads well without its last digits.
+        Refuse a text whose last line has no end, as its last number may have lost digits.
 
     Returns
     -------

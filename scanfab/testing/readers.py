@@ -1,4 +1,4 @@
-"""What every reader of packings must do, tried on files of its format, sound and damaged."""
+"""The check of readers of packings, on sound and damaged files of their format."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from scanfab.io.reader import FileKind, GrainTable, Reader, ReadOptions, Snapsho
 from scanfab.packing.packing import Packing
 from scanfab.testing.writers import differences
 
-# seconds that a small file may take
+# seconds in which a small file must be read
 LONGEST = 10.0
-# damaged files that are made of each
+# how many cut and how many otherwise damaged files are made of each file
 CUTS, DAMAGES = 40, 150
 FOREIGN = {
     "empty": b"",
@@ -57,10 +57,10 @@ def check_reader(
     folder : Path
         An empty folder for damaged files, such as pytest's ``tmp_path``.
     options : ReadOptions, optional
-        What the files need to be read.
+        Options that are needed to read the files.
     counts : bool, optional
-        Whether the format says how many grains there are, or where they end: then no file that is
-        cut off may be read as fewer grains.
+        Whether the format says how many grains there are, or where they end. A file that is cut
+        off must then be an error, not fewer grains.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def check_reader(
 
 
 def _check_sound(reader: Reader, file: Path, folder: Path, options: ReadOptions) -> int:
-    """Read a sound file twice, and packed; how many grains it has."""
+    """Read a sound file twice, and once compressed; the number of its grains."""
     before = file.read_bytes()
     packed = _put(folder, f"packed_{bare_name(file)}.gz", gzip.compress(plain(file).read_bytes()))
     with _quiet(file):
@@ -119,7 +119,7 @@ def _check_sound(reader: Reader, file: Path, folder: Path, options: ReadOptions)
 
 
 def _packings(reader: Reader, path: Path, options: ReadOptions) -> list[Packing]:
-    """The grains of each frame, which must make a packing."""
+    """The packing of each frame."""
     found = []
     for snapshot in reader.snapshots(path):
         assert isinstance(snapshot, Snapshot), f"{path.name}: snapshots() gives Snapshot objects"
@@ -139,7 +139,7 @@ def _check_damaged(
     data, random = file.read_bytes(), Random(0)
     for place in sorted({random.randrange(len(data)) for _ in range(CUTS)}):
         found = _try_all(reader, _put(folder, f"cut_{file.name}", data[:place]), options)
-        # nothing but blanks may be missing without harm
+        # only blanks may be missing without harm
         assert found is None or found >= least or not data[place:].strip(), (
             f"{file.name} cut off after {place} bytes is read as {found} of {least} grains: a part "
             f"of a file must be an error"
@@ -165,7 +165,7 @@ def _damaged(data: bytes, random: Random) -> bytes:
 
 
 def _try_all(reader: Reader, path: Path, options: ReadOptions) -> int | None:
-    """Everything that a reader is asked about a file; the number of grains if it can be read."""
+    """Ask a reader all that the package asks it; the number of grains if it reads the file."""
 
     def count(path: Path) -> int:
         tables = (reader.read_grains(snapshot, options) for snapshot in reader.snapshots(path))
@@ -181,7 +181,7 @@ def _try_all(reader: Reader, path: Path, options: ReadOptions) -> int | None:
 
 
 def _asked(what: str, call: Callable[[Path], T], path: Path) -> T | None:
-    """What a call gives, None if it raises an error of scanfab's; anything else is wrong."""
+    """The answer of a call; None if it raises a ScanfabError. Other errors fail the check."""
     with _quiet(path):
         try:
             return call(path)
@@ -199,7 +199,7 @@ def _asked(what: str, call: Callable[[Path], T], path: Path) -> T | None:
 
 @contextlib.contextmanager
 def _quiet(path: Path) -> Iterator[None]:
-    """Nothing may be printed, and no warnings but scanfab's."""
+    """Fails if anything is printed, or if a warning is not scanfab's."""
     out = io.StringIO()
     with (
         warnings.catch_warnings(record=True) as caught,

@@ -1,7 +1,7 @@
 """
-What every writer of packings must do: what it writes is read back, to the last bit.
+The check of writers of packings: what they write must be read back to the last bit.
 
-Packings that ask everything of a format, and in what two packings differ.
+Also packings that need everything of a format, and the differences of two packings.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from scanfab.packing.contacts import ContactList
 from scanfab.packing.packing import Packing
 from scanfab.packing.search import find_contacts
 
-# no decimal number has these ids
+# ids that no float can hold
 LARGE = 2**60 + 1
 
 
@@ -46,7 +46,7 @@ def check_writer(
     Raises
     ------
     AssertionError
-        That says what got lost.
+        If something was lost; the message says what.
 
     Examples
     --------
@@ -172,7 +172,7 @@ def differences(one: Packing, two: Packing) -> list[str]:
 
 
 def _values_of(packing: Packing) -> dict[str, Any]:
-    """All that a packing holds, by the names of messages; None: it has no such thing."""
+    """All that a packing holds, by names for messages; None for what it does not have."""
     parts = {
         "": ("position", "radius", "id", "wall_contacts", "step", "time"),
         "cell": ("vectors", "origin", "periodic"),
