@@ -198,16 +198,3 @@ def test_lines_in_channels_are_counted_in_a_warning():
             packing, variants="a", directions="equal-angle-full:45", spacing=0.1, cutoff=0.0,
             tolerance=10.0,
         )  # fmt: skip
-
-
-def test_open_axes_end_at_the_first_and_last_solid():
-    """A layer of touching grains below another: no gap is above or below them."""
-    packing = Packing(
-        [[0.5, 0.5, 0.0], [0.5, 0.5, 2.0]], 0.5, cell=Cell([1.0, 1, 9], (True, True, False))
-    )
-    row = compute(
-        packing, variants="a", directions=50, spacing=0.03, cutoff=0.0, tolerance=1,
-        contact_tolerance=1e-4,
-    )[0]  # fmt: skip
-    assert row.solid_fraction is None
-    assert 0.5 < row.mean_length < 2.5
