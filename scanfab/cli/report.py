@@ -8,9 +8,9 @@ from typing import Any
 
 import click
 
-from scanfab.cli.console import Command
+import scanfab
+from scanfab.cli.console import Command, announce, working
 from scanfab.cli.options import OF_SEVERAL, check_labels, options, usage_errors
-from scanfab.cli.talk import announce_compiling, talk_options, working
 
 
 @click.command(cls=Command)
@@ -28,7 +28,6 @@ from scanfab.cli.talk import announce_compiling, talk_options, working
 )
 @options("cutoff", **OF_SEVERAL)
 @options("labels")
-@talk_options
 def report(tables: tuple[Path, ...], output: Path, author: str | None, **chosen: Any) -> int:
     """
     Write a report on fabric tables: one HTML file that opens without a network.
@@ -37,14 +36,15 @@ def report(tables: tuple[Path, ...], output: Path, author: str | None, **chosen:
     come from TABLE.manifest.json beside it; without it, the report says that they are not known.
     """
     from scanfab.viz.report.page import check_page_file
-    from scanfab.viz.report.report import make_report
 
     check_labels(chosen["labels"], tables)
     with usage_errors():
         check_page_file(output)
-    announce_compiling()
+    announce()
     with working():
-        made = make_report(tables, author=_full_name() if author is None else author, **chosen)
+        made = scanfab.make_report(
+            tables, author=_full_name() if author is None else author, **chosen
+        )
     made.save(output)
     if not made.has_void_fabric:
         click.echo("scanfab: warning: no row of the tables has a void fabric", err=True)

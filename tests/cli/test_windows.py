@@ -103,8 +103,11 @@ def test_shape_and_surface_are_resumed_unless_the_file_has_changed(compute, tmp_
     [
         (["--rv-shape", "box", "--rv-size", "1,2"], "--rv-size: expected A,B,C, full edges"),
         (["--rv-size", "1,2,3"], "--rv-size: the shape sphere takes none: choose --rv-radius"),
-        (["--rv-shape", "box", "--rv-radius", "2"], "--rv-radius: is that of a sphere"),
-        (["--rv-shape", "box", "--rv-axis", "x"], "--rv-axis: is that of a cylinder"),
+        (
+            ["--rv-shape", "box", "--rv-radius", "2"],
+            "--rv-radius: has no meaning if",
+        ),
+        (["--rv-shape", "box", "--rv-axis", "x"], "choose --rv-shape cylinder"),
         (["--rv-shape", "none.stl"], "closed convex surface that exists (.stl .vtp .ply .obj)"),
         (["--rv-follows", "sand"], "--rv-follows: expected none or strain"),
     ],
