@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from scanfab.base.errors import DimensionError
 from scanfab.base.space import Space
+from scanfab.base.spelling import spelt_place
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import AXES, Axis, UsualAxis, as_written
 from scanfab.scan.directions import DirectionRule, rule_of
@@ -49,8 +50,10 @@ def _axis(axis: Axis, space: Space) -> Axis:
         return AXES["xyz"[max(space.along)]]
     if abs(axis[space.across]) > ROUNDING:
         first, second = ("xyz"[k] for k in sorted(space.along))
+        named = as_written(axis)
+        asked = named if isinstance(named, str) else spelt_place(axis)
         raise DimensionError(
-            f"axis: the axis {as_written(axis)} leads out of {space}, in which all discs "
+            f"axis: the axis {asked} leads out of {space}, in which all discs "
             f"lie: choose {first}, {second}, or another axis in the plane"
         )
     if axis[space.across] == 0.0:

@@ -125,11 +125,3 @@ def test_what_cannot_be_compared_is_one_message(tmp_path, compare, text, words, 
         assert answer.err.startswith("scanfab: error: ")
         assert message in answer.err
     assert output.read_text() == "precious"
-
-
-@pytest.mark.parametrize(
-    "words", [["--summary", "--differences"], ["-o", "out.docx"], ["nowhere.csv"]]
-)
-def test_wrong_usage(tmp_path, compare, table, words, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert compare(table(curve()), *words, code=2).out == ""

@@ -59,20 +59,6 @@ def pairs(tmp_path):
     return pairs
 
 
-@pytest.mark.parametrize(
-    ("frames", "words"),
-    [
-        ([(GRID, TWOS), (GRID, (np.arange(len(GRID)) + 1) // 2)], "frame 1: other spheres are one"),
-        ([(GRID, TWOS), (GRID[:-4], TWOS[:-4] + 7)], "frame 1: 30 grains of 60 spheres, where"),
-        ([(GRID, np.append(TWOS[:-1], 0))], "1 body of several spheres, such as number 0, reach"),
-    ],
-)
-def test_bodies_that_change_or_cannot_be_are_told(compute, dump, frames, words):
-    for step, (position, bodies) in enumerate(frames):
-        dump(step, position, bodies)
-    assert words in compute()
-
-
 @pytest.mark.parametrize("source", ["liggghts_periodic", "yade_triaxial", "lammps_discs"])
 def test_that_each_sphere_is_a_grain_can_be_said_of_spheres(ask, source):
     words = ("compute", SAMPLE_DATA / source, "--tolerance", "0.02", "--workers", "1")
@@ -100,29 +86,6 @@ def test_frames_of_mixed_dimension_are_an_error(compute, dump, frames, words):
     for step, position in enumerate(frames):
         dump(step, position)
     assert words in compute(code=1)
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--axis", "z"), "--axis: the axis z leads out of the plane x-y"),
-        (("--axis", "0,1,1"), "leads out of the plane x-y"),
-        (("--rv-shape", "cylinder"), "--rv-shape: cylinder is no window of discs"),
-        (("--rv-shape", "box", "--rv-size", "1,1,1"), "--rv-size: expected two, A,B"),
-        (("--rv-center", "7", "7", "3"), "--rv-center: lies outside the plane x-y"),
-        (("--directions", "lebedev:11"), "--directions: lebedev:11 is a rule of three dimensions"),
-    ],
-)
-def test_what_is_of_space_is_refused_of_discs(ask, words, message):
-    # a place is right or wrong by the data, an option by the plane
-    code = 1 if "--rv-center" in words else 2
-    words = (*FAST, *words, "--contacts", "geometric")
-    assert message in ask("compute", DISCS, *words, code=code).told
-
-
-def test_a_map_of_discs_is_refused(ask):
-    answer = ask("map", DISCS, "--contacts", "geometric", "--grid", "2,2,1", code=1)
-    assert "spheres in space, but all grains are discs" in answer.told
 
 
 def _not_a_number(rows):

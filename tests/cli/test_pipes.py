@@ -171,13 +171,3 @@ def test_a_dash_goes_with_columns_and_digits_and_is_compared(packed, capsys, tmp
     assert list(rows[0]) == ["variant", "frame", "alpha_vs_axial"]
     for row in rows:
         assert float(row["alpha_vs_axial"]) == float(f"{float(row['alpha_vs_axial']):.2g}")
-
-
-def test_a_dash_cannot_be_gone_on_with(packed, capsys):
-    assert run(["compute", str(packed), "-o", "-", "--resume"]) == 2
-    assert "--resume goes with -o FILE" in capsys.readouterr().err
-
-
-def test_a_column_that_does_not_exist_is_wrong_usage(packed, capsys):
-    assert run(["compute", str(packed), "--fields", "frame,alpha_v"]) == 2
-    assert "fields: there is no column 'alpha_v': did you mean alpha_vs?" in capsys.readouterr().err
