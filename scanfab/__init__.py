@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-# same as typing.TYPE_CHECKING; importing typing here would delay the answer to Ctrl-C
-TYPE_CHECKING = False
+# same as typing.TYPE_CHECKING; importing typing here would delay the answer to Ctrl-C. Jedi, which
+# completes names in notebooks and editors, skips the block below if the type is not written out.
+TYPE_CHECKING: bool = False
 
 if TYPE_CHECKING:
     # for editors and type checkers: "as" says that a name is public

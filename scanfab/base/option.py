@@ -110,12 +110,6 @@ reading, sample, window, scan, fabric = (partial(option, group=group) for group 
 running = partial(option, decides=False)
 
 
-def changed(holder: type, name: str, **changes: Any) -> Any:
-    """A field that declares an option of another dataclass once more, with some changes."""
-    (declared,) = (one.metadata for one in fields(holder) if one.name == name)
-    return option(**{**declared, **changes})
-
-
 def options_of(holder: type) -> tuple[Option, ...]:
     """The options that the fields of a dataclass declare."""
     helps: dict[str, str] = {}

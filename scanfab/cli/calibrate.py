@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import scanfab
-from scanfab.cli.console import announce, is_readable, print_csv, print_rows, working
+from scanfab.cli.console import announce, draw, is_readable, print_csv, print_rows, working
 from scanfab.cli.options import SourceCommand, checked, excerpt_of, open_one, options, take_output
 from scanfab.pipeline.options import as_options
 
@@ -63,7 +63,6 @@ def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
     from scanfab.pipeline.record import asked_for
     from scanfab.pipeline.repeat import repeat_command
     from scanfab.table.writing import write_rows
-    from scanfab.viz.figures.page import make_figures, save_figures
 
     asked = take_output(chosen)
     columns = columns_of_fields(StepRow)
@@ -79,8 +78,7 @@ def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
     command = repeat_command(asked_for(sources, reading, replace(settings, **best)))
     if asked.output is not None:
         write_rows(asked.output, rows, columns, excerpt)
-    if asked.plot is not None:
-        save_figures(asked.plot, make_figures(rows, "calibration"))
+    draw(asked, rows, "calibration")
     tells_all = asked.output is not None or is_readable()
     if not tells_all:
         print_csv(rows, excerpt, columns)

@@ -8,8 +8,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import scanfab
-from scanfab.cli.console import Command, is_readable, print_csv, print_rows
-from scanfab.cli.options import OF_SEVERAL, check_labels, excerpt_of, options, take_output
+from scanfab.cli.console import Command, draw, is_readable, print_csv, print_rows
+from scanfab.cli.options import (
+    OF_SEVERAL,
+    check_labels,
+    excerpt_of,
+    options,
+    tables_argument,
+    take_output,
+)
 
 if TYPE_CHECKING:
     from scanfab.table.compare import Comparison
@@ -30,13 +37,7 @@ MOST_BARS = 15
 
 
 @click.command(cls=Command)
-@click.argument(
-    "tables",
-    metavar="TABLE...",
-    nargs=-1,
-    required=True,
-    type=click.Path(exists=True, dir_okay=False, allow_dash=True),
-)
+@tables_argument(allow_dash=True)
 @click.option("--summary", is_flag=True, help="One row per source and variant: slopes and peaks.")
 @click.option(
     "--differences", is_flag=True, help="One row per frame and pair of variants: how far apart."
@@ -59,7 +60,6 @@ def compare(tables: tuple[str, ...], summary: bool, differences: bool, **chosen:
     """
     from scanfab.table.selection import choose_rows
     from scanfab.table.writing import ALL, write_rows
-    from scanfab.viz.figures.page import make_figures, save_figures
 
     asked = take_output(chosen, "table")
     if summary and differences:
@@ -81,8 +81,7 @@ def compare(tables: tuple[str, ...], summary: bool, differences: bool, **chosen:
         print_comparison(comparison)
     else:
         print_csv(found, excerpt, found.columns)
-    if asked.plot is not None:
-        save_figures(asked.plot, make_figures(rows, "table", asked.figure, comparison=comparison))
+    draw(asked, rows, "table", comparison=comparison)
     return 0 if any(row.alpha_vs_axial is not None for row in comparison.frames) else 1
 
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from scanfab.base.column import DEFAULT_DIGITS
-from scanfab.base.errors import ScanfabNote, ScanfabWarning
+from scanfab.base.errors import ScanfabNote
 from scanfab.base.spelling import spelt_time
 from scanfab.io.files import without_temporary
 from scanfab.pipeline.options import as_options
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from scanfab.base.column import Column
     from scanfab.io.series import Series
+    from scanfab.pipeline.options import Output
     from scanfab.table.row import Row
     from scanfab.table.writing import Excerpt
 
@@ -65,12 +66,9 @@ class Command(click.Command):
 
     def __init__(self, *args: Any, **more: Any) -> None:
         super().__init__(*args, **more)
+        flag: Any = {"is_flag": True, "expose_value": False, "callback": _choose_level}
         for name, words in LEVELS.items():
-            flag = [f"--{name}"]
-            option = click.Option(
-                flag, is_flag=True, expose_value=False, callback=_choose_level, help=words
-            )
-            self.params.append(option)
+            self.params.append(click.Option([f"--{name}"], help=words, **flag))
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command."""
@@ -96,9 +94,8 @@ def _reported_warnings() -> Iterator[Told]:
             say(f"{'note' if is_note else 'warning'}: {as_options(str(message))}")
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        warnings.simplefilter("always", ScanfabWarning)
-        warnings.simplefilter("always", ScanfabNote)
+        # those of other packages are heard and left out
+        warnings.simplefilter("always")
         warnings.showwarning = show
         yield told
 
@@ -279,7 +276,17 @@ def print_rows(
 
 
 def spelt(value: Any, digits: int = 3) -> str:
-    """A value in so many digits, and a dash for none."""
+    """A value in so many digits, several with commas, and a dash for none."""
+    if isinstance(value, list):
+        return ", ".join(spelt(one, digits) for one in value)
     if value is None:
         return "-"
     return f"{value:.{digits}g}" if isinstance(value, float) else str(value)
+
+
+def draw(asked: Output, data: Any, kind: str, **more: Any) -> None:
+    """Draw the figures that are asked for; ``more`` is what figures share."""
+    from scanfab.viz.figures.page import make_figures, save_figures
+
+    if asked.plot is not None:
+        save_figures(asked.plot, make_figures(data, kind, asked.figure, **more))

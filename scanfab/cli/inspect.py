@@ -54,10 +54,4 @@ def _print(report: FrameReport) -> None:
     told = fields.pop("warnings")
     click.echo(click.style(title, bold=True))
     for name, value in [*fields.items(), *(("warning", text) for text in told)]:
-        click.echo(f"  {name:<13} {_spell(value)}")
-
-
-def _spell(value: Any) -> str:
-    if isinstance(value, list):
-        return ", ".join(map(_spell, value))
-    return spelt(value, 6)
+        click.echo(f"  {name:<13} {spelt(value, 6)}")

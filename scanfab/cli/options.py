@@ -194,6 +194,12 @@ def excerpt_of(asked: Output, columns: Sequence[Column]) -> Excerpt:
         return Excerpt.make(columns, asked.fields, asked.digits)
 
 
+def tables_argument(**more: Any) -> Callable[[Function], Function]:
+    """The argument of commands that take tables."""
+    a_table = click.Path(exists=True, dir_okay=False, **more)
+    return click.argument("tables", metavar="TABLE...", nargs=-1, required=True, type=a_table)
+
+
 def check_labels(labels: tuple[str, ...], tables: tuple[Any, ...]) -> None:
     """A usage error if some tables have a label, and others none."""
     if labels and len(labels) != len(tables):

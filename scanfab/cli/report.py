@@ -10,17 +10,11 @@ import click
 
 import scanfab
 from scanfab.cli.console import Command, announce, working
-from scanfab.cli.options import OF_SEVERAL, check_labels, options, usage_errors
+from scanfab.cli.options import OF_SEVERAL, check_labels, options, tables_argument, usage_errors
 
 
 @click.command(cls=Command)
-@click.argument(
-    "tables",
-    metavar="TABLE...",
-    nargs=-1,
-    required=True,
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-)
+@tables_argument(path_type=Path)
 @options("output", callback=None, required=True, metavar="FILE.html", help="The report.")
 @click.option("--title", metavar="TEXT", help="Title (default: the sources' names).")
 @click.option(
@@ -41,10 +35,9 @@ def report(tables: tuple[Path, ...], output: Path, author: str | None, **chosen:
     with usage_errors():
         check_page_file(output)
     announce()
+    author = _full_name() if author is None else author
     with working():
-        made = scanfab.make_report(
-            tables, author=_full_name() if author is None else author, **chosen
-        )
+        made = scanfab.make_report(tables, author=author, **chosen)
     made.save(output)
     if not made.has_void_fabric:
         click.echo("scanfab: warning: no row of the tables has a void fabric", err=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import scanfab
-from scanfab.cli.console import announce, is_readable, print_csv, print_table, working
+from scanfab.cli.console import announce, draw, is_readable, print_csv, print_table, working
 from scanfab.cli.options import checked, excerpt_of, open_series, take_output, usage_errors
 from scanfab.cli.settings_file import as_listed
 from scanfab.cli.signals import ending_in_order, telling
@@ -89,36 +89,31 @@ def write_table(sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Set
 
 
 class _Drawing:
-    """The figures of a table, if they are asked for, and the columns that they need."""
+    """The figures of a table, if they are asked for."""
 
     def __init__(self, asked: Output, kinds: tuple[str, ...]) -> None:
         from scanfab.table.plots import figures_of
         from scanfab.viz.figures.page import find_figure
 
-        self.plot, self.figure, self.kind = asked.plot, asked.figure, kinds[0]
-        figures = [] if self.plot is None else list(figures_of(self.kind).values())
-        if self.figure is not None:
-            figures = [find_figure(self.figure, *kinds)[0]]
+        self.asked, self.kind, self._drawn = asked, kinds[0], 0
+        figures = list(figures_of(self.kind).values()) if asked.plot is not None else []
+        if asked.figure is not None:
+            figures = [find_figure(asked.figure, *kinds)[0]]
             self.kind = figures[0].kind
         self.needed = tuple(dict.fromkeys(name for one in figures for name in one.columns))
-        self._drawn = 0
+        """The columns that they need."""
 
     def draw(self, job: Job) -> None:
         """Draw the rows that there are."""
-        from scanfab.viz.figures.page import make_figures, save_figures
-
-        if self.plot is None:
-            return
-        if not job.found_void_fabric:
-            click.echo(f"scanfab: {self.plot} is not drawn: no row has a void fabric", err=True)
-            return
-        rows = job.every_row
-        data: Any = scanfab.Table(rows, job.settings.columns)
-        if self.kind == "frames":
-            data = scanfab.ScannedFrames(job.series[0], job.settings, rows)
-        comparison = scanfab.compare_tables(rows) if self.kind == "table" else None
-        figures = make_figures(data, self.kind, self.figure, comparison=comparison)
-        save_figures(self.plot, figures)
+        plot, rows = self.asked.plot, job.every_row
+        if plot is not None and not job.found_void_fabric:
+            click.echo(f"scanfab: {plot} is not drawn: no row has a void fabric", err=True)
+        elif self.kind == "frames":
+            draw(self.asked, scanfab.ScannedFrames(job.series[0], job.settings, rows), self.kind)
+        elif plot is not None:
+            comparison = scanfab.compare_tables(rows) if self.kind == "table" else None
+            table = scanfab.Table(rows, job.settings.columns)
+            draw(self.asked, table, self.kind, comparison=comparison)
 
     def redraw(self, job: Job) -> None:
         """Draw a series that is followed if there are new frames; a new scan waits for the end."""

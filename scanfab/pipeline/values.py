@@ -169,9 +169,8 @@ def parse_axis(name: str, text: str | Iterable[float] | None) -> Axis:
     return Axis(*(part / math.hypot(*vector) for part in vector))
 
 
-def parse_rv_axis(name: str, text: str | Iterable[float] | None) -> Axis | None:
-    """The same for an axis that is that of the settings if none is given."""
-    return None if text is None else parse_axis(name, text)
+# of a cylinder, which has the loading axis if none is given
+parse_rv_axis = optional(parse_axis)
 
 
 def parse_fractions(name: str, value: Any) -> float | tuple[float, ...]:

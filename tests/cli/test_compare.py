@@ -74,22 +74,11 @@ def test_several_tables_stand_side_by_side_under_their_labels(compare, table):
     assert "expected one a table: 2, found 1" in compare(*given, "--label", "coarse", code=2).err
 
 
-def test_the_largest_strain_is_that_of_the_fit(compare, table):
-    (row,) = compare(table(curve()), "--summary", "--strain-max", "0.02").rows
-    assert (row["frames"], row["slope_se"]) == ("3", "")
-
-
 def test_the_rows_of_one_cutoff_are_chosen(compare, table):
     given = table([{**row, "cutoff": c} for row in curve() for c in (0.0, 0.5, 1.0)])
     assert "choose one cut-off with --cutoff" in compare(given, code=1).err
     assert len(compare(given, "--cutoff", "0.5").rows) == 5
     assert "expected one of the table's: 0, 0.5, 1" in compare(given, "--cutoff", "0.7", code=1).err
-
-
-def test_the_same_table_twice_counts_once(compare, table):
-    printed = compare(*[table(curve())] * 2)
-    assert len(printed.rows) == 5
-    assert printed.err.count("warning") == 1
 
 
 def test_a_dash_is_standard_input(compare, table, monkeypatch):
