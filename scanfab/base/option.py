@@ -18,6 +18,7 @@ from typing import Any, ParamSpec, TypeVar
 from scanfab.base.errors import SettingsError
 
 Parse = Callable[[str, Any], Any]
+Floats = tuple[float, ...]
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -210,9 +211,7 @@ def whole(expected: str, holds: Callable[[int], bool]) -> Parse:
     return parse
 
 
-def numbers(
-    expected: str, holds: Callable[[tuple[float, ...]], bool]
-) -> Callable[[str, Any], tuple[float, ...]]:
+def numbers(expected: str, holds: Callable[[Floats], bool]) -> Callable[[str, Any], Floats]:
     """A parser of several finite numbers, in a text between commas or blanks or in a sequence."""
 
     def parse(name: str, value: Any) -> tuple[float, ...]:
