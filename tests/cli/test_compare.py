@@ -85,6 +85,9 @@ def test_a_dash_is_standard_input(compare, table, monkeypatch):
     data = table(curve()).read_bytes()
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data)))
     assert len(compare("-").rows) == 5
+    # what a command that failed before it leaves
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO()))
+    assert compare("-", code=1).err == "scanfab: error: -: expected a table, found nothing\n"
 
 
 def test_tables_without_a_void_fabric_are_exit_code_1(compare, table):

@@ -38,12 +38,6 @@ def series(tmp_path):
 
 
 @pytest.fixture
-def other(tmp_path):
-    (tmp_path / "other").mkdir()
-    return write(tmp_path / "other" / "dump_1.txt", dump_text(cubic_rows())).parent
-
-
-@pytest.fixture
 def table(tmp_path):
     rows = [*curve(), *curve(variant="d")]
     return write(tmp_path / "t.jsonl", "".join(json.dumps(row) + "\n" for row in rows))
@@ -74,13 +68,6 @@ def test_a_resumed_run_draws_all_frames_and_keeps_their_files(series, tmp_path, 
     compute(part, "--resume")
     for name in ("t.csv", "t.svg", "vtk/distribution-c.pvd"):
         assert (part / name).read_bytes() == (whole / name).read_bytes()
-
-
-def test_several_series_have_folders_of_their_own(series, other, tmp_path, ask):
-    vtk = tmp_path / "vtk"
-    ask("compute", series, other, *FAST, "--vtk", vtk)
-    assert {path.name for path in vtk.iterdir()} == {"series-1", "series-2"}
-    assert len(list((vtk / "series-1").glob("grains_*.vtp"))) == 4
 
 
 def test_compare_draws_the_fit_that_it_prints(table, tmp_path, ask):
