@@ -271,8 +271,9 @@ def print_rows(
     for name in columns[: stay - 1 : -1]:
         if len("  ".join(cells[0] for cells in texts.values())) > room:
             texts.pop(name, None)
-    for number, line in enumerate(zip(*texts.values(), strict=True)):
-        click.secho("  ".join(line).rstrip(), bold=number == 0)
+    for line in zip(*texts.values(), strict=True):
+        # by this stream, which spells what a terminal has no letter for
+        click.echo("  ".join(line).rstrip(), file=sys.stdout)
 
 
 def spelt(value: Any, digits: int = 3) -> str:

@@ -46,6 +46,7 @@ def folder(tmp_path, monkeypatch):
         ("compute cube --format nonsense", 2, "there is no reader called 'nonsense'; the readers"),
         ("compute cube --cell 1 2", 2, "--cell: expected three lengths"),
         ("compute cube --columns radius", 2, "--columns: expected NAME=COLUMN"),
+        ("compute cube --columns x=1,x=2", 2, "--columns: expected one column as x"),
         ("compute cube --follow-for -1", 2, "--follow-for"),
         ("compute cube --rv -1 -o out.csv", 2, "--rv: expected a fraction above 0"),
         ("compute cube --rv-shape none.stl", 2, "surface that exists (.stl .vtp .ply .obj)"),
