@@ -12,12 +12,15 @@ import numpy.typing as npt
 
 from scanfab.base.arrays import MOST, doubles
 from scanfab.base.errors import ReadError
-from scanfab.base.typing import FloatArray, IntArray
-from scanfab.io.reader import BODIES, WALLS, GrainTable, ReadOptions
+from scanfab.base.typing import AnyArray, Columns, FloatArray, IntArray
+from scanfab.io.reader import GrainTable, ReadOptions
 from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
 from scanfab.packing.cell import Cell
 
-Columns = Mapping[str, npt.NDArray[Any]]
+BODIES = "scanfab_bodies"
+"""A column of this name is the number of each sphere's body, whatever other columns say."""
+WALLS = "scanfab_wall_contacts"
+"""A column of this name is the number of contacts with walls of each grain."""
 
 # names are compared without regard to case
 RADIUS_NAMES = ("radius", "radii", "rad", "r", "f_radius")
@@ -102,10 +105,8 @@ def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | Non
     if periodic is None:
         return cell
     if cell is None:
-        raise ReadError(
-            f'{path}: `periodic="{asked}"` was asked for, but the dump names no cell: give it with '
-            f"`cell=(LX, LY, LZ)`"
-        )
+        lacks = f'`periodic="{asked}"` needs a cell, which the dump does not name'
+        raise ReadError(f"{path}: {lacks}: give it with `cell=(LX, LY, LZ)`")
     return Cell(cell.vectors, periodic, cell.origin)
 
 
@@ -140,10 +141,8 @@ def _named_by_user(path: Path, columns: Columns, options: ReadOptions) -> dict[s
     rest, named = dict(columns), {}
     for standard, own in options.columns.items():
         if own not in rest:
-            raise ReadError(
-                f"{path}: there is no column {own!r} to serve as {standard}; "
-                f"the columns are {', '.join(rest)}"
-            )
+            there = f"the columns are {', '.join(rest)}"
+            raise ReadError(f"{path}: there is no column {own!r} to serve as {standard}; {there}")
         named[standard] = rest.pop(own)
     # a column that the file calls by a standard name is something else
     return {name + "_of_dump" * (name in named): one for name, one in rest.items()} | named
@@ -170,10 +169,8 @@ def _position(
         # what is not finite is the packing's to refuse
         with np.errstate(over="ignore", invalid="ignore"):
             return np.asarray(cell.origin + position @ cell.vectors)
-    raise ReadError(
-        f"{where}: no coordinates: expected the columns x y z (or xu yu zu, xs ys zs), found "
-        f'{", ".join(rest) or "none"}; name them with `columns={{"x": ..., "y": ..., "z": ...}}`'
-    )
+    there, advice = ", ".join(rest) or "none", '`columns={"x": ..., "y": ..., "z": ...}` names them'
+    raise ReadError(f"{where}: no coordinates (x y z, xu yu zu, xs ys zs) in {there}; {advice}")
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -207,23 +204,19 @@ def _radius(where: str, rest: dict[str, Any], options: ReadOptions, count: int) 
         row = None if other is None else other_size(radius, rest[other])
         if row is not None:
             names = own.get("radius", name), own.get("diameter", other)
-            raise ReadError(
-                f"{where}: the columns {names[0]!r} and {names[1]!r} contradict each other at "
-                f'grain {row + 1}: name the right one: `columns={{"radius": "{names[0]}"}}` or '
-                f'`columns={{"diameter": "{names[1]}"}}`'
-            )
+            told = f"the columns {names[0]!r} and {names[1]!r} contradict each other"
+            advice = f'`columns={{"radius": "{names[0]}"}}` names one'
+            raise ReadError(f"{where}: {told} at grain {row + 1}: {advice}")
         return radius
     if other is not None:
         return 0.5 * _lengths(where, rest.pop(other), "a diameter")
     like = next((name for name in rest if LIKE_A_RADIUS.search(name)), "...")
-    raise ReadError(
-        f"{where}: no radius: expected a column radius (or diameter), found "
-        f'{", ".join(rest) or "none"}; name it with `columns={{"radius": "{like}"}}`'
-        f"{' (if that is one)' * (like != '...')}, or give one radius for all grains with `radius`"
-    )
+    found, doubt = ", ".join(rest) or "none", " (if that is one)" * (like != "...")
+    advice = f'name it with `columns={{"radius": "{like}"}}`{doubt}, or give all grains a `radius`'
+    raise ReadError(f"{where}: no radius: expected radius or diameter, found {found}; {advice}")
 
 
-def other_size(radius: FloatArray, diameter: npt.NDArray[Any]) -> int | None:
+def other_size(radius: FloatArray, diameter: AnyArray) -> int | None:
     """
     The first grain whose diameter is not twice its radius, as nearly as numbers are printed.
 
@@ -253,11 +246,8 @@ def _refuse_superquadrics(where: str, rest: Columns, radius: FloatArray) -> None
         value = expected[name.lower()]
         count = np.count_nonzero(np.abs(rest[name] - value) > SIX_DIGITS * np.abs(value))
         if count:
-            raise ReadError(
-                f"{where}: {count} of {len(radius)} particles are superquadrics (by the column "
-                f"{name}): fill them with spheres, and say with `bodies` which of these are one "
-                f"particle"
-            )
+            told = f"{count} of {len(radius)} particles are superquadrics (by the column {name})"
+            raise ReadError(f"{where}: {told}: fill them with spheres, to be joined by `bodies`")
 
 
 def first_of(known: Sequence[str], names: Iterable[str]) -> str | None:
@@ -324,9 +314,7 @@ def body_numbers(path: Path, grains: GrainTable, named: str | None) -> IntArray 
     if name is None or not len(grains.radius) or (name == "id" and name not in columns):
         return None
     if name not in columns:
-        raise ReadError(
-            f"{path}: there is no column {name!r} to say which spheres are one body (`bodies`); "
-            f"the columns are {', '.join(['id', *columns])}"
-        )
+        there = ", ".join(["id", *columns])
+        raise ReadError(f"{path}: `bodies`: there is no column {name!r}; the columns are {there}")
     numbers = whole_numbers(path, columns[name], f": `bodies`: the column {name}")
     return np.where(numbers > 0, numbers, -1) if name.lower() in MOLECULE_COLUMNS else numbers

@@ -13,14 +13,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
-from scanfab.io.columns import whole_numbers
+from scanfab.base.typing import Columns
+from scanfab.io.columns import BODIES, WALLS, whole_numbers
 from scanfab.io.contacts import join_ids
 from scanfab.io.families import numbers_in
 from scanfab.io.files import bare_name, check_memory, first_bytes, plain
-from scanfab.io.reader import BODIES, WALLS, GrainTable, JoinedContacts, Snapshot
+from scanfab.io.reader import GrainTable, JoinedContacts, Snapshot
 from scanfab.io.writer import Left, as_arrays, csv_bytes, more_columns
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
@@ -100,7 +100,7 @@ def _rows(path: Path) -> Any:
         raise ReadError(f"{path}: cannot be read: {str(error).partition(chr(10))[0]}") from None
 
 
-def _columns(path: Path) -> dict[str, npt.NDArray[Any]]:
+def _columns(path: Path) -> Columns:
     """The columns of a companion file: each whole numbers, numbers or texts, as all words are."""
     import polars
 
@@ -144,11 +144,8 @@ def read_contacts(path: Path, grains: GrainTable) -> JoinedContacts:
 def _check_count(path: Path, found: int, what: str, told: FrameData | None) -> None:
     """ReadError if a file has lost rows on its way, or belongs to another frame."""
     if told is not None and getattr(told, what) not in (None, found):
-        expected = f"{getattr(told, what)} by {told.file.name}"
-        raise ReadError(
-            f"{path}: holds {found} {what}, expected {expected}: it was cut, or belongs to another "
-            f"frame (if you took rows out yourself, empty that number)"
-        )
+        expected = f"expected {getattr(told, what)} by {told.file.name}"
+        raise ReadError(f"{path}: holds {found} {what}, {expected}: it was cut, or is of others")
 
 
 class FrameData(NamedTuple):
@@ -220,9 +217,8 @@ def check_contacts_are_there(path: Path, told: FrameData | None) -> None:
     if count or is_empty:
         found = "an empty file" if is_empty else "other words" if file.is_file() else "no such file"
         advice = 'copy it again, or choose `contacts="geometric"`'
-        raise ReadError(
-            f"{file}: expected the {count}contacts of {path.name}, found {found}: {advice}"
-        )
+        expected = f"expected the {count}contacts of {path.name}"
+        raise ReadError(f"{file}: {expected}, found {found}: {advice}")
 
 
 def with_columns(path: Path, grains: GrainTable, told: FrameData | None) -> GrainTable:

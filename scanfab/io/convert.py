@@ -12,7 +12,7 @@ from typing import Any
 from scanfab.base.errors import SettingsError, note
 from scanfab.base.files import check_folder, whole_file
 from scanfab.base.option import refuse_unknown
-from scanfab.io.companions import HEADS, companion_there, companions_of
+from scanfab.io.companions import HEADS, companion_kind, companion_there, companions_of
 from scanfab.io.files import COMPRESSED_SUFFIXES, bare_name
 from scanfab.io.options import parse_frames
 from scanfab.io.reader import installed_readers
@@ -84,7 +84,8 @@ def convert(
     ('grains.vtp', 800, 30000)
     """
     out = Path(out)
-    is_folder = STEP not in out.name and (out.is_dir() or (to is not None and not out.suffix))
+    is_new = to is not None and not out.suffix and not out.exists()
+    is_folder = STEP not in out.name and (out.is_dir() or is_new)
     if is_folder and to is None:
         raise SettingsError(f"{out}: a folder has no format: name one as `to`")
     writer = writer_for(out) if to is None else writer_named(to)
@@ -124,7 +125,9 @@ def _packings(source: Any, chosen: slice, reading: dict[str, Any]) -> Iterator[t
     elif reading:
         raise SettingsError(f"`{next(iter(reading))}` is for files that are yet to be read")
     if isinstance(source, Series):
-        _tell_left_out(source)
+        for one in source.contacts:
+            if companion_kind(one.largest) is None:
+                note(f"{one.pattern}: of contacts only pairs, images and forces are written")
         return ((frame.number, frame.read()) for frame in source[chosen])
     packings = [source] if isinstance(source, Packing) else source
     if not isinstance(packings, Iterable):
@@ -134,17 +137,6 @@ def _packings(source: Any, chosen: slice, reading: dict[str, Any]) -> Iterator[t
         # counted from the end, so that all must be known first
         return iter(list(enumerate(packings))[chosen])
     return islice(enumerate(packings), *bounds)
-
-
-def _tell_left_out(series: Series) -> None:
-    """A note for each kind of contact files on the columns that a packing has no place for."""
-    for family in series.contacts:
-        ask = getattr(family.reader, "left_out", None)
-        file = next(iter(family.files.values()))
-        names = ["whatever else stands there"] if ask is None else ask(file)
-        if names:
-            kept = "contacts are kept as pairs, images and forces"
-            note(f"{family.pattern}: {kept}; left out: {', '.join(names)}")
 
 
 def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> None:

@@ -132,20 +132,16 @@ def check_times(path: Path, packed: int, unpacked: float) -> None:
     """ReadError if a file would unpack to far more than one so small can hold."""
     times = _times.get()
     if unpacked > max(ANYWAY, times * packed):
-        raise ReadError(
-            f"{path}: {packed:,} bytes of it unpack to more than {times:g} times as many: if it "
-            f"is a dump, allow more with `max_unpacked`"
-        )
+        told = f"{packed:,} bytes of it unpack to more than {times:g} times as many"
+        raise ReadError(f"{path}: {told}: if it is a dump, allow more with `max_unpacked`")
 
 
 def check_memory(path: Path, needed: float) -> None:
     """ReadError if there are not so many bytes for what a file holds."""
     free = free_memory()
     if needed > free:
-        raise ReadError(
-            f"{path}: needs about {needed / 1e9:.1f} GB of memory to be read, and "
-            f"{free / 1e9:.1f} GB are free"
-        )
+        sizes = f"about {needed / 1e9:.1f} GB of memory, and {free / 1e9:.1f} GB are free"
+        raise ReadError(f"{path}: to read it takes {sizes}")
 
 
 def file_inside(index: Path, name: str) -> Path:
@@ -161,9 +157,8 @@ def file_inside(index: Path, name: str) -> Path:
     folder = os.path.abspath(index.parent)
     file = os.path.normpath(os.path.join(folder, name.replace("\\", "/")))
     if "\0" in name or os.path.commonpath([folder, file]) != folder or file == folder:
-        raise ReadError(
-            f"{index}: names {name!r}, which does not lie in its folder: move the files together"
-        )
+        told = "which does not lie in its folder: move the files together"
+        raise ReadError(f"{index}: names {name!r}, {told}")
     path = index.parent / os.path.relpath(file, folder)
     # a name may be too long for any file
     if not os.path.isfile(path):
@@ -190,10 +185,9 @@ def temporary_copy(content: Iterable[bytes], name: str) -> Path:
     except BaseException as error:
         shutil.rmtree(folder, ignore_errors=True)
         if isinstance(error, OSError):
-            raise ReadError(
-                f"{name}: its content cannot be written to {tempfile.tempdir or 'any folder'}: "
-                f"{_reason(error)}: make room, or name another folder for temporary files by TMPDIR"
-            ) from None
+            told = f"{_reason(error)}: make room there, or name another folder by TMPDIR"
+            place = tempfile.tempdir or "any folder"
+            raise ReadError(f"{name}: cannot be written to {place}: {told}") from None
         raise
 
 

@@ -12,26 +12,12 @@ from typing import Any
 
 from scanfab.base.errors import ReadError, UnknownFormatError, note, warn
 from scanfab.base.option import refuse_unknown, takes_options, unusable
-from scanfab.io.families import (
-    Family,
-    Numbered,
-    PathLike,
-    are_tied,
-    contacts_beside,
-    expanded,
-    files_around,
-    files_in,
-    files_of,
-    group_by_name,
-    named_once,
-    some,
-    sort_into_families,
-    without_tables,
-)
+from scanfab.io import families as sorting
+from scanfab.io.families import Family, Numbered, PathLike, named_once, some
 from scanfab.io.files import first_bytes, unpacking_up_to
 from scanfab.io.layout import FrameFile
 from scanfab.io.options import READING_OPTIONS, take_reading
-from scanfab.io.reader import FileKind, ReadOptions, why_not
+from scanfab.io.reader import FileKind, ReadOptions, why_no_table
 from scanfab.io.series import ContactsFrom, Series
 from scanfab.packing.packing import Packing
 
@@ -200,12 +186,12 @@ def _given(source: Any) -> list[PathLike]:
 def _series(given: Sequence[PathLike], contacts: PathLike, options: ReadOptions) -> Series:
     """The series of what is named: its files sorted out."""
     paths = [Path(one) for one in given]
-    files = [file for path in paths for file in files_of(path)]
-    around = [] if any(path.is_dir() for path in paths) else files_around(files)
-    groups = group_by_name(files, around)
-    families = sort_into_families(files, options, groups)
+    files = [file for path in paths for file in sorting.files_of(path)]
+    around = [] if any(path.is_dir() for path in paths) else sorting.files_around(files)
+    groups = sorting.group_by_name(files, around)
+    families = sorting.sort_into_families(files, options, groups)
     if options.format is None:
-        families = without_tables(families, paths)
+        families = sorting.without_tables(families, paths)
     grains = _choose_grains(paths, families, options)
     _tell_skipped([one for one in families if one is not grains and one.kind != "contacts"])
     is_lone = paths[0].is_dir() and len(paths) == len(grains.files) == 1
@@ -259,7 +245,7 @@ def _no_grains(
             if all(word in data for word in TABLE_WORDS):
                 advice = "scanfab compare or scanfab report take it"
                 return ReadError(f"{table}: this is a fabric table, not a dump: {advice}")
-    reason = why_not(paths[0], options) if len(paths) == 1 and not folders else ""
+    reason = why_no_table(paths[0], options) if len(paths) == 1 and not folders else ""
     return UnknownFormatError(
         f"{where}: no reader knows the format; scanfab formats lists those that exist"
         + (f"; as a table it cannot be read: {reason}" if reason else "")
@@ -272,7 +258,7 @@ def _series_below(folder: Path) -> str:
     found = []
     for one in below[:MOST_FOLDERS]:
         with suppress(OSError, ReadError):
-            families = sort_into_families(files_in(one), ReadOptions())
+            families = sorting.sort_into_families(sorting.files_in(one), ReadOptions())
             found += [str(one)] if any(family.kind in GRAINS for family in families) else []
     return f"there are series in its folders: name them as sources: {some(found)}" if found else ""
 
@@ -312,12 +298,11 @@ def _choose_contacts(
     own = [family for family in families if family.kind == "contacts"]
     is_beside = bool(around) and not own
     if is_beside:
-        families, own = contacts_beside(grains, around, options)
+        families, own = sorting.contacts_beside(grains, around, options)
     in_grains = getattr(grains.reader, "lists_contacts", False)
     if contacts == "file" and not (own or in_grains):
-        raise ReadError(
-            f'{grains.pattern}: `contacts="file"` was asked for, but there is no contact file'
-        )
+        lacks = 'there is no contact file, which `contacts="file"` needs'
+        raise ReadError(f"{grains.pattern}: {lacks}")
     if contacts == "file":
         return own, "path" if own else "grains"
     if own:
@@ -326,7 +311,9 @@ def _choose_contacts(
     damaged = [
         replace(one, kind="contacts", files=dict.fromkeys(grains.files, one.largest), clash=None)
         for one in families
-        if one.problem is not None and len(one.files) == len(grains.files) and are_tied(grains, one)
+        if one.problem is not None
+        and len(one.files) == len(grains.files)
+        and sorting.are_tied(grains, one)
     ]
     if options.contact_columns and not (damaged or in_grains):
         missing = "there is no file of contacts with such columns"
@@ -336,8 +323,8 @@ def _choose_contacts(
 
 def _named_contacts(contacts: PathLike, options: ReadOptions) -> list[Family]:
     """Contact files from a file, a folder or a glob."""
-    files = [file for one in expanded(contacts) for file in files_of(Path(one))]
-    families = sort_into_families(files, options)
+    files = [file for one in sorting.expanded(contacts) for file in sorting.files_of(Path(one))]
+    families = sorting.sort_into_families(files, options)
     found = [family for family in families if family.kind == "contacts"]
     if not found:
         problem = next((family.problem for family in families if family.problem), None)

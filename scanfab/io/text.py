@@ -20,11 +20,10 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import ReadError, warn
+from scanfab.base.typing import Columns
 from scanfab.io.fence import fenced
 from scanfab.io.files import check_memory, grows, plain
 from scanfab.io.reader import Snapshot
-
-Columns = dict[str, npt.NDArray[Any]]
 
 NUMBER = re.compile(
     r"\s*[-+]?(?:(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?|(?:nan|inf|infinity))\s*\Z",
@@ -74,12 +73,7 @@ class Layout(NamedTuple):
 
 
 def read_rows(
-    snapshot: Snapshot,
-    rows: bytes,
-    layout: Layout,
-    *,
-    count: int | None = None,
-    what: str = "rows",
+    snapshot: Snapshot, rows: bytes, layout: Layout, *, count: int | None = None, what: str = "rows"
 ) -> Columns:
     """
     The columns of a table of text, by name.
@@ -137,10 +131,9 @@ def read_rows(
     found = rows.count(b"\n")
     if count is not None and found != count:
         step = "" if snapshot.step is None else f", step {snapshot.step}"
-        raise (CutError if found < count or not has_end else ReadError)(
-            f"{snapshot.path}{step}: the header counts {count} {what}, found {found}: the "
-            f"file is incomplete or damaged"
-        )
+        told = f"the header counts {count} {what}, found {found}: the file is incomplete or damaged"
+        error = CutError if found < count or not has_end else ReadError
+        raise error(f"{snapshot.path}{step}: {told}")
     if not rows:
         kinds = {name: np.int64 if name in layout.whole else np.float64 for name in layout.names}
         return {name: np.zeros(0, kind) for name, kind in kinds.items()}

@@ -20,12 +20,11 @@ import numpy as np
 
 from scanfab.base.arrays import MOST, doubles
 from scanfab.base.errors import ReadError
-from scanfab.base.typing import FloatArray
+from scanfab.base.typing import Columns, FloatArray
 from scanfab.io.fence import fenced
 from scanfab.io.files import check_memory, first_bytes, leave_out_last, plain
 from scanfab.io.formats import shared
 from scanfab.io.reader import FileKind, Snapshot
-from scanfab.io.text import Columns
 from scanfab.packing.cell import Cell
 
 # minus the length of the word, the word, the number 1, and the revision of the layout

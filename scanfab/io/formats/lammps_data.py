@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError
+from scanfab.base.typing import Columns
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.shared import GrainsOnly, box_cell, grains_of, numbered, numbers
 from scanfab.io.reader import Carries, FileKind, GrainTable, ReadOptions, Snapshot
-from scanfab.io.text import Columns, Layout, read_rows, text_of
+from scanfab.io.text import Layout, read_rows, text_of
 from scanfab.packing.cell import Cell
 
 # the first line is a comment; these two must stand below it
@@ -88,11 +89,9 @@ class DataFile(GrainsOnly):
             others += [f"'Atoms # {style}'"] if style not in STYLES else []
             others += ["YADE's radii in their place"] if data.startswith(OF_YADE) else []
             if others:
-                raise ReadError(
-                    f"{path}: expected diameters of spheres (atom_style sphere), found "
-                    f"{', '.join(others)}: write the grains with dump custom ... id type x y z "
-                    f'radius, or name the columns: `columns="id=1,radius=3,x=5,y=6,z=7"`'
-                )
+                told = f"expected diameters (atom_style sphere), found {', '.join(others)}"
+                advice = '`columns="id=1,radius=3,x=5,y=6,z=7"` names the columns'
+                raise ReadError(f"{path}: {told}: {advice}")
             columns = _named(path, style, columns, cell)
         return grains_of(snapshot, columns, cell, options)
 
@@ -145,10 +144,8 @@ def _named(path: Path, style: str, columns: Columns, cell: Cell | None) -> Colum
         are_sizes = (named["diameter"] > 0) & (named["density"] > 0)
         fits = bool(are_inside.all() and are_whole.all() and are_sizes.all())
     if not fits:
-        raise ReadError(
-            f"{path}: expected {' '.join(PLAIN)} of atom_style sphere (or a hybrid's "
-            f"{' '.join(HYBRID)}), found {len(columns)} columns below 'Atoms' that cannot be "
-            f'these: name them by their numbers, `columns="id=1,diameter=3,x=5,y=6,z=7"`'
-        )
+        told = f"are not {' '.join(PLAIN)} (or a hybrid's {' '.join(HYBRID)})"
+        advice = '`columns="id=1,diameter=3,x=5,y=6,z=7"` names them'
+        raise ReadError(f"{path}: the {len(columns)} columns below 'Atoms' {told}: {advice}")
     names = [*order, *["mol", *list(columns)[len(PLAIN) + 1 :]][:more], *flags]
     return dict(zip(names, values, strict=True))

@@ -11,19 +11,11 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.io.binary_tables import IS_NPZ, npz_shapes, read_npz
-from scanfab.io.columns import grain_table
+from scanfab.io.columns import BODIES, WALLS, grain_table
 from scanfab.io.companions import companion_kind, read_contacts
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.shared import GrainsOnly
-from scanfab.io.reader import (
-    BODIES,
-    WALLS,
-    FileKind,
-    GrainTable,
-    JoinedContacts,
-    ReadOptions,
-    Snapshot,
-)
+from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.io.writer import Left, as_arrays, cell_of, contacts_of
 from scanfab.packing.packing import Packing
 
@@ -80,10 +72,6 @@ class NpzFormat(GrainsOnly):
         if "pairs" not in arrays:
             return grains
         return grains._replace(contacts=contacts_of(arrays["pairs"], arrays))
-
-    def left_out(self, path: Path) -> list[str]:
-        """Of what scanfab writes nothing is left out."""
-        return []
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable

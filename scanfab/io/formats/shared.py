@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
-from scanfab.base.typing import FloatArray
+from scanfab.base.typing import Columns, FloatArray
 from scanfab.io.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.contacts import join_ids
 from scanfab.io.files import leave_out_last, plain
@@ -24,7 +24,7 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
-from scanfab.io.text import Columns, CutError, spelt, text_of
+from scanfab.io.text import CutError, spelt, text_of
 from scanfab.packing.cell import Cell
 
 # the header of a frame is shorter, even with thousands of columns
@@ -90,10 +90,8 @@ def grains_of(
 ) -> GrainTable:
     """The grains in the columns of a frame; ReadError if these have no names and users none."""
     if "1" in columns and not options.columns:
-        raise ReadError(
-            f"{snapshot.path}: this dump does not name its {len(columns)} columns: name them by "
-            f'their numbers, as the deck lists them: `columns="id=1,x=3,y=4,z=5,radius=6"`'
-        )
+        advice = 'number them as the deck lists them: `columns="id=1,x=3,y=4,z=5,radius=6"`'
+        raise ReadError(f"{snapshot.path}: the {len(columns)} columns have no names: {advice}")
     named = {key: f"{own}" for key, own in options.columns.items()}
     where = "" if snapshot.step is None else f", step {snapshot.step}"
     return grain_table(snapshot.path, columns, cell, replace(options, columns=named), where)
@@ -235,10 +233,13 @@ def marked_frames(
         lost = NO_COMMENT.search(text_of(Snapshot(path, stop=start)))
         if lost:
             raise ReadError(f"{path}: expected the header of a frame above {spelt(lost[0])}")
+        where = f"{path}: time of a frame"
         for stop in [*starts[1:], size][: len(starts)]:
             stream.seek(start)
             head = stream.read(min(HEADER_BYTES, stop - start))
-            at = moment(path, head) if moment else (None, _time(path, mark.match(head)))
+            header = mark.match(head)
+            assert header is not None
+            at = moment(path, head) if moment else (None, numbers(where, header[1], 1)[0])
             # a last frame whose header was cut has no moment
             if at or stop == size:
                 found.append(Snapshot(path, *(at or (None, None)), start, stop))
@@ -275,8 +276,3 @@ def numbered_frames(
     if not found:
         raise ReadError(f"{path}: expected frames, found none")
     return found
-
-
-def _time(path: Path, header: re.Match[bytes] | None) -> float:
-    """The time in the first group of the header of a frame."""
-    return numbers(f"{path}: time of a frame", header[1] if header else b"", 1)[0]

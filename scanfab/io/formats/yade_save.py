@@ -62,10 +62,8 @@ class SavedScene(GrainsOnly):
     def kind(self, path: Path) -> FileKind:
         """Grains, in XML."""
         if b"<boost_serialization" not in first_bytes(path):
-            raise ReadError(
-                f"{path}: YADE's binary format can be read by the same build of YADE only: load it "
-                f"there, and save it as XML: O.save('name.xml.bz2')"
-            )
+            advice = "load it there, and save it as XML: O.save('name.xml.bz2')"
+            raise ReadError(f"{path}: only the same build of YADE can read its binary: {advice}")
         return "grains"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
@@ -198,10 +196,8 @@ def cell_beside(path: Path, position: FloatArray) -> Cell | None:
     if file is None:
         exported = EXPORTED.fullmatch(bare_name(path))
         if exported and _numbered(path.parent, f"{exported[1]}-periCell-", stamp_of(path.parent)):
-            warn(
-                f"{path.parent / exported[1]}-periCell-*: not read, as there is not one cell for "
-                f'each file of spheres: name the cells with `cell="FILE.csv"`'
-            )
+            told = 'skipped, as not each file of spheres has one: name cells by `cell="FILE.csv"`'
+            warn(f"{path.parent / exported[1]}-periCell-*: {told}")
         return None
     if is_cell_file(file):
         corners = read_mesh(file).points
@@ -216,10 +212,9 @@ def cell_beside(path: Path, position: FloatArray) -> Cell | None:
     fractions = cell.fractional(position)
     outside = np.any((fractions < -ROUNDING) | (fractions > 1.0 + ROUNDING), axis=1)
     if outside.any():
-        raise ReadError(
-            f"{path}: {np.count_nonzero(outside)} grains lie outside the cell of {file}: name the "
-            f'right one with `cell=(LX, LY, LZ)` or `cell="FILE.csv"`'
-        )
+        told = f"{np.count_nonzero(outside)} grains lie outside the cell of {file}"
+        advice = 'name the right one with `cell=(LX, LY, LZ)` or `cell="FILE.csv"`'
+        raise ReadError(f"{path}: {told}: {advice}")
     pattern = re.sub(r"\d+", "*", file.name)
     note(f"the cell is read from {file.parent / pattern}, beside the grains")
     return cell
