@@ -25,14 +25,10 @@ from scanfab.base.files import check_file, free_memory
 COMPRESSED_SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".lz4")
 # part of Python since 3.14
 ZSTD = "compression.zstd" if sys.version_info >= (3, 14) else "backports.zstd"
-DECOMPRESSORS = {
-    b"\x1f\x8b": "gzip",
-    b"BZh": "bz2",
-    b"\xfd7zXZ\x00": "lzma",
-    b"\x28\xb5\x2f\xfd": ZSTD,
-    b"\x50\x2a\x4d\x18": ZSTD,  # a frame to skip, with which pzstd begins
-    b"\x04\x22\x4d\x18": "lz4.frame",
-}
+DECOMPRESSORS = {b"\x1f\x8b": "gzip", b"BZh": "bz2", b"\xfd7zXZ\x00": "lzma"}
+# zstd, and a frame to skip with which pzstd begins
+DECOMPRESSORS |= {b"\x28\xb5\x2f\xfd": ZSTD, b"\x50\x2a\x4d\x18": ZSTD}
+DECOMPRESSORS |= {b"\x04\x22\x4d\x18": "lz4.frame"}
 """The module that opens a file, by the first bytes of the file."""
 MAGIC_BYTES = max(map(len, DECOMPRESSORS))
 # how many times its compressed size a file may grow to; up to ANYWAY bytes, any file may

@@ -161,8 +161,14 @@ def read_series(
         cells = FrameFile(Path(frame_cell), ["lx", "ly", "lz"], ["xy", "xz", "yz"], positive=3)
     told |= {"columns": told["columns"] or {}, "cell": None if cells else frame_cell}
     options = ReadOptions(**told)
+    if isinstance(source, str | os.PathLike) or not isinstance(source, Iterable):
+        source = [source]
+    given = list(source)
+    if not given or not all(isinstance(path, str | os.PathLike) for path in given):
+        expected = "the path of a folder or file, or several of files"
+        raise unusable("source", expected, arguments["source"])
     with unpacking_up_to(options.max_unpacked):
-        series = _series(_given(source), contacts, options)
+        series = _series(named_once(given), contacts, options)
     return replace(series, cells=cells, reading=reading, dim=dim)
 
 
@@ -172,15 +178,6 @@ def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
     for source in named_once(sources):
         groups[source if Path(source).is_dir() else ""].append(source)
     return [read_series(group, **options) for group in groups.values()]
-
-
-def _given(source: Any) -> list[PathLike]:
-    """What is named, one by one, each file and folder once."""
-    one = isinstance(source, str | os.PathLike) or not isinstance(source, Iterable)
-    given = [source] if one else list(source)
-    if not given or not all(isinstance(path, str | os.PathLike) for path in given):
-        raise unusable("source", "the path of a folder or file, or several of files", source)
-    return named_once(given)
 
 
 def _series(given: Sequence[PathLike], contacts: PathLike, options: ReadOptions) -> Series:
@@ -201,9 +198,13 @@ def _series(given: Sequence[PathLike], contacts: PathLike, options: ReadOptions)
     for family in (grains, *chosen):
         if family.clash is not None:
             raise ReadError(family.clash)
-    name = as_text(os.fspath(given[0]) if len(given) == 1 else _common_folder(paths))
     sources = tuple(os.fspath(path) for path in given)
-    return Series(name, grains, tuple(chosen), origin, options, sources=sources)
+    name = sources[0]
+    if len(sources) > 1:
+        are_alike = len({path.is_absolute() for path in paths}) == 1
+        folders = [str(path.parent if are_alike else path.parent.absolute()) for path in paths]
+        name = os.path.commonpath(folders) or "."
+    return Series(as_text(name), grains, tuple(chosen), origin, options, sources=sources)
 
 
 def _choose_grains(
@@ -336,9 +337,3 @@ def _named_contacts(contacts: PathLike, options: ReadOptions) -> list[Family]:
 def as_text(name: str) -> str:
     """A name as a table can hold it: those of files need be no text."""
     return name.encode("utf-8", "backslashreplace").decode()
-
-
-def _common_folder(paths: list[Path]) -> str:
-    are_alike = len({path.is_absolute() for path in paths}) == 1
-    folders = [str(path.parent if are_alike else path.parent.absolute()) for path in paths]
-    return os.path.commonpath(folders) or "."

@@ -186,5 +186,5 @@ def test_a_dump_local_without_ids_is_skipped_with_a_note(folder):
     write(folder / "other_9.txt", local_text([(0.5, 1.5, -0.25), (2.5, 1, 0.5)], step=9))
     with pytest.warns(ScanfabNote, match=r"skipped .*other_9.txt: no two columns"):
         assert contacts_of(folder) == [2, 2]
-    with pytest.raises(ReadError, match="no two columns are surely the ids"):
+    with pytest.raises(ReadError, match="surely ids of these grains"):
         contacts_of(folder / "dump_9.txt", contacts=folder / "other_9.txt")

@@ -78,7 +78,7 @@ def test_contacts_by_geometry_need_no_file(folder):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert frames_of(folder)[0].contacts is None
-    with pytest.raises(ReadError, match='`contacts="file"` was asked for, but there is no contact'):
+    with pytest.raises(ReadError, match='there is no contact file, which `contacts="file"` needs'):
         scanfab.read_series(folder, contacts="file")
 
 

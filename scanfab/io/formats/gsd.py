@@ -39,16 +39,17 @@ class GsdReader(GrainsOnly):
 
     def names(self, path: Path) -> list[str]:
         """Those of all frames: without diameters there are no radii."""
-        return [name.rpartition("/")[2] for name in _read(path, None)[1]]
+        return [name.rpartition("/")[2] for name in fenced(read_in_worker, path, None)[1]]
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """The frames with their steps; ``start`` of a snapshot is the number of its frame."""
-        return numbered_frames(path, ((step, None) for step in _read(path, None)[0]))
+        steps = fenced(read_in_worker, path, None)[0]
+        return numbered_frames(path, ((step, None) for step in steps))
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """What the frame, or else the first one, has of each particle."""
         path, where = snapshot.path, f"{snapshot.path}, frame {snapshot.start}"
-        arrays = _read(path, snapshot.start)[2]
+        arrays = fenced(read_in_worker, path, snapshot.start)[2]
         position = arrays.pop("particles/position", np.zeros((0, 3), np.float32))
         count = arrays.pop("particles/N", np.array([0])).tolist()
         box = arrays.get("configuration/box", np.zeros(0)).astype(np.float64).tolist()
@@ -73,10 +74,6 @@ class GsdReader(GrainsOnly):
         vectors = np.array([[lx, 0, 0], [xy * ly, ly, 0], [xz * lz, yz * lz, lz]])
         origin = -0.5 * vectors.sum(axis=0)
         return columns, cell_of(f"{where}: its box", vectors, (True, True, not flat), origin)
-
-
-def _read(path: Path, frame: int | None) -> tuple[list[int], list[str], Columns]:
-    return fenced(read_in_worker, path, frame)
 
 
 def read_in_worker(path: str, frame: int | None) -> tuple[list[int], list[str], Columns]:

@@ -233,13 +233,10 @@ def marked_frames(
         lost = NO_COMMENT.search(text_of(Snapshot(path, stop=start)))
         if lost:
             raise ReadError(f"{path}: expected the header of a frame above {spelt(lost[0])}")
-        where = f"{path}: time of a frame"
         for stop in [*starts[1:], size][: len(starts)]:
             stream.seek(start)
             head = stream.read(min(HEADER_BYTES, stop - start))
-            header = mark.match(head)
-            assert header is not None
-            at = moment(path, head) if moment else (None, numbers(where, header[1], 1)[0])
+            at = moment(path, head) if moment else (None, _time(path, mark.match(head)))
             # a last frame whose header was cut has no moment
             if at or stop == size:
                 found.append(Snapshot(path, *(at or (None, None)), start, stop))
@@ -276,3 +273,8 @@ def numbered_frames(
     if not found:
         raise ReadError(f"{path}: expected frames, found none")
     return found
+
+
+def _time(path: Path, header: re.Match[bytes] | None) -> float:
+    """The time in the first group of the header of a frame."""
+    return numbers(f"{path}: time of a frame", header[1] if header else b"", 1)[0]

@@ -32,21 +32,13 @@ END = (
 FORCE = "f{0} force.{0} f.{0} contact.force.global.{0} force.global.{0}"
 # of contacts: the force on either grain, the image of the second, the force on the first or second,
 # the normal and the tangential part
-FORCES: Names = {
-    what.format(axis): tuple(words.format(axis).split())
-    for axis in "xyz"
-    for what, words in (
-        ("f{0}", FORCE),
-        ("i{0}", "i{0} image.{0}"),
-        ("f{0}1", "f{0}1"),
-        ("f{0}2", "f{0}2"),
-        ("fn{0}", "fn{0} contact.normal.force.{0}"),
-        ("ft{0}", "ft{0} contact.tangential.force.{0}"),
-    )
-} | {
+ALONG = {"f{0}": FORCE, "i{0}": "i{0} image.{0}", "f{0}1": "f{0}1", "f{0}2": "f{0}2"}
+ALONG |= {"fn{0}": "fn{0} contact.normal.force.{0}", "ft{0}": "ft{0} contact.tangential.force.{0}"}
+FORCES: dict[str, tuple[str, ...]] = {
     "fn": ("fn", "force.n", "normal.force", "contact.force.normal", "force.normal"),
     "kind": ("contact.type", "kind"),
 }
+FORCES |= {k.format(x): tuple(v.format(x).split()) for x in "xyz" for k, v in ALONG.items()}
 TABLE: Names = {
     **{axis: tuple(CENTRE.format(axis, number).split()) for number, axis in enumerate("xyz")},
     "radius": (*RADIUS_NAMES, "f.radius", "ball.radius", "particle.radius"),
