@@ -23,8 +23,6 @@ from scanfab.packing.packing import Packing
 
 READING = tuple(one.name for one in READING_OPTIONS)
 """The options of :func:`read_series`, by which commands and manifests know them too."""
-# sub-folders that are looked into for the advice in an error
-MOST_FOLDERS = 50
 # how a fabric table begins, in whatever format
 TABLE_WORDS = (b"source", b"frame", b"variant", b"alpha_vs")
 GRAINS: tuple[FileKind, ...] = ("grains", "index", "start", "points")
@@ -191,9 +189,6 @@ def _series(given: Sequence[PathLike], contacts: PathLike, options: ReadOptions)
         families = sorting.without_tables(families, paths)
     grains = _choose_grains(paths, families, options)
     _tell_skipped([one for one in families if one is not grains and one.kind != "contacts"])
-    is_lone = paths[0].is_dir() and len(paths) == len(grains.files) == 1
-    if is_lone and (below := _series_below(paths[0])):
-        note(f"{paths[0]}: {Path(grains.pattern).name} alone is read, but {below}")
     chosen, origin = _choose_contacts(grains, families, groups if around else [], contacts, options)
     for family in (grains, *chosen):
         if family.clash is not None:
@@ -236,8 +231,9 @@ def _no_grains(
         held = ", ".join(f"{HOLDS[one.kind]} ({Path(one.pattern).name})" for one in known[:5])
         return ReadError(f"{where}: no grains: expected points with a radius, found {held}")
     folders = [path for path in paths if path.is_dir()]
-    if below := ", ".join(filter(None, map(_series_below, folders))):
-        return ReadError(f"{where}: the folder holds no dumps, but {below}")
+    below = [f"{one}" for path in folders for one in sorted(path.glob("[!.]*")) if one.is_dir()]
+    if below:
+        return ReadError(f"{where}: the folder holds no dumps, but folders: name {some(below)}")
     if not families:
         return ReadError(f"{where}: the folder holds no files")
     for table in set(paths).difference(folders):
@@ -251,17 +247,6 @@ def _no_grains(
         f"{where}: no reader knows the format; scanfab formats lists those that exist"
         + (f"; as a table it cannot be read: {reason}" if reason else "")
     )
-
-
-def _series_below(folder: Path) -> str:
-    """Which sub-folders hold grains, as the end of a sentence; empty if none does."""
-    below = sorted(one for one in folder.iterdir() if one.is_dir() and one.name[0] != ".")
-    found = []
-    for one in below[:MOST_FOLDERS]:
-        with suppress(OSError, ReadError):
-            families = sorting.sort_into_families(sorting.files_in(one), ReadOptions())
-            found += [str(one)] if any(family.kind in GRAINS for family in families) else []
-    return f"there are series in its folders: name them as sources: {some(found)}" if found else ""
 
 
 def _tell_skipped(families: Sequence[Family]) -> None:
