@@ -35,8 +35,9 @@ POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("x
 # axes are its radius and the exponents 2, within the rounding of six digits
 HALF_AXES, EXPONENTS = ("shapex", "shapey", "shapez"), ("blockiness1", "blockiness2")
 OLD_EXPONENTS, SIX_DIGITS = ("roundness1", "roundness2"), 1e-5
-# no grain is so many periodic cells, or times as far as the others where there are some, from the
-# origin: rounding would leave nothing of its place
+# a number is damaged if a grain lies this many periodic cells from the cell's origin, or without a
+# cell (and at least FEW grains) this many times as far from 0 as the others: rounding would leave
+# nothing of its place
 FAR, FEW = 1e12, 10
 # a diameter that differs from twice the radius by more than this share of it is another size:
 # numbers of few digits are rounded
@@ -144,7 +145,7 @@ def _named_by_user(path: Path, columns: Columns, options: ReadOptions) -> dict[s
             there = f"the columns are {', '.join(rest)}"
             raise ReadError(f"{path}: there is no column {own!r} to serve as {standard}; {there}")
         named[standard] = rest.pop(own)
-    # a column that the file calls by a standard name is something else
+    # a column of the file that has such a standard name already is something else
     return {name + "_of_dump" * (name in named): one for name, one in rest.items()} | named
 
 
@@ -152,7 +153,7 @@ def _position(
     where: str, rest: dict[str, Any], options: ReadOptions, cell: Cell | None
 ) -> FloatArray:
     """Take the coordinates out of the columns."""
-    # a column of a dump may have that name, too
+    # a dump may have a column of single numbers called position, too
     if "position" in rest and np.ndim(rest["position"]) == 2:
         return _lengths(where, rest.pop("position"), "a coordinate")
     for names, scaled in POSITION_NAMES:
@@ -166,7 +167,7 @@ def _position(
             return position
         if cell is None:
             raise ReadError(f"{where}: {names} are fractions of a box, but there is no box")
-        # what is not finite is the packing's to refuse
+        # Packing refuses numbers that are not finite
         with np.errstate(over="ignore", invalid="ignore"):
             return np.asarray(cell.origin + position @ cell.vectors)
     there, advice = ", ".join(rest) or "none", '`columns={"x": ..., "y": ..., "z": ...}` names them'
@@ -176,22 +177,22 @@ def _position(
 @np.errstate(over="ignore", invalid="ignore")
 def _refuse_far(where: str, position: FloatArray, radius: FloatArray, cell: Cell | None) -> None:
     """ReadError if a grain is so far away that rounding leaves nothing of its place or size."""
-    is_periodic = cell is not None and cell.is_periodic
-    if len(radius) < (1 if is_periodic else FEW):
+    periodic = cell if cell is not None and cell.is_periodic else None
+    if len(radius) < (FEW if periodic is None else 1):
         return
-    away = np.abs(position).max(axis=1)
-    size = np.abs(cell.vectors).max() if cell is not None and is_periodic else np.median(away)
-    # what cannot be a length is the packing's to refuse
+    away = np.abs(position - (0.0 if periodic is None else periodic.origin)).max(axis=1)
+    size = np.median(away) if periodic is None else np.abs(periodic.vectors).max()
+    # Packing refuses numbers that cannot be lengths
     far = np.flatnonzero((away < MOST) & (away > FAR * max(radius.max(), size)))
     if len(far):
-        found = f"grain {far[0] + 1} has a coordinate of {away[far[0]]:g}"
-        raise ReadError(f"{where}: {found}, too far away from all others: is the number damaged?")
+        found = f"grain {far[0] + 1} lies {away[far[0]]:g} from the origin"
+        raise ReadError(f"{where}: {found}, too far away: is a number damaged?")
 
 
 def _radius(where: str, rest: dict[str, Any], options: ReadOptions, count: int) -> FloatArray:
     """Take the radii out of the columns, or half the diameters; or the user's for all."""
     own = options.columns
-    # of a size that the user names, the other need not be believed
+    # if the user names one size, the other column is not compared with it
     sizes = own.keys() & {"radius", "diameter"} or {"radius", "diameter"}
     name = first_of(RADIUS_NAMES, rest) if "radius" in sizes else None
     other = first_of(DIAMETER_NAMES, rest) if "diameter" in sizes else None
@@ -310,7 +311,7 @@ def body_numbers(path: Path, grains: GrainTable, named: str | None) -> IntArray 
         if grains.bodies is not None:
             return grains.bodies
         name = first_of(CLUMP_COLUMNS, columns)
-    # an empty frame may have lost its columns, and grains without ids are grains all the same
+    # an empty frame may have lost its columns; `id` makes each sphere a grain, also without ids
     if name is None or not len(grains.radius) or (name == "id" and name not in columns):
         return None
     if name not in columns:

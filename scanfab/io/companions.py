@@ -38,7 +38,7 @@ PARTS |= {"force": ["fx2", "fy2", "fz2"], "force_n": ["fn"]}
 WHOLE = ("id1", "id2", *PARTS["image"])
 # vectors and corner of the cell
 CELL = tuple(f"{vector}{axis}" for vector in "abco" for axis in "xyz")
-# files of early versions end before the counts
+# early versions of scanfab wrote no counts
 FRAME = ("step", "time", *CELL, "periodic", "grains", "contacts")
 # bytes of memory for each byte of a file
 IN_MEMORY = 12.0
@@ -130,7 +130,7 @@ def read_contacts(path: Path, grains: GrainTable) -> JoinedContacts:
     table = _columns(path)
     if any(values.dtype.kind == "U" for values in table.values()):
         raise ReadError(f"{path}: expected numbers as {', '.join(table)}, found other words")
-    # any file of grains of this name has the same frame file
+    # the frame file is the same whatever the ending of the grain file
     grain_file = path.with_name(f"{bare_name(path).removesuffix('.contacts.csv')}.csv")
     _check_count(path, len(table["id1"]), "contacts", read_frame(grain_file))
     if grains.id is None:

@@ -23,7 +23,7 @@ from scanfab.packing.contacts import ContactList
 SAME_PLACE = 0.01
 # two grains are neighbours if their distance is below (r1 + r2) times this
 NEAR = 1.1
-# a rule that holds for this share of all contacts holds
+# a rule is taken to hold if it holds for this share of all contacts
 NEARLY_ALL = 0.9
 # what programs call a contact of two grains; whatever else is one with a wall
 OF_GRAINS = ("ss", "ball-ball", "ball-pebble", "pebble-ball", "pebble-pebble", "rball-rball")
@@ -280,7 +280,7 @@ def join_table(path: Path, grains: GrainTable, found: Columns) -> JoinedContacts
     ids = np.column_stack([whole_numbers(path, found[one]) for one in ("id1", "id2")])
     kind = found.get("kind")
     if kind is not None and kind.dtype.kind == "U":
-        # the second is the wall; its id is of another kind than those of grains
+        # the second end is the wall: its id counts walls, not grains
         ids[~np.isin(np.char.lower(np.char.strip(kind)), OF_GRAINS), 1] = -1
     walls = np.any(ids < 0, axis=1)
     found = {name: values[~walls] for name, values in found.items()}
@@ -290,14 +290,14 @@ def join_table(path: Path, grains: GrainTable, found: Columns) -> JoinedContacts
     force = _force(path, grains, rows, found) if (rows >= 0).all() else None
     force_n = found.get("fn") if force is None else None
     if force_n is not None:
-        # compression is positive: the sign that nearly all have
+        # compression is positive, and nearly all contacts are under compression
         doubt = "are above 0, so it cannot be told whether that means compression"
         sign = _sign(doubles(force_n), f"{path}: the normal forces are left out", doubt)
         force_n = None if sign is None else sign * doubles(force_n)
     shift = _vectors(path, grains, found, "ix iy iz")
     image = None if shift is None else whole_numbers(path, shift.ravel()).reshape(-1, 3)
     joined = join_ids(path, grains, pairs, force, walls=False, image=image, force_n=force_n)
-    # of a pair in either order, with the image of the second grain from the first
+    # a pair may be listed in either order; the image is that of the second grain
     keys = np.sort(pairs, axis=1)
     if image is not None:
         keys = np.hstack([keys, np.where(pairs[:, :1] > pairs[:, 1:], -image, image)])

@@ -94,7 +94,7 @@ def convert(
     refuse_unknown("convert", reading, [*READING, "to", "frames"])
     found = _packings(source, parse_frames(frames), reading)
     if STEP not in pattern.name:
-        # there must be no second frame, which is known before the file is touched
+        # look for a second frame before the file is touched
         first = list(islice(found, 2))
         if len(first) > 1:
             where = f"a folder, or a file with {STEP} in its name, or one frame by `frames`"
@@ -134,7 +134,7 @@ def _packings(source: Any, chosen: slice, reading: dict[str, Any]) -> Iterator[t
         raise SettingsError(f"source: expected a path, a Series or packings, found {source!r}")
     bounds = (chosen.start, chosen.stop, chosen.step)
     if any((bound or 0) < 0 for bound in bounds):
-        # counted from the end, so that all must be known first
+        # a bound counts from the end, so all packings are needed first
         return iter(list(enumerate(packings))[chosen])
     return islice(enumerate(packings), *bounds)
 
@@ -159,13 +159,13 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
         names = " and ".join(file.name for file in there)
         raise SettingsError(f"{path}: {names} may belong to {other.name}: choose another name")
     with ExitStack() as files:
-        # the first file to be opened is the last to take its place: with the grains all is there
+        # files take their places in reverse order, so the grain file comes when all others are there
         left = writer.write(packing, files.enter_context(whole_file(path)))
         made = companions_of(packing, path, left)
         for file, data in made.items():
             files.enter_context(whole_file(file)).write_bytes(data)
     for file in set(there) - made.keys():
-        # an earlier packing of this name has left it
+        # it belonged to an earlier packing of this name
         with suppress(OSError):
             file.unlink()
     for text in left.notes:

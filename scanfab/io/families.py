@@ -184,7 +184,7 @@ def _split(group: list[Path]) -> Iterable[Numbered]:
 
 def numbers_in(file: Path) -> tuple[int, ...]:
     """The numbers in a name, of which one may be the step."""
-    # the ending of a name (.mp4) is not a number of the frame, unless it is nothing else (dump.100)
+    # digits in the ending (.mp4) are no step, unless the whole ending is a number (dump.100)
     name = Path(bare_name(file))
     text = name.name if name.suffix[1:].isdigit() else name.stem
     return tuple(map(int, NUMBER.findall(text)))
@@ -206,7 +206,7 @@ def _family_of(
         reader = reader_for(family.largest, options)
         kind = "other" if reader is None else reader.kind(family.largest)
     except ReadError as error:
-        # in a folder one damaged file is skipped; alone it is the error
+        # a folder is read without its damaged files; of a single file this is the error
         return replace(family, reader=reader, problem=str(error))
     return replace(family, reader=reader, kind=kind)
 

@@ -23,7 +23,7 @@ from scanfab.base.errors import ReadError, warn
 from scanfab.base.files import check_file, free_memory
 
 COMPRESSED_SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".lz4")
-# part of Python since 3.14
+# in the standard library since Python 3.14
 ZSTD = "compression.zstd" if sys.version_info >= (3, 14) else "backports.zstd"
 DECOMPRESSORS = {b"\x1f\x8b": "gzip", b"BZh": "bz2", b"\xfd7zXZ\x00": "lzma"}
 # zstd, and a frame to skip with which pzstd begins
@@ -38,7 +38,7 @@ ANYWAY = 64 << 20
 KEPT = 16
 # bytes that are copied at a time
 PART = 4 << 20
-# of the name of the folder that holds the copies of a process
+# folders of decompressed copies are named so
 PREFIX = "scanfab-"
 Stamp = tuple[str, int, int, int]
 """Tells a file from other files, and from itself after it was changed."""
@@ -102,7 +102,7 @@ def pieces(path: Path, size: int = PART) -> Iterator[bytes]:
         with open(path, "rb") as packed, packed if module is None else module.open(packed) as file:
             while piece := file.read(size):
                 unpacked += len(piece)
-                # by what was read so far, a bomb is known long before its end
+                # checked while reading, so that a bomb is found long before its end
                 check_times(path, packed.tell(), unpacked)
                 yield piece
     except (OSError, EOFError, RuntimeError, zlib.error, lzma.LZMAError, zstd_error) as error:
@@ -196,7 +196,7 @@ def _folder(process: int) -> str:
 
 
 def _remove_at_end(folder: str) -> None:
-    # under another name no thread that is still reading can put a copy into it
+    # renamed first, so that no thread that is still reading can add a copy
     last = f"{folder}-removed"
     with suppress(OSError):
         os.rename(folder, last)

@@ -21,7 +21,7 @@ from scanfab.io.options import take_reading
 from scanfab.io.series import ENDLESS, Series
 from scanfab.io.sources import READING, as_text, read_series
 
-# seconds between two looks at the files, or so many times what the last look took
+# seconds between two looks at the files, or this many times what the last look took
 PAUSE, PAUSES = 0.2, 3.0
 # a file that did not change for so many seconds is whole, if it can be read to its end
 QUIET = 1.0
@@ -157,7 +157,7 @@ class FollowedSeries(Series):
         if any(self._is_whole(frame, has_later=frame is not waiting[-1]) for frame in waiting):
             self._take(waiting[0])
         elif self._is_over or waited >= self._seconds:
-            # from now on nothing is waited for, not even contact files
+            # stop waiting, also for contact files
             self._seconds = 0.0
             if any(map(self._can_be_read, waiting)):
                 self._take(waiting[0])
@@ -224,8 +224,8 @@ class FollowedSeries(Series):
             return False
         if has_later or frame.number:
             return self._can_be_read(frame)
-        # of the first frame alone nobody knows whether contact files will come, nor whether the
-        # number in its name is its step
+        # while there is one frame only, nobody knows whether contact files will come, nor whether
+        # the number in its name is a step
         may_come = series.contacts_from in ("auto", "beside") and not series.contacts
         has_step = frame.step is not None or frame.name_step is None
         return has_step and self._can_be_read(frame, needs_contacts=may_come)

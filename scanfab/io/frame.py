@@ -79,7 +79,7 @@ class Frame:
         steps = {None, self.name_step, self.step} | (set() if is_known else {*series.grains.files})
         families = []
         for one in (series.grains, *series.contacts):
-            # and one more file: a family's only one may be of any step
+            # plus one more: if a family has one file only, that may belong to any step
             wanted = {*steps, next((step for step in one.files if step not in steps), None)}
             files = {step: file.absolute() for step, file in one.files.items() if step in wanted}
             families.append(replace(one, files=files))
@@ -156,7 +156,7 @@ class Frame:
         if not lists and series.contacts_from == "path":
             told = "lists contacts with walls only: those between grains are found by geometry"
             warn(f"{named}: {told}, unless `contacts` names their file")
-        # the contacts file that a conversion has left beside the grains lists no walls
+        # a contacts file that `convert` wrote lists no walls: the grain file counts them
         if grains.wall_contacts is not None and (
             takes_own or any(companion_kind(file) == "contacts" for file in files)
         ):
@@ -183,7 +183,7 @@ class Frame:
         files: list[Path] = []
         parts: list[JoinedContacts] = []
         if series.contacts:
-            # contacts are joined by lengths and ids: what is wrong with those comes first
+            # contacts are joined by lengths and ids, so errors in these are reported first
             id = np.arange(len(grains.radius)) if grains.id is None else grains.id
             check_lengths(grains.position, grains.radius, id)
         for family in series.contacts:

@@ -218,7 +218,7 @@ def reader_for(path: Path, options: ReadOptions | None = None) -> Reader | None:
     """The reader that a user names, or that knows the file; any text may be a table."""
     if options is not None and options.format is not None:
         return reader_named(options.format, options)
-    # a format that any program may write comes after the programs' own
+    # formats that any program may write are asked last
     offers = installed_readers().values()
     for one in sorted(offers, key=lambda one: getattr(one.plugin, "generic", False)):
         reader = _told(one.plugin, options)

@@ -23,7 +23,7 @@ from scanfab.io.layout import FrameFile
 from scanfab.io.reader import ReadOptions, Snapshot
 from scanfab.packing.plane import flat_space, space_of, spelt_plane
 
-# more frames than there can be: the end of frames that nobody has counted
+# more frames than there can be: where a slice ends while its frames are not counted
 ENDLESS = 2**62
 # relative difference of two times that are the same: programs write them with six digits or more
 ROUNDING = 2e-6
@@ -305,7 +305,7 @@ class Series:
         """
         dumps: list[Path] = []
         if self.grains.kind == "index" and self.grains.reader is not None:
-            # a dump that is not there has been told of
+            # a missing dump was reported when its frame was read
             with suppress(ReadError):
                 listed = [(one.path, *one.parts) for one in self.grains.reader.snapshots(path)]
                 dumps = [file for file in dict.fromkeys(chain(*listed)) if file.is_file()]

@@ -293,7 +293,7 @@ def _choose_contacts(
         return own, "path" if own else "grains"
     if own:
         return own, "beside" if is_beside else "auto"
-    # a file that cannot be read, and may be the contacts by its name and number, is an error
+    # a file that cannot be read is an error if, by name and number, it may be the contact file
     damaged = [
         replace(one, kind="contacts", files=dict.fromkeys(grains.files, one.largest), clash=None)
         for one in families

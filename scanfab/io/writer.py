@@ -111,7 +111,7 @@ def as_arrays(packing: Packing) -> Arrays:
     bodies, cell, listed = packing.bodies, packing.cell, packing.contacts
     numbers = None if bodies is None else bodies.number
     if bodies is None and first_of(CLUMP_COLUMNS, packing.columns) is not None:
-        # without this column, a reader would join the spheres that another column numbers
+        # otherwise a reader would join the spheres that another column numbers
         numbers = np.full(len(packing), -1)
     walls = packing.wall_contacts if packing.wall_contacts.any() else None
     grains = {"id": packing.id, "radius": packing.radius, BODIES: numbers, WALLS: walls}
