@@ -159,7 +159,7 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
         names = " and ".join(file.name for file in there)
         raise SettingsError(f"{path}: {names} may belong to {other.name}: choose another name")
     with ExitStack() as files:
-        # files take their places in reverse order, so the grain file comes when all others are there
+        # files take their places in reverse order: the grain file last, when all others are there
         left = writer.write(packing, files.enter_context(whole_file(path)))
         made = companions_of(packing, path, left)
         for file, data in made.items():
