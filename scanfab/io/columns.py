@@ -36,9 +36,8 @@ POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("x
 HALF_AXES, EXPONENTS = ("shapex", "shapey", "shapez"), ("blockiness1", "blockiness2")
 OLD_EXPONENTS, SIX_DIGITS = ("roundness1", "roundness2"), 1e-5
 # a number is damaged if a grain lies this many periodic cells from the cell's origin, or without a
-# cell (and at least FEW grains) this many times as far from 0 as the others: rounding would leave
-# nothing of its place
-FAR, FEW = 1e12, 10
+# cell this many times as far from 0 as the others: rounding would leave nothing of its place
+FAR = 1e12
 # a diameter that differs from twice the radius by more than this share of it is another size:
 # numbers of few digits are rounded
 ROUNDED = 0.05
@@ -178,7 +177,7 @@ def _position(
 def _refuse_far(where: str, position: FloatArray, radius: FloatArray, cell: Cell | None) -> None:
     """ReadError if a grain is so far away that rounding leaves nothing of its place or size."""
     periodic = cell if cell is not None and cell.is_periodic else None
-    if len(radius) < (FEW if periodic is None else 1):
+    if not len(radius):
         return
     away = np.abs(position - (0.0 if periodic is None else periodic.origin)).max(axis=1)
     size = np.median(away) if periodic is None else np.abs(periodic.vectors).max()
