@@ -67,7 +67,7 @@ def fenced(function: Callable[..., Answer], path: Path, *more: Any) -> Answer:
         except (OSError, EOFError, pickle.UnpicklingError):
             is_sound, answer = False, "its library crashed, or took too much time or memory"
         finally:
-            # it ended; or we were interrupted, and its next answer would be to this question
+            # it ended; or we were interrupted, and its next answer would belong to this question
             if not idle:
                 with suppress(OSError), worker:
                     worker.kill()

@@ -88,7 +88,7 @@ def text_table(path: Path, skip: int) -> TextTable:
         # the line above the rows may be their names, as numpy.savetxt writes them
         words = re.split(r"[\s,;]+", lines[first - 1].strip().lstrip("#%!/").strip())
         names = words if len(words) == width and not any(map(is_number, words)) else None
-    # a row below names that was cut is found when the table is read
+    # rows below names are checked when the table is read
     for number, row in zip(numbers if names is None else (), rows, strict=False):
         if len(row) != width:
             wrong = f"expected {width} columns as above, found {len(row)}"
@@ -157,7 +157,7 @@ def _score(lines: Sequence[str], separator: str, comma: bool) -> float:
     words = [word for row in rows for word in row]
     alike = sum(len(row) == len(rows[0]) > 1 for row in rows) / len(rows)
     numbers = sum(not word or is_number(word, comma) for word in words) / max(len(words), 1)
-    # what no separator parts is one column, of a table of blanks
+    # if no separator splits the rows, it is a table of blanks with one column
     return alike * (1e-3 + numbers) if alike or separator == " " else -1.0
 
 

@@ -316,7 +316,7 @@ def _stored(content: bytes, array: ElementTree.Element, root: ElementTree.Elemen
     kind = f"{'>' if root.get('byte_order') == 'BigEndian' else '<'}u{width}"
     size, full, last = np.frombuffer(head.ljust(3 * width, b"\0"), kind, 3).tolist()
     if root.get("compressor"):
-        # there are so many blocks, which are all full but perhaps the last one
+        # all blocks are full, but perhaps the last one
         size = size * full - (full - last if size and last else 0)
     return int(size) // np.dtype(array.attrib["type"].lower()).itemsize
 

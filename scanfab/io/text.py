@@ -157,7 +157,7 @@ def columns_of(_path: str, rows: bytes, layout: Layout) -> Columns | None:
     if b"\r" in rows or rows.startswith(LIKE_COMPRESSED):
         return None
     rows = _regular(rows, layout)
-    # with a decimal comma a point may stand for thousands, which only words tell
+    # beside a decimal comma a point may be a sign of thousands, which only the words show
     found = None if layout.comma else _parsed(rows, layout, by_words=False)
     if found is not None:
         return found
@@ -176,7 +176,7 @@ def _regular(rows: bytes, layout: Layout) -> bytes:
         kept: npt.NDArray[np.bool_] = text != ord(" ")
         kept[1:] |= kept[:-1].copy()
         return _stripped(text[kept].tobytes())
-    # the first row speaks for all: a search for blanks around each of them would take too long
+    # only the first row is checked for blanks around it: to check all would take too long
     return rows if first == first.strip() else _stripped(rows)
 
 

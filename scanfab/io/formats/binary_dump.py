@@ -126,7 +126,7 @@ def _header(stream: IO[bytes]) -> Header:
             (time,) = _take(stream, "<d")
         names = _text(stream).split()
     (blocks,) = _take(stream, "<i")
-    # a file of the old layout is known by numbers that can be nothing else
+    # the old layout has no mark: it is recognised by the ranges of its numbers
     is_box = np.all(bounds[:, 0] <= bounds[:, 1]) and np.all(np.abs(bounds) <= MOST)
     is_sound = min(step, rows) >= 0 and tilted in (0, 1) and {*faces} <= {0, 1, 2, 3}
     if not (is_sound and is_box and 0 < width == len(names) <= MOST_COLUMNS and blocks > 0):
@@ -190,7 +190,7 @@ def read_in_worker(path: str, frame: int | None) -> tuple[Any, Any]:
     with netCDF4.Dataset(path, "r") as file:
         if getattr(file, "program", "") != "LAMMPS" or "time" not in file.variables:
             raise ValueError("expected what LAMMPS writes by dump netcdf")
-        # what was never written is masked
+        # values that were never written are masked
         file.set_auto_scale(False)
         if frame is None:
             # LAMMPS writes the step as time, and the length of a step as its scale

@@ -70,7 +70,7 @@ class EsysReader(GrainsOnly):
         # the names are absolute where the run was: the files lie beside their header
         names = [word.decode("utf-8", "replace").replace("\\", "/") for word in head[8].split()]
         files = [file_inside(path, name.rpartition("/")[2]) for name in names]
-        # the program writes no line end behind the last name: a header may be cut at any of them
+        # the last name has no line end, so a header that was cut behind any name looks whole
         lost = {one.name for one in self.beside(path)} - {one.name for one in files}
         if lost or not files or len(set(files)) < len(files):
             told = (

@@ -25,12 +25,12 @@ SECTION = re.compile(rb"\n[ \t]*([A-Z][A-Za-z ]*?)[ \t]*(?:#[ \t]*(\S+)[^\n]*)?\
 # the box in the header: bounds and perhaps a tilt, or vectors and their origin
 BOUNDS, TILT = (b"xlo xhi", b"ylo yhi", b"zlo zhi"), b"xy xz yz"
 VECTORS, ORIGIN = (b"avec", b"bvec", b"cvec"), b"abc origin"
-# orders of the columns; image flags, and of hybrid styles the columns of others, stand behind
+# order of the columns; image flags and the columns of other styles of a hybrid stand behind them
 PLAIN = ("id", "type", "diameter", "density", "x", "y", "z")
 HYBRID = ("id", "type", "x", "y", "z", "diameter", "density")
 STYLES = ("", "sphere", "granular", "hybrid")
 FLAGS = ("ix", "iy", "iz")
-# what atoms may be that are no spheres: their third column is a flag, not a diameter
+# atoms that are not spheres: their third column is a flag instead of a diameter
 NO_SPHERES = (b"ellipsoids", b"lines", b"triangles", b"bodies")
 # YADE writes this first line, and radii in the column of diameters
 OF_YADE = b"LIGGGHTS Description"
@@ -137,7 +137,7 @@ def _named(path: Path, style: str, columns: Columns, cell: Cell | None) -> Colum
     named = dict(zip(order, values, strict=False))
     fits = more >= 0 if is_hybrid else more == 0
     if fits and not style:
-        # a grain may reach out of the box, and a periodic one lie there
+        # grains may reach out of the box, and lie outside of a periodic one
         centres = np.column_stack([named[axis] for axis in "xyz"])
         place = np.full_like(centres, np.nan) if cell is None else cell.fractional(centres)
         are_inside, are_whole = (place > -0.5) & (place < 1.5), named["type"] % 1 == 0

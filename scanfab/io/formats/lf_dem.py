@@ -25,7 +25,7 @@ POSITION, PAIR = "position (x, y, z)", ("particle 1 label", "particle 2 label")
 NORMAL = "normal vector, oriented from particle 1 to particle 2"
 PUSH = "norm of the normal part of the contact force"
 TANGENTIAL = "tangential part of the contact force"
-# versions with this title write a push with its sign, whatever the title of the push says
+# versions that have this title write the push with its sign, although its own title says norm
 OF_SIGNED_PUSH = "normal part of the lubrication force"
 
 

@@ -86,7 +86,7 @@ class NpzFormat(GrainsOnly):
         arrays |= found.grains | found.frame
         arrays |= {f"{COLUMN}{name}": values for name, values in found.own.items()}
         if packing.contacts is not None:
-            # they name the rows of grains
+            # pairs are rows of the grains here, not ids
             named = {"pairs": packing.contacts.pairs, **found.contacts}
             arrays |= {name: one for name, one in named.items() if name not in ("id1", "id2")}
         stream = io.BytesIO()

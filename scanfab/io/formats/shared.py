@@ -222,7 +222,7 @@ def marked_frames(
     starts: list[int] = []
     found: list[Snapshot] = []
     size = 0
-    # not mapped into memory: if a mapped file is cut meanwhile, the process dies
+    # the file is not mapped into memory: if it were cut meanwhile, the process would die
     with open(plain(path), "rb") as stream:
         # pieces of whole lines, so that no mark is cut in two
         while piece := stream.read(PIECE) + stream.readline():

@@ -32,8 +32,8 @@ NUMBERS = ("x", "y", "z", "radius", "diameter", "volume", *WHOLE)
 MOST_COLUMNS = 4096
 CENTRES, SIZES = {"x", "y", "z"}, {"radius", "diameter", "volume"}
 OF_GRAINS = ("x", "y", "z", "radius", "diameter", "id", "clump")
-# first grains by which a table without names is judged, and the least median distance of a grain
-# from the nearest one, in its diameters: below it the radii are diameters, or these are frames
+# a table without names is judged by this many grains; if their median distance to the nearest grain
+# is below this many diameters, its radii are diameters, or it holds several frames
 LOOKED_AT, LEAST_DISTANCE = 2000, 0.75
 ASK = (
     'name them, for instance `columns="x=1,y=2,z=3,radius=4"` (or diameter=4; numbers of columns '

@@ -88,7 +88,7 @@ def _read_save(path: Path, options: ReadOptions) -> GrainTable:
         with open(plain(path), "rb") as stream:
             parsed: Any = ElementTree.iterparse(stream)
             for _, element in parsed:
-                # a contact, which stands in the first body that has it, or a body that is there
+                # a contact stands in the first body that has it; bodies may also be references
                 if element.tag != "px":
                     continue
                 if element.find("iterMadeReal") is not None:
@@ -227,7 +227,7 @@ def cell_file(path: Path) -> Path | None:
         # its number counts files; that of a saved state is a step
         spheres = _numbered(folder, f"{exported[1]}-spheres-", stamp)
         cells = _numbered(folder, f"{exported[1]}-periCell-", stamp)
-        # behind the interactions of its frame a cell has the next number, before them the same one
+        # a cell that was exported after the interactions of its frame has the next number
         pairs = dict(zip(sorted(spheres), sorted(cells), strict=False))
         if len(spheres) != len(cells) or any(pairs[one] - one not in (0, 1) for one in pairs):
             return None
