@@ -38,7 +38,6 @@ PARTS |= {"force": ["fx2", "fy2", "fz2"], "force_n": ["fn"]}
 WHOLE = ("id1", "id2", *PARTS["image"])
 # vectors and corner of the cell
 CELL = tuple(f"{vector}{axis}" for vector in "abco" for axis in "xyz")
-# early versions of scanfab wrote no counts
 FRAME = ("step", "time", *CELL, "periodic", "grains", "contacts")
 # bytes of memory for each byte of a file
 IN_MEMORY = 12.0
@@ -181,7 +180,7 @@ def read_frame(path: Path) -> FrameData | None:
     words = {name: word for name, word in zip(rows[0], rows[-1], strict=True) if word}
     along = words.get("periodic", "")
     try:
-        if rows[0] not in (FRAME, FRAME[:-2]) or len(rows) != 2 or set(along) - set("xyz"):
+        if rows[0] != FRAME or len(rows) != 2 or set(along) - set("xyz"):
             raise ValueError(f"expected the line {','.join(FRAME)} and one row")
         cell = None
         if any(name in words for name in CELL):
