@@ -11,11 +11,15 @@ import numpy as np
 
 from scanfab.base.errors import Note
 from scanfab.fabric.forces import doubts_of_forces
-from scanfab.fabric.jackknife import BlockedSums
-from scanfab.fabric.measured import Measured
+from scanfab.fabric.measured import BlockedSums, Measured
+from scanfab.fabric.predicted import (
+    LONGEST_GAP,
+    PREDICTED_ALPHA,
+    WINDOW_ALPHA,
+    predicted_alpha,
+    window_alpha,
+)
 from scanfab.fabric.registry import GROUPS, OWN_FABRICS, checked_values
-from scanfab.fabric.spectrum import LONGEST_GAP, PREDICTED_ALPHA, predicted_alpha
-from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
 from scanfab.packing.columns import RV_COLUMN, sample_values
 from scanfab.packing.sample import Variant
 from scanfab.packing.search import near_pairs

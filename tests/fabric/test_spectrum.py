@@ -8,7 +8,7 @@ import pytest
 import scanfab
 from scanfab import Cell, Packing
 from scanfab.base.space import Space
-from scanfab.fabric.spectrum import LONGEST_GAP, predicted_alpha
+from scanfab.fabric.predicted import LONGEST_GAP, predicted_alpha
 from scanfab.packing.search import NearPairs
 
 NAME = "alpha_vs_axial_contacts"

@@ -12,7 +12,7 @@ import numpy as np
 from scanfab.base.arrays import concatenated
 from scanfab.base.errors import Note
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.blocks import BlockFabrics, block_fabrics
+from scanfab.fabric.void import BlockFabrics, block_fabrics
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.measurement import coarse_spacing, solids_of
 from scanfab.pipeline.plan import Plan

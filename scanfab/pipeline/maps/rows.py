@@ -13,9 +13,8 @@ from scanfab.base.errors import Note, joined
 from scanfab.base.space import SPACE
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.blocks import part_errors, ratio, ratio_with_errors
 from scanfab.fabric.contact import axial_error, contact_fabric
-from scanfab.fabric.errors import homogeneity_of
+from scanfab.fabric.errors import homogeneity_of, part_errors, ratio, ratio_with_errors
 from scanfab.fabric.tensor import FabricTensor, axial, tensor_values
 from scanfab.packing.sample import VARIANTS, Sample, Variant
 from scanfab.pipeline.maps.measurement import MapMeasurement, measure_map
