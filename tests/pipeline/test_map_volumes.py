@@ -7,7 +7,7 @@ import pytest
 
 from scanfab import Cell, Packing, Window, compute, fabric_map, find_contacts, sphere
 from scanfab.base.shapes import box, cylinder
-from scanfab.pipeline.maps.region import volumes_inside
+from scanfab.pipeline.maps.blocks import volumes_inside
 from scanfab.scan.blocks import Blocks
 from tests.helpers.lattices import shaken_cubic
 
