@@ -49,39 +49,36 @@ def windows_of(sample: Sample, settings: Settings) -> list[Window]:
     Raises
     ------
     SettingsError
-        If it is far smaller than any grain, or its surface is that of no convex body.
+        If one is far smaller than any grain or lies beside the plane of the discs, or if its
+        surface is that of no convex body.
     ReadError
         If the file of its surface cannot be read.
     """
-    surfaces = SurfaceBox.of(sample.packing, sample.gathered)
-    half = 0.5 * surfaces.extents
-    return [_window(sample, settings, one * half, surfaces.center) for one in settings.rvs]
-
-
-def _window(sample: Sample, settings: Settings, part: FloatArray, middle: FloatArray) -> Window:
-    """The RV whose sizes, where none are given, are those of a part of the sample's box."""
     packing, space = sample.packing, sample.packing.space
-    shape, center = _shape(settings, part, space)
-    if settings.rv_center is not None:
-        center = np.array(settings.rv_center, dtype=float)
-    elif center is None:
-        center = np.array(middle, dtype=float)
-    if space.across is not None:
-        # an RV that lies beside the plane by rounding is one in the plane
-        if abs(center[space.across] - packing.place_across) > packing.radius.max():
-            raise SettingsError(
-                f"rv_center: lies outside {space} of the discs: expected "
-                f"{spelt_plane(packing.position, space)}, found {center[space.across]:g}"
-            )
-        center[space.across] = packing.place_across
+    surfaces = SurfaceBox.of(packing, sample.gathered)
     smallest = float(packing.radius[sample.grains].min())
-    half = 0.5 * float((shape.high - shape.low)[list(space.along)].min())
-    if half < SMALLEST * smallest:
-        raise SettingsError(
-            f"rv: the {shape} is nothing beside the smallest grain (radius {smallest:g}): choose a "
-            f"larger `rv`, `rv_radius` or `rv_size`"
-        )
-    return Window(center, shape)
+    found = []
+    for fraction in settings.rvs:
+        shape, center = _shape(settings, fraction * (0.5 * surfaces.extents), space)
+        if settings.rv_center is not None:
+            center = np.array(settings.rv_center, dtype=float)
+        elif center is None:
+            center = surfaces.center.copy()
+        if space.across is not None:
+            # an RV that lies beside the plane by rounding is one in the plane
+            if abs(center[space.across] - packing.place_across) > packing.radius.max():
+                raise SettingsError(
+                    f"rv_center: lies outside {space} of the discs: expected "
+                    f"{spelt_plane(packing.position, space)}, found {center[space.across]:g}"
+                )
+            center[space.across] = packing.place_across
+        if 0.5 * (shape.high - shape.low)[list(space.along)].min() < SMALLEST * smallest:
+            raise SettingsError(
+                f"rv: the {shape} is nothing beside the smallest grain (radius {smallest:g}): "
+                f"choose a larger `rv`, `rv_radius` or `rv_size`"
+            )
+        found.append(Window(center, shape))
+    return found
 
 
 def _shape(settings: Settings, part: FloatArray, space: Space) -> tuple[Convex, FloatArray | None]:
@@ -104,9 +101,8 @@ def _shape(settings: Settings, part: FloatArray, space: Space) -> tuple[Convex, 
     try:
         return shapes.polyhedron(*read_surface(Path(kind)))
     except SettingsError as error:
-        raise SettingsError(
-            f"rv_shape: {kind}: {error}: expected a closed convex surface"
-        ) from None
+        text = f"rv_shape: {kind}: {error}: expected a closed convex surface"
+        raise SettingsError(text) from None
 
 
 def _cylinder_within(half: FloatArray, axis: Vector) -> tuple[float, float]:

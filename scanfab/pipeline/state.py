@@ -49,7 +49,8 @@ def contact_forces(sample: Sample, chosen: BoolArray) -> ContactForces | None:
     contacts = sample.contacts
     if contacts.force_n is None:
         return None
-    branch = np.einsum("ci,ci->c", _branches(sample.packing)[chosen], contacts.normal[chosen])
+    _, branch = _places_and_branches(sample.packing)
+    branch = np.einsum("ci,ci->c", branch[chosen], contacts.normal[chosen])
     force = None if contacts.force is None else contacts.force[chosen]
     return ContactForces(branch, contacts.force_n[chosen], force)
 
@@ -104,17 +105,17 @@ def _volume(packing: Packing, window: Window | None) -> float | None:
     return None if cell is None or not cell.is_endless else cell.volume
 
 
-def _places(packing: Packing) -> FloatArray:
-    """The place of each sphere, of a clump that of its image next to the sphere, shape (N, 3)."""
-    bodies, position = packing.bodies, packing.position
-    return position if bodies is None else position + bodies.to_place(position, packing.cell)
+def _places_and_branches(packing: Packing) -> tuple[FloatArray, FloatArray]:
+    """
+    The place of each sphere, (N, 3), and from the first grain's place to the second's, (M, 3).
 
-
-def _branches(packing: Packing) -> FloatArray:
-    """From the first grain's place to the second's, shape (M, 3)."""
-    contacts = packing.contacts
+    Of a clump the place of its image next to the sphere.
+    """
+    places, bodies, contacts = packing.position, packing.bodies, packing.contacts
     assert contacts is not None
-    return branches(_places(packing), contacts.pairs, contacts.image, packing.cell)
+    if bodies is not None:
+        places = places + bodies.to_place(places, packing.cell)
+    return places, branches(places, contacts.pairs, contacts.image, packing.cell)
 
 
 def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
@@ -124,8 +125,8 @@ def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
     if contacts.force is None or volume is None:
         return None
     one, two = contacts.pairs.T
-    places = _places(packing)
-    start, end = places[one], places[one] + _branches(packing)
+    places, branch = _places_and_branches(packing)
+    start, end = places[one], places[one] + branch
     # boundary is a wall: the branch of such a contact ends where the grain does
     start = np.where(sample.boundary[one][:, None], contacts.point, start)
     end = np.where(sample.boundary[two][:, None], contacts.point, end)
@@ -183,7 +184,13 @@ def cut_volumes(
     if shape.is_sphere:
         return lens_volumes(np.linalg.norm(places, axis=1), radius, shape.reach, space)
     points = _points_in_ball(space)
-    found = surely_inside(shape, places, radius).astype(np.float64)
+    # A convex region that holds the ball of radius ρ about the origin and the place x / (1 - r/ρ)
+    # also holds the sphere of radius r about x.
+    curved = float(np.linalg.eigvalsh(shape.quadric.form)[-1])
+    ball = math.sqrt(shape.quadric.level / curved) if curved > 0.0 else math.inf
+    room = 1.0 - radius / min([ball, *shape.planes[:, 3]])
+    scaled = places / np.where(room > 0.0, room, 1.0)[:, None]
+    found = ((room > 0.0) & shape.contains(scaled)).astype(np.float64)
     cut = np.flatnonzero(found == 0.0)
     for first in range(0, len(cut), CHUNK):
         rows = cut[first : first + CHUNK]
@@ -191,18 +198,6 @@ def cut_volumes(
         inside = shape.contains(spread.reshape(-1, 3)).reshape(-1, len(points))
         found[rows] = inside.mean(axis=1)
     return space.volume(radius, found)
-
-
-def surely_inside(shape: Convex, points: FloatArray, radius: FloatArray) -> BoolArray:
-    """Whether spheres lie wholly in a region; a few in an ellipsoid or cylinder are not found."""
-    form = shape.quadric.form
-    # √(x·form·x) is a norm: that of a sphere's places is at most that of both parts
-    most = math.sqrt(max(float(np.linalg.eigvalsh(form)[-1]), 0.0))
-    middle = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", points, form, points), 0.0))
-    inside = middle + most * radius < math.sqrt(shape.quadric.level)
-    for plane in shape.planes:
-        inside &= points @ plane[:3] + radius < plane[3]
-    return np.asarray(inside)
 
 
 def _rays(count: int, space: Space = SPACE) -> FloatArray:

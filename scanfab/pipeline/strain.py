@@ -47,8 +47,8 @@ def axial_length(sample: Sample, mode: str, axis: Vector) -> float | None:
     mode = strain_mode(sample, mode, axis)
     if mode != "cell":
         return float(np.ptp(centers_of(sample, mode) @ np.array(axis))) if mode else None
-    along, is_along = _nearest(axis)
-    if not is_along:
+    along = _coordinate_of(axis)
+    if along is None:
         raise SettingsError("strain: cell was asked for, but the axis is not x, y or z")
     return float(cell_of(sample).vectors[along, along])
 
@@ -57,16 +57,16 @@ def strain_mode(sample: Sample, mode: str, axis: Vector) -> str:
     """What ``auto`` stands for in a frame, empty where it finds nothing; else the mode itself."""
     if mode != "auto":
         return mode
-    cell, (along, is_along) = sample.packing.cell, _nearest(axis)
-    if cell is not None and is_along and cell.periodic[along]:
+    cell, along = sample.packing.cell, _coordinate_of(axis)
+    if cell is not None and along is not None and cell.periodic[along]:
         return "cell"
     return "boundary" if sample.boundary.any() else ""
 
 
-def _nearest(axis: Vector) -> tuple[int, bool]:
-    """Which of x, y, z is nearest to the axis, and whether that is the axis itself."""
+def _coordinate_of(axis: Vector) -> int | None:
+    """Which of x, y, z the axis is; None for an oblique one."""
     along = int(np.argmax(np.abs(axis)))
-    return along, abs(axis[along]) > 1 - 1e-12
+    return along if abs(axis[along]) > 1 - 1e-12 else None
 
 
 def cell_of(sample: Sample) -> Cell:
@@ -175,7 +175,7 @@ def is_flipped(cell: Cell | None, before: Cell | None) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Strains:
-    """Strains of the frames of a series, since its first frame that has grains."""
+    """What the strains of a series are measured by, since its first frame that has grains."""
 
     mode: str
     """As for :func:`axial_length`; of no meaning if there is a file."""
@@ -222,23 +222,21 @@ class Strains:
 
 
 class Flips:
-    """The cells of a series, each held against those of the frames before and behind it."""
+    """Whether the cell of a series is flipped from one of its chosen frames to the next."""
 
     def __init__(self, step: int | None) -> None:
         """Frames are chosen with a step, as in a slice."""
         self.step = abs(step or 1)
-        self.cells: dict[int, Cell | None] = {}
+        self.before: tuple[int, Cell | None] = -self.step, None
 
     def notes(self, number: int, cell: Cell | None) -> list[Note]:
-        """What to tell once the cell of one more frame is known."""
-        self.cells[number] = cell
-        return [
-            Note(
-                "flipped_cell",
-                f"the cell seems to be flipped between the frames {early} and {late}: from there "
-                f"on its vectors are others than in the first frame, and shear_strain is not the "
-                f"strain since then (LAMMPS: fix deform ... flip no)",
-            )
-            for early, late in ((number - self.step, number), (number, number + self.step))
-            if is_flipped(self.cells.get(late), self.cells.get(early))
-        ]
+        """What to tell of the cell of one more frame; frames come in their order."""
+        (early, before), self.before = self.before, (number, cell)
+        if early != number - self.step or not is_flipped(cell, before):
+            return []
+        text = (
+            f"the cell seems to be flipped between the frames {early} and {number}: from there on "
+            f"its vectors are others than in the first frame, and shear_strain is not the strain "
+            f"since then (LAMMPS: fix deform ... flip no)"
+        )
+        return [Note("flipped_cell", text)]
