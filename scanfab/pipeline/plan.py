@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -132,11 +132,9 @@ class Plan:
         """The plan with the windows as they lie in a frame."""
         if self.deformation is None:
             return self
-        return self._with(self.deformation.windows_in(sample, self.windows))
-
-    def _with(self, windows: Sequence[Window]) -> Plan:
+        windows = self.deformation.windows_in(sample, self.windows)
         rvs = zip(self.rvs, windows, strict=True)
-        return replace(self, rvs=tuple(rv._replace(window=window) for rv, window in rvs))
+        return replace(self, rvs=tuple(RV(rv.fraction, window) for rv, window in rvs))
 
     def along(self, replicates: int) -> Iterator[Plan]:
         """The plans of the other RVs, for the lines that the first was scanned along."""
@@ -184,18 +182,18 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
         If the packing cannot be measured.
     """
     refuse_impossible(sample)
-    settings = settings_in(settings, sample.packing.space)
-    plan = plan_without_grains(settings, sample.packing.space)
-    radii = sample.packing.radius[sample.grains]
-    r_min, r_mean, r_max = float(radii.min()), float(radii.mean()), float(radii.max())
-    lengths = {"rmin": r_min, "rmean": r_mean, "rmax": r_max}
-    box = SurfaceBox.of(sample.packing, sample.gathered)
+    packing, space = sample.packing, sample.packing.space
+    settings = settings_in(settings, space)
+    plan = plan_without_grains(settings, space)
+    radii = packing.radius[sample.grains]
+    lengths = {"rmin": float(radii.min()), "rmean": float(radii.mean()), "rmax": float(radii.max())}
+    box = SurfaceBox.of(packing, sample.gathered)
     windows = windows_of(sample, settings) if settings.needs_window else []
-    notes = [one for window in windows for one in doubts_of_rv(window, sample, box, r_max)]
+    notes = [note for one in windows for note in doubts_of_rv(one, sample, box, lengths["rmax"])]
     blocks: MapBlocks | None = None
     if isinstance(settings, MapSettings):
         blocks = MapBlocks.of(settings, sample)
-        notes += blocks.doubts(sample, next(iter(windows), None), r_mean)
+        notes += blocks.doubts(sample, windows[0] if windows else None, lengths["rmean"])
     if plan.rule.bias > 0.1 * settings.tolerance:
         name, bias = plan.rule.name, plan.rule.bias
         text = f"directions {name}: an isotropic sample would get alpha = {bias:.2g}"
@@ -204,30 +202,27 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     if settings.rv_follows != "none" and settings.needs_window:
         deformation = Deformation.since(sample, settings.strain, settings.axis)
     cutoff = settings.cutoff.resolve(lengths)
-    # as many as were asked for, also if two are equal: every frame has the same number of rows
-    cutoffs = tuple(sorted(one.resolve(lengths) for one in settings.cutoffs)) or (cutoff,)
+    # of several RVs the first gets the share of all chords that its scan cuts at least
+    share = 1.0
+    if len(windows) > 1:
+        volumes = [one.shape.volume for one in windows]
+        share = volumes[0] / sum(volumes)
+        if any(not VARIANTS[one].in_window for one in settings.variants):
+            # its scan is that of the whole, too
+            share = 1.0 / len(windows)
     return replace(
-        plan._with(windows),
+        plan,
+        rvs=tuple(RV(rv.fraction, one) for rv, one in zip(plan.rvs, windows, strict=True)),
         strains=plan.strains.since(sample),
         deformation=deformation,
-        max_chords=plan.max_chords * _share_of_first(windows, settings),
+        max_chords=plan.max_chords * share,
         cutoff=cutoff,
-        cutoffs=cutoffs,
+        # as many as were asked for, also if two are equal: all frames have the same number of rows
+        cutoffs=tuple(sorted(one.resolve(lengths) for one in settings.cutoffs)) or (cutoff,),
         map_blocks=blocks,
         notes=tuple(notes),
         **_lines(settings, len(plan.rule), box, windows[0].shape if windows else None, lengths),
     )
-
-
-def _share_of_first(windows: Sequence[Window], settings: Settings) -> float:
-    """Of several RVs: the share of all chords that the scan of the first one cuts at least."""
-    if len(windows) < 2:
-        return 1.0
-    if any(not VARIANTS[one].in_window for one in settings.variants):
-        # the first scan is that of the whole, too
-        return 1.0 / len(windows)
-    volumes = [one.shape.volume for one in windows]
-    return volumes[0] / sum(volumes)
 
 
 def _lines(
@@ -235,7 +230,15 @@ def _lines(
 ) -> dict[str, Any]:
     """How close the lines are, in how many replicates, and what an auto scan may add."""
     space = box.space
-    reach, area, depth = _scanned(box, shape)
+    # How large is what lines scan, the window, or of the whole half the smallest extent: its reach;
+    # the area that lines of one direction pierce, in the mean of all (in a plane a length); and
+    # three quarters of the mean length of the lines in it, of a sphere the radius.
+    reach = 0.5 * box.smallest_extent if shape is None else shape.reach
+    area, depth = math.pi * reach**2, reach
+    if space.is_plane or (shape is not None and not shape.is_sphere):
+        shape = shape or circle(reach, space)
+        area = shape.mean_shadow
+        depth = 0.75 * shape.volume / area
     if settings.spacing is None:
         spacing = _auto_spacing(settings, axes, area, depth, lengths["rmean"], space)
         return {"spacing": spacing, "replicates": REPLICATES, "auto": "replicates"}
@@ -250,22 +253,6 @@ def _lines(
     fewest, most = (REPLICATES, MOST_REPLICATES) if auto else (1, REPLICATES)
     replicates = int(min(max(space.lines(area, asked) / FEWEST_LINES, fewest), most))
     return {"spacing": asked * space.apart(replicates), "replicates": replicates, "auto": auto}
-
-
-def _scanned(box: SurfaceBox, shape: Convex | None) -> tuple[float, float, float]:
-    """
-    How large is what lines scan: the window, or of the whole half the smallest extent.
-
-    That is its reach; the area that lines of one direction pierce, in the mean of all (in a plane
-    a length); and three quarters of the mean length of the lines in it, of a sphere the radius.
-    """
-    reach = 0.5 * box.smallest_extent if shape is None else shape.reach
-    if box.space.is_plane:
-        shape = shape or circle(reach, box.space)
-    elif shape is None or shape.is_sphere:
-        return reach, math.pi * reach**2, reach
-    area = shape.mean_shadow
-    return reach, area, 0.75 * shape.volume / area
 
 
 def _auto_spacing(

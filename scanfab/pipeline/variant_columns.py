@@ -72,14 +72,18 @@ class VariantColumns:
             found |= fabric.values(measured)
         for name, fabric in installed_fabrics().items():
             found |= checked_values(name, fabric, measured)
-        asked = {RV_COLUMN.name: self.rv, "edge": self.edge, "left_out": self.left_out}
+        more: dict[str, Any] = {
+            RV_COLUMN.name: self.rv,
+            "edge": self.edge,
+            "left_out": self.left_out,
+        }
         if WINDOW_ALPHA.name in plan.more_columns:
-            asked[WINDOW_ALPHA.name] = self.window_alpha
+            more[WINDOW_ALPHA.name] = self.window_alpha
         if PREDICTED_ALPHA.name in plan.more_columns:
-            asked[PREDICTED_ALPHA.name] = self.predicted_alpha
+            more[PREDICTED_ALPHA.name] = self.predicted_alpha
         for group in plan.groups:
-            asked |= GROUPS[group].values(measured)
-        return found | {name: asked[name] for name in plan.more_columns if name in asked}
+            more |= GROUPS[group].values(measured)
+        return found | {name: more[name] for name in plan.more_columns if name in more}
 
     @cached_property
     def measured(self) -> Measured:
@@ -166,14 +170,15 @@ class VariantColumns:
         return (Note(code, text, (about,)) for code, text in texts.items())
 
     def _doubts_of_void(self) -> dict[str, str]:
-        void = self.measured.void
+        void, window = self.measured.void, self.window
         if not self.measured.meets_solids:
             with_rattlers = replace(self.variant, without_rattlers=False)
-            rattlers = self.sample.number(self.sample.solids(with_rattlers, self.window))
+            rattlers = self.sample.number(self.sample.solids(with_rattlers, window))
+            if not rattlers:
+                return {"no_solid": f"no grain reaches into the {window}"}
             there = " that reach into the RV" if self.variant.in_window else ""
-            left = f"no grain is left, all {rattlers}{there} are rattlers"
-            return {"no_solid": left if rattlers else f"no grain reaches into the {self.window}"}
-        if self.edge == ENDS and self.window is None and self.measurement.solids.inner is None:
+            return {"no_solid": f"no grain is left, all {rattlers}{there} are rattlers"}
+        if self.edge == ENDS and window is None and self.measurement.solids.inner is None:
             return {"no_inner_window": NO_INNER_WINDOW}
         if self.measured.segment_count == 0:
             times = self.cutoff / float(self.sample.packing.radius[self.sample.grains].min())
@@ -185,13 +190,9 @@ class VariantColumns:
         if void is None:
             text = "in some direction no void segment is kept, so there is no void fabric"
             return {"empty_direction": text}
-        if void.filled <= 0.01:
-            return {}
-        text = (
-            f"{void.filled:.0%} of the directions keep no void segment in a replicate: choose a "
-            f"smaller spacing"
-        )
-        return {"filled_directions": text}
+        filled = f"{void.filled:.0%} of the directions keep no void segment in a replicate"
+        text = f"{filled}: choose a smaller spacing"
+        return {"filled_directions": text} if void.filled > 0.01 else {}
 
 
 def no_columns(more: Collection[str] = ()) -> dict[str, Any]:
