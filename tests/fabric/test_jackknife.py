@@ -116,16 +116,6 @@ def test_contacts_are_recomputed_without_each_octant():
     assert contact_scatter(normals, np.full(200, 4)) is None
 
 
-def test_error_of_independent_contacts_is_their_scatter():
-    """The variance of one contact over their number: of (3 cos² - 1)/2 over the sphere 1/5."""
-    random = np.random.default_rng(3)
-    variance = [
-        contact_scatter(unit_vectors(random, 400), random.integers(0, 8, 400)).error ** 2
-        for _ in range(400)
-    ]
-    assert np.mean(variance) == pytest.approx(0.2 / 400, rel=0.1)
-
-
 def void_scatter(axes, length, number):
     """From lengths and numbers by octant, shape (8, R, D)."""
     total = length.sum(axis=0), number.sum(axis=0)
