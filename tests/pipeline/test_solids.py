@@ -56,15 +56,6 @@ def test_a_scan_by_hand_is_that_of_compute(periodic, variants, lines):
         assert fabric.mean_length == pytest.approx(row.mean_length, rel=1e-14)
 
 
-def test_positions_are_told_from_an_origin():
-    one = packing()
-    sample = Sample(one, np.zeros(len(one), bool))
-    for window in (None, Window([2.0, 3.0, 3.0], scanfab.sphere(1.5))):
-        solids = scanfab.solids_of(sample, window)
-        np.testing.assert_allclose(solids.position + solids.origin, one.position, atol=1e-14)
-    np.testing.assert_array_equal(solids.origin, window.center)
-
-
 def test_a_window_wider_than_the_cell_is_refused():
     sample = Sample(packing(periodic=True), np.zeros(COUNT**3, bool))
     with pytest.raises(SettingsError, match="wider than the cell"):

@@ -158,11 +158,6 @@ def test_lenses_and_points_agree():
     assert points.sum() == pytest.approx(exact.sum(), rel=3e-4)
 
 
-def test_a_box_cuts_a_sphere_in_half():
-    found = cut_volumes(np.array([[1.0, 0, 0]]), np.array([0.5]), box((2.0, 2.0, 2.0)))
-    assert found[0] == pytest.approx(0.5 * np.pi / 6, rel=3e-3)
-
-
 # the programs' own numbers
 
 
@@ -187,31 +182,27 @@ def lammps():
 
 
 @pytest.mark.parametrize("frame", [0, 1])
-def test_fabric_and_forces_are_those_of_lammps_compute_fabric(lammps, frame):
-    found = table(lammps[frame])
-    told = np.loadtxt(LAMMPS / "fabric.txt")[frame, 1:].reshape(4, 6)
-    fabric = 7.5 * (found.tensor("gc")[0] - np.eye(3) / 3)
-    np.testing.assert_allclose(six(fabric), told[0], rtol=0, atol=1e-13)
-    np.testing.assert_allclose(six(found.tensor("bn")[0]), told[1], rtol=0, atol=1e-13)
-    np.testing.assert_allclose(six(found.tensor("fn")[0]), told[2], rtol=0, atol=1e-13)
-
-
-@pytest.mark.parametrize("frame", [0, 1])
-def test_stress_is_the_virial_of_lammps(lammps, frame):
+def test_fabric_forces_and_stress_are_those_of_lammps(lammps, frame):
     """
-    Within a thousandth of the kinetic part, which the forces' damping at another moment makes.
+    Its compute fabric, and its virial.
 
+    That within a thousandth of the kinetic part, which the forces' damping at another moment makes.
     Off the diagonal LAMMPS has one of the two components whose mean is taken here.
     """
+    packing, found = lammps[frame], table(lammps[frame])
+    told = np.loadtxt(LAMMPS / "fabric.txt")[frame, 1:].reshape(4, 6)
+    fabric = 7.5 * (found.tensor("gc")[0] - np.eye(3) / 3)
+    for one, theirs in zip(
+        (fabric, found.tensor("bn")[0], found.tensor("fn")[0]), told[:3], strict=True
+    ):
+        np.testing.assert_allclose(six(one), theirs, rtol=0, atol=1e-13)
     told = np.loadtxt(LAMMPS / "stress.txt")[frame, 1:]
-    stress = whole(lammps[frame]).stress
     kinetic = np.abs(told[6:9] - told[:3]).max()
-    assert np.all(np.abs(np.diag(stress) - told[:3]) < kinetic)
-    contacts, volume = lammps[frame].contacts, abs(np.linalg.det(lammps[frame].cell.vectors))
-    one, two = contacts.pairs.T
-    branch = lammps[frame].position[two] - lammps[frame].position[one]
-    branch += contacts.image @ lammps[frame].cell.vectors
-    product = branch.T @ contacts.force / volume
+    assert np.all(np.abs(np.diag(whole(packing).stress) - told[:3]) < kinetic)
+    one, two = packing.contacts.pairs.T
+    branch = packing.position[two] - packing.position[one]
+    branch += packing.contacts.image @ packing.cell.vectors
+    product = branch.T @ packing.contacts.force / abs(np.linalg.det(packing.cell.vectors))
     np.testing.assert_allclose(six(product), told[:6], atol=3e-6 * told[:3].mean())
 
 
