@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -111,18 +111,8 @@ def _with_gaps(
     sample: Sample, solids: Solids, sums: ScanSums, plan: Plan, notes: tuple[Note, ...]
 ) -> Measurement:
     """A scan with all gaps of its lines, if need be, and the gaps of fewer lines by block."""
-    blocks = _blocks(sample, plan)
-    scan = partial(
-        scan_gaps,
-        solids,
-        cutoffs=plan.cutoffs,
-        blocks=(blocks[0].moved(solids.origin), blocks[1].moved(solids.origin)),
-        variants=plan.variants,
-        seed=plan.seed,
-        workers=plan.workers,
-        # the scan before tells how long these take: they need no limit
-        most_steps=math.inf,
-    )
+    blocks = _octants(sample, plan)
+    scan = gap_scan(solids, plan, blocks, plan.cutoffs)
     gaps = None
     if plan.lists_gaps:
         gaps = scan(plan.rule, spacing=plan.spacing, replicates=range(sums.replicates))
@@ -137,7 +127,23 @@ def _with_gaps(
     return Measurement(sample, plan, solids, sums, gaps, blocked, rule, blocks, notes)
 
 
-def _blocks(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
+def gap_scan(
+    solids: Solids, plan: Plan, blocks: tuple[Blocks, Blocks], cutoffs: Sequence[float]
+) -> Callable[..., GapSums]:
+    """
+    A scan of all gaps by blocks of the dump's coordinates, with the variants and seed of a plan.
+
+    What is left to name is the rule, spacing and replicates. Its steps are not limited: the scan
+    before it tells how long it takes.
+    """
+    return partial(
+        scan_gaps, solids,
+        cutoffs=cutoffs, blocks=(blocks[0].moved(solids.origin), blocks[1].moved(solids.origin)),
+        variants=plan.variants, seed=plan.seed, workers=plan.workers, most_steps=math.inf,
+    )  # fmt: skip
+
+
+def _octants(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
     """Octants about the middle of the sample (of the cell), and about the centre of the RV."""
     packing, cell = sample.packing, sample.packing.cell
     position = packing.position[sample.gathered]

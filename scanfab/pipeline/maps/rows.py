@@ -28,14 +28,13 @@ from scanfab.pipeline.maps.blocks import (
     surface_of,
     volumes_inside,
 )
-from scanfab.pipeline.measurement import coarse_spacing, solids_of
+from scanfab.pipeline.measurement import coarse_spacing, gap_scan, solids_of
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.tolerance import Errors, Goal, scan_to_tolerance
 from scanfab.pipeline.variant_columns import doubts_of_lines, edge_of, left_out_of
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import design_of
 from scanfab.scan.edges import CLIP, ENDS, START
-from scanfab.scan.gaps import scan_gaps
 from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Solids
 from scanfab.table.columns import row_of
@@ -84,9 +83,8 @@ def map_rows(
     solids = solids_of(sample, plan.window, variants=plan.variants, edge=plan.edge)
     whole = map_blocks.of_whole(sample.packing.cell)
     blocks = whole, whole if plan.window is None else map_blocks.of_window(plan.window)
-    goal = MedianBlock((blocks[0].moved(solids.origin), blocks[1].moved(solids.origin)))
-    sums, plan, notes = scan_to_tolerance(solids, plan, where, goal)
-    parts = _part_sums(solids, plan, goal.blocks, sums)
+    sums, plan, notes = scan_to_tolerance(solids, plan, where, MedianBlock(blocks))
+    parts = _part_sums(solids, plan, blocks, sums)
     rows = []
     for name in plan.variants:
         variant = VARIANTS[name]
@@ -112,20 +110,16 @@ class MedianBlock(Goal):
     """The error of the median block of each variant is to meet the tolerance."""
 
     blocks: tuple[Blocks, Blocks]
-    """In the coordinates of the solids."""
+    """Of the whole and of the window, in the dump's coordinates."""
 
     def scan(
         self, solids: Solids, plan: Plan, replicates: range, most_steps: float = math.inf
     ) -> MapSums:
         """As planned; replicate by replicate, as the sums of all their axes would be too many."""
         weights, moment, parts = plan.rule.weights, plan.moment, []
-        for replicate in replicates:
-            sums = scan_gaps(
-                solids, plan.rule,
-                spacing=plan.spacing, cutoffs=[plan.cutoff], blocks=self.blocks,
-                variants=plan.variants, replicates=[replicate], seed=plan.seed,
-                workers=plan.workers, most_steps=most_steps,
-            )  # fmt: skip
+        scan = partial(gap_scan(solids, plan, self.blocks, [plan.cutoff]), plan.rule)
+        for one in replicates:
+            sums = scan(spacing=plan.spacing, replicates=[one], most_steps=most_steps)
             most_steps -= float(sums.scan.steps.sum())
             fabrics = {
                 name: block_fabrics(sums.axes, weights, *sums.in_blocks(name, 0, moment))
@@ -165,15 +159,16 @@ def _part_sums(
     rule, parts = design_of(PART_AXES), []
     most = min(MOST_CHORDS, plan.max_chords)
     spacing = coarse_spacing(solids, PART_REPLICATES * len(rule), before, plan, most)
+    finer = blocks[0].finer(), blocks[1].finer()
+    scan, clipped = (
+        gap_scan(one, plan, finer, [0.0, plan.cutoff])
+        for one in (solids, replace(solids, edge=CLIP))
+    )
     for replicate in range(PART_REPLICATES):
-        scan = partial(
-            scan_gaps, rule=rule, spacing=spacing, cutoffs=[0.0, plan.cutoff],
-            blocks=(blocks[0].finer(), blocks[1].finer()), variants=plan.variants,
-            replicates=[replicate], seed=plan.seed, workers=plan.workers, most_steps=math.inf,
-        )  # fmt: skip
-        sums = scan(solids)
-        # by the rule start, segments count with what is outside the window, too
-        voids = sums if solids.edge != START else scan(replace(solids, edge=CLIP))
+        sums = voids = scan(rule, spacing=spacing, replicates=[replicate])
+        if solids.edge == START:
+            # by this rule segments count with what is outside the window, too
+            voids = clipped(rule, spacing=spacing, replicates=[replicate])
         found = {}
         for name in plan.variants:
             by_part = blocks[name in "cd"].by_part
