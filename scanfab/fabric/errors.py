@@ -175,14 +175,14 @@ def ratio(over: FloatArray, under: FloatArray) -> FloatArray:
 
 
 class Homogeneity(NamedTuple):
-    """What the scatter of blocks says."""
+    """Whether blocks scatter more than their errors explain."""
 
     ratio: float
-    """Of their scatter to what their errors explain: 1 in the mean of homogeneous samples."""
+    """Scatter of the blocks over what their errors explain; about 1 in homogeneous samples."""
     chance: float
-    """That blocks of a homogeneous sample scatter so much or more."""
+    """Probability that the blocks of a homogeneous sample scatter as much or more."""
     blocks: int
-    """How many there are."""
+    """Number of blocks."""
 
 
 def homogeneity_of(
@@ -224,7 +224,7 @@ def homogeneity_of(
     >>> homogeneity_of(shifted, *words).chance < 0.001
     True
     """
-    # loaded here, as few need it
+    # imported here because few scans need it
     from scipy.special import fdtrc
 
     known = np.isfinite(values) & np.isfinite(variances) & (variances > 0) & (weights > 0)

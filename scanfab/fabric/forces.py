@@ -32,14 +32,14 @@ from scanfab.fabric.invariants import fabric_deviator
 from scanfab.fabric.measured import Measured
 from scanfab.fabric.tensor import COMPONENTS
 
-# of a tangential to the mean normal force: what remains of it where only digits are left
+# tangential over mean normal force: less than this is rounding of the digits in the dump
 NO_FRICTION = 1e-4
-# of the largest force: what differs by less is equal
+# differences below this share of the largest force are rounding
 ROUNDING = 1e-12
 
 
 class DirectionalMean(NamedTuple):
-    """How a mean over the contacts of a direction depends on that: a tensor without trace."""
+    """How the mean over contacts depends on their direction: a tensor without trace."""
 
     matrix: FloatArray
     """Shape (3, 3), dimensionless."""

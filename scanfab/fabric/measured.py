@@ -21,7 +21,7 @@ LEAST_RATIO = 0.02
 
 
 class ContactForces(NamedTuple):
-    """What the contacts of one variant bear, and what they span."""
+    """Forces and branches of the contacts of one variant."""
 
     branch: FloatArray
     """From the first grain's centre to the second's, along the normal; shape (M,), a length."""
@@ -49,7 +49,7 @@ class BlockedSums(NamedTuple):
 
 
 class SampleState(NamedTuple):
-    """What is known of the sample beside its fabric."""
+    """Void ratio, coordination and stress of the sample."""
 
     void_ratio: float | None
     """Volume of the voids over that of the grains; None without a volume."""
@@ -82,7 +82,7 @@ class SampleState(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What a fabric is computed from, and what several of them need of that."""
+    """What fabrics are computed from, and results that several of them share."""
 
     axis: FloatArray
     """Loading axis, a unit vector, shape (3,)."""
@@ -117,7 +117,7 @@ class Measured:
     segment_count: int = 0
     """Number of the kept void segments of all replicates."""
     forces: ContactForces | None = None
-    """What these contacts bear; None if that is not known, or not asked for."""
+    """Forces of these contacts; None if they are unknown or not asked for."""
     state: SampleState | None = None
     """Stress and void ratio, where they are asked for."""
 

@@ -89,7 +89,7 @@ class Scatter:
 
 
 class Halves:
-    """The columns of what the scan's noise makes of the void fabric without each block."""
+    """The columns of the scan's noise in the void fabric without each block."""
 
     columns = numbers(
         {

@@ -95,7 +95,7 @@ class VoidFabric:
 
     def expected_error(self, axis: npt.ArrayLike, degree: int | None = None) -> float | None:
         """
-        The same from the scatter of the mean lengths about an even polynomial.
+        The same error from the scatter of the mean lengths about an even polynomial.
 
         Far less noisy for few replicates, as every axis counts, but it depends on the polynomial:
         good for planning a scan.
@@ -121,10 +121,10 @@ class VoidFabric:
         lengths, terms = self.mean_lengths.ravel(), design.shape[1]
         if len(lengths) < 3 * terms:
             return None
-        # many more lengths than terms: the normal equations do, and are much faster
+        # with many more lengths than terms the normal equations suffice and are much faster
         fit = np.linalg.lstsq(design.T @ design, design.T @ lengths, rcond=None)[0]
         variance = np.sum((lengths - design @ fit) ** 2) / (len(lengths) - terms)
-        # by how much a mean length moves the axial anisotropy, a ratio of sums over the axes
+        # derivative of the axial anisotropy, a ratio of sums over the axes, by each mean length
         along = space.axial((self.axes @ np.asarray(axis, dtype=float)) ** 2)
         slope = self.weights * (along - self.tensor.axial(axis))
         slope /= (self.mean_lengths @ self.weights)[:, None]

@@ -1,4 +1,4 @@
-"""How many lines are enough: ladders of spacing, directions, cut-off and RV for one frame."""
+"""How many lines are enough: one frame scanned with finer and finer settings, by ladders."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ STEPS = (3, 5, 8, 16, 32, 64, 128)
 CUTOFFS = tuple(0.25 * k for k in range(13))
 # fractions of half the smallest extent
 RV_FRACTIONS = (0.4, 0.5, 0.6, 0.67, 0.7, 0.8)
-# what a scan may add to the sample's own error: a quarter of it adds 3 %
+# the scan's error as a fraction of the sample's own: together they are 3 % above the latter
 OF_SAMPLE = 0.25
-# of the recommended settings, and how often they are tried
+# most directions to recommend, and how often recommended settings are tried and refined
 MOST_DIRECTIONS, ROUNDS = 2905, 5
-# how likely chance alone makes any two steps of a ladder differ, and how sure standard errors of 16
-# replicates are
+# probability that two steps of a ladder differ by chance alone, and degrees of freedom of the
+# difference of two values with standard errors of 16 replicates each
 CHANCE, FREEDOM = 0.05, 30
 PAPER = {"spacing": " (the paper: 0.1)", "rv": " (the paper: 0.67 to 0.7)"}
 
@@ -216,7 +216,7 @@ class _OneFrame:
         tell(make_plan(self.settings, self.first).notes)
 
     def ladder(self, name: str) -> list[StepRow]:
-        """The rows of all steps but those whose settings do not fit the sample."""
+        """The rows of a ladder, without the steps whose settings do not fit the sample."""
         settings, space = self.settings, self.space
         steps: dict[float, dict[str, Any]] = {}
         if name == "spacing":
@@ -257,7 +257,7 @@ class _OneFrame:
     def measured(
         self, ladder: str, value: float | None, settings: Settings
     ) -> tuple[list[StepRow], Measurement]:
-        """The rows of one step, and what they were made from; no value: that of each cut-off."""
+        """The rows of one step, and their measurement; without a value each row has its cut-off."""
         begun = time.perf_counter()
         plan = make_plan(settings, self.first)
         shadow = self.space.shadow(self.sample.packing.radius[self.sample.grains])

@@ -58,7 +58,7 @@ class Measurement:
     blocks: tuple[Blocks, Blocks]
     """Octants of the whole sample and of the window, of places in the dump's coordinates."""
     notes: tuple[Note, ...] = ()
-    """What the scan did not reach."""
+    """On tolerances that the scan did not reach."""
 
     def kept(self, variant: str, place: int = 0) -> tuple[FloatArray, FloatArray | IntArray]:
         """As :meth:`GapSums.kept`, at one of the plan's cut-offs, with the moment of the table."""
@@ -85,7 +85,7 @@ class Measurement:
         return position[solid], radius[solid], window
 
     def at_cutoffs(self, cutoffs: Iterable[float]) -> Measurement:
-        """The same lines evaluated with other cut-offs, in the dump's unit."""
+        """The measurement of the same lines at other cut-offs, in the dump's unit."""
         plan = replace(self.plan, cutoffs=tuple(sorted(cutoffs)), lists_gaps=True)
         return _with_gaps(self.sample, self.solids, self.sums, plan, self.notes)
 
@@ -110,7 +110,7 @@ def _measure(sample: Sample, plan: Plan, where: str) -> Measurement:
 def _with_gaps(
     sample: Sample, solids: Solids, sums: ScanSums, plan: Plan, notes: tuple[Note, ...]
 ) -> Measurement:
-    """A scan with all gaps of its lines, if need be, and the gaps of fewer lines by block."""
+    """Add the gaps of all lines, if the plan needs them, and those of fewer lines by octant."""
     blocks = _octants(sample, plan)
     scan = gap_scan(solids, plan, blocks, plan.cutoffs)
     gaps = None

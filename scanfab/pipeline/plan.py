@@ -24,7 +24,7 @@ from scanfab.pipeline.values import Vector
 from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.directions import DirectionRule, usual_rule
 
-# what a plan takes from the settings as it is
+# settings that a plan takes over unchanged
 AS_ASKED = (
     "variants", "axis", "moment", "seed", "workers", "tolerance", "max_chords", "more_columns",
     "edge", "lists_gaps",
@@ -33,7 +33,7 @@ AS_ASKED = (
 REPLICATES = 16
 # replicates at most of a scan that adds directions until its error, as they tell it, is small
 MOST_REPLICATES = 64
-# lines of one axis below which a replicate's mean lengths are too uncertain to be of use
+# with fewer lines along an axis, the mean lengths of a replicate are too uncertain to be of use
 FEWEST_LINES = 30
 # the closest spacing, over the reach of what is scanned: nobody could wait for closer lines
 CLOSEST = 1e-9
@@ -79,17 +79,20 @@ class Plan:
     max_chords: float
     """An auto scan stops before it cuts more."""
     rvs: tuple[RV, ...]
-    """Of the first frame that has grains, if :meth:`in_frame` has not put others in their place, in
-    ascending order; the first is scanned until its tolerance holds, the others along its lines."""
+    """
+    The RVs in ascending order: as they lie in the first frame that has grains, or, after
+    :meth:`in_frame`, in another one. The first is scanned until its tolerance holds, the others
+    along the same lines.
+    """
     more_columns: tuple[str, ...]
-    """Of the table, behind those that it always has."""
+    """Further columns of the table, behind those that every table has."""
     groups: tuple[str, ...]
     """Of further columns, see :data:`scanfab.fabric.registry.GROUPS`."""
     cutoffs: tuple[float, ...]
-    """Of the table's rows, in ascending order."""
+    """Cut-offs of the table's rows, in ascending order."""
     rule: DirectionRule
     rule_is_asked_for: bool
-    """Then an auto scan keeps it."""
+    """Whether the user chose the rule; then an auto scan keeps it."""
     edge: str
     """What counts at the window's surface, see :mod:`scanfab.scan.edges`."""
     lists_gaps: bool
@@ -98,9 +101,9 @@ class Plan:
     """Of a map; else None."""
     space: Space
     """The plane in which all grains of the series lie, if they are discs."""
-    # what follows is not known of a series without grains
+    # the fields below are unknown for a series without grains
     cutoff: float = math.nan
-    """Of the scan that is to meet the tolerance."""
+    """Cut-off of the scan that is to meet the tolerance."""
     spacing: float = math.nan
     """Between the lines of one axis and replicate."""
     replicates: int = 0
@@ -125,7 +128,7 @@ class Plan:
         return [one.window for one in self.rvs if one.window is not None]
 
     def rvs_of(self, variant: str) -> tuple[RV, ...]:
-        """Those that a variant has rows for; of the whole one that is none."""
+        """The RVs that a variant has rows for; the whole has one entry without a window."""
         return self.rvs if VARIANTS[variant].in_window else (RV(),)
 
     def in_frame(self, sample: Sample) -> Plan:
@@ -137,7 +140,7 @@ class Plan:
         return replace(self, rvs=tuple(RV(rv.fraction, window) for rv, window in rvs))
 
     def along(self, replicates: int) -> Iterator[Plan]:
-        """The plans of the other RVs, for the lines that the first was scanned along."""
+        """A plan for each of the other RVs, with the lines that the first was scanned along."""
         variants = "".join(one for one in self.variants if VARIANTS[one].in_window)
         for rv in self.rvs[1:]:
             yield replace(self, rvs=(rv,), variants=variants, replicates=replicates, auto="")
@@ -145,9 +148,9 @@ class Plan:
 
 def plan_without_grains(settings: Settings, space: Space = SPACE) -> Plan:
     """
-    What settings say by themselves.
+    The plan as far as settings alone decide it.
 
-    That is the plan of a series without any grain: its frames have rows, but nothing is scanned.
+    A series without any grain keeps this plan: its frames have rows, but nothing is scanned.
     """
     return Plan(
         samples=sample_rule(settings),
@@ -170,7 +173,7 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     Parameters
     ----------
     settings : Settings
-        Nothing behind the plan sees them.
+        Later steps see only the plan.
     sample : Sample
         The first frame that has grains.
 
@@ -228,7 +231,7 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
 def _lines(
     settings: Settings, axes: int, box: SurfaceBox, shape: Convex | None, lengths: dict[str, float]
 ) -> dict[str, Any]:
-    """How close the lines are, in how many replicates, and what an auto scan may add."""
+    """How close the lines are, how many replicates there are, and what an auto scan may add."""
     space = box.space
     # How large is what lines scan, the window, or of the whole half the smallest extent: its reach;
     # the area that lines of one direction pierce, in the mean of all (in a plane a length); and
@@ -261,13 +264,14 @@ def _auto_spacing(
     """
     Spacing of one replicate's lines at which the first round is likely to meet the tolerance.
 
-    Never so wide that lines get too few, nor closer than is of use: more directions are added then.
+    The spacing is never so wide that a replicate has too few lines, nor so close that more
+    directions would tell more.
     """
     noise = NOISE[space.dimension]
     segments_per_line = max(depth / (3.0 * radius), 1.0)
     # lines * segments_per_line = segments, and lines are so many axes' area / spacing²
     lines = noise.segments / settings.tolerance**2 / (REPLICATES * axes * segments_per_line)
-    # of which each block gets its share
+    # each block of a map gets its share of the lines
     lines *= settings.blocks
     apart = area / lines / radius ** (space.dimension - 1)
     spacing = radius * max(

@@ -22,7 +22,7 @@ from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import cell_of, centers_of, strain_mode
 from scanfab.pipeline.values import Vector
 
-# in radii of the smallest grain: nobody means an RV as small as this
+# in radii of the smallest grain: a smaller RV is a mistake
 SMALLEST = 1e-9
 
 
@@ -36,7 +36,7 @@ class RV(NamedTuple):
 
 
 def sizes_of(settings: Settings) -> tuple[RV, ...]:
-    """The RVs of a series as far as the settings alone tell; none if no variant needs one."""
+    """The RVs of a series, without their windows; none if no variant needs one."""
     if not settings.needs_window:
         return ()
     return tuple(RV(one if len(settings.rvs) > 1 else None) for one in settings.rvs)
@@ -65,7 +65,7 @@ def windows_of(sample: Sample, settings: Settings) -> list[Window]:
         elif center is None:
             center = surfaces.center.copy()
         if space.across is not None:
-            # an RV that lies beside the plane by rounding is one in the plane
+            # rounding may put the centre beside the plane
             if abs(center[space.across] - packing.place_across) > packing.radius.max():
                 raise SettingsError(
                     f"rv_center: lies outside {space} of the discs: expected "
@@ -109,8 +109,8 @@ def _cylinder_within(half: FloatArray, axis: Vector) -> tuple[float, float]:
     """
     Radius and height of the cylinder that fills a box of these half edges.
 
-    Half as high, and as wide, as lines through the box's middle along the axis and across it are
-    long; if the axis is oblique, smaller by what its rims would stick out.
+    Its half height and its radius are the half lengths of lines through the middle of the box,
+    along the axis and across it. If the axis is oblique, the cylinder shrinks until its rims fit.
     """
     along = np.abs(np.array(axis))
     across = np.sqrt(np.maximum(1.0 - along**2, 0.0))
@@ -122,7 +122,7 @@ def _cylinder_within(half: FloatArray, axis: Vector) -> tuple[float, float]:
 
 def doubts_of_rv(window: Window, sample: Sample, box: SurfaceBox, largest: float) -> list[Note]:
     """
-    What to tell of an RV at the sample's surface.
+    Check the place of an RV, and note if it comes near the sample's surface.
 
     Raises
     ------
@@ -206,7 +206,7 @@ class Deformation:
 
 
 def _edges(sample: Sample, mode: str) -> tuple[FloatArray, FloatArray]:
-    """Origin and edges, as columns, of what is followed; nothing changes across a plane."""
+    """Origin and edges, as columns, of what an RV follows; across a plane nothing changes."""
     space = sample.packing.space
     if mode == "cell":
         cell = cell_of(sample)

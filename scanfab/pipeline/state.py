@@ -21,14 +21,14 @@ from scanfab.packing.sample import Sample, Variant
 from scanfab.packing.window import Window
 from scanfab.scan.directions import direction_rule, plane_rule
 
-# points that stand for a grain where the surface of an RV that is no sphere cuts it
+# points that stand for a grain that is cut by the surface of an RV, unless that is a sphere
 POINTS = 2048
-# grains at a time, times their points: some tens of megabytes
+# grains whose points are handled at a time: some tens of megabytes
 CHUNK = 256
 
 
 def refuse_forces(sample: Sample, groups: Collection[str]) -> None:
-    """PackingError if forces are asked for that the dump does not have, or not all as numbers."""
+    """PackingError if forces are asked for but missing, or if one is no finite number."""
     contacts = sample.contacts
     if contacts.force_n is not None and not np.isfinite(contacts.force_n).all():
         one, two = sample.packing.id[contacts.pairs[np.argmin(np.isfinite(contacts.force_n))]]
@@ -45,7 +45,7 @@ def refuse_forces(sample: Sample, groups: Collection[str]) -> None:
 
 
 def contact_forces(sample: Sample, chosen: BoolArray) -> ContactForces | None:
-    """What some contacts bear and span; None if that is not known."""
+    """Forces and branches of the chosen contacts; None if the dump has no forces."""
     contacts = sample.contacts
     if contacts.force_n is None:
         return None
@@ -57,10 +57,10 @@ def contact_forces(sample: Sample, chosen: BoolArray) -> ContactForces | None:
 
 def sample_state(sample: Sample, variant: Variant, window: Window | None) -> SampleState:
     """
-    The state of the RV; without a window, of the whole.
+    The state of the RV, or without a window of the whole sample.
 
-    Rattlers are solid, and all contacts bear stress, in all variants; the coordination is of the
-    variant's grains.
+    Void ratio and stress are the same with and without rattlers: rattlers are solid, and all
+    contacts bear stress. The coordination is that of the variant's grains.
     """
     counted = sample.once(sample.counted(variant, window) & ~sample.removed(variant))
     numbers = sample.numbers_of(variant)[counted]
@@ -74,7 +74,7 @@ def sample_state(sample: Sample, variant: Variant, window: Window | None) -> Sam
 
 
 def doubts_of_state(sample: Sample, window: Window | None) -> dict[str, str]:
-    """Why there is no stress, or what it leaves out, by the code of a note."""
+    """Notes, by code, on why there is no stress, or on forces that it leaves out."""
     contacts, packing = sample.contacts, sample.packing
     if len(contacts) and contacts.force is None:
         known = "no forces" if contacts.force_n is None else "the normal part of forces only"
@@ -119,7 +119,7 @@ def _places_and_branches(packing: Packing) -> tuple[FloatArray, FloatArray]:
 
 
 def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
-    """Of all contacts that a grain has part in; None without forces or a volume."""
+    """The stress of all contacts of grains; None without forces or a volume."""
     packing, contacts = sample.packing, sample.contacts
     volume = _volume(packing, window)
     if contacts.force is None or volume is None:
@@ -156,14 +156,14 @@ def _void_ratio(sample: Sample, window: Window | None) -> float | None:
     if volume is None:
         return None
     position, radius = packing.position[sample.grains], packing.radius[sample.grains]
-    # in a clump what several spheres share is there once
+    # what several spheres of a clump share counts once
     share = np.ones_like(radius)
     if packing.bodies is not None:
         share = own_shares(packing, partial(_rays, space=space))[sample.grains]
     if window is None:
         solid = float(np.sum(space.volume(radius) * share))
     else:
-        # through periodic faces too
+        # a window may reach through periodic faces
         solid = 0.0
         origin, shifts = window.images(position, packing, float(radius.max(initial=0.0)))
         for shift in shifts:

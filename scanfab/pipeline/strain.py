@@ -15,7 +15,7 @@ from scanfab.packing.sample import Sample
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import STRAIN_MODES, Vector
 
-# programs that flip their cells do so when it leans by half a length or a little later
+# programs flip a cell when it leans by half a length, or a little later
 MOST_TILT = 0.61
 
 
@@ -54,7 +54,7 @@ def axial_length(sample: Sample, mode: str, axis: Vector) -> float | None:
 
 
 def strain_mode(sample: Sample, mode: str, axis: Vector) -> str:
-    """What ``auto`` stands for in a frame, empty where it finds nothing; else the mode itself."""
+    """The mode, with ``auto`` replaced by what it finds in a frame; empty if it finds nothing."""
     if mode != "auto":
         return mode
     cell, along = sample.packing.cell, _coordinate_of(axis)
@@ -149,7 +149,7 @@ def volumetric_strain(cell: Cell | None, first: Cell | None) -> float | None:
     if cell is None or first is None or not (cell.is_endless and first.is_endless):
         return None
     now, before = (np.linalg.det(one.own_vectors) for one in (cell, first))
-    # no -0.0 of a cell that is as it was
+    # written so that an unchanged cell gives 0.0, not -0.0
     return float(np.log(abs(before / now)))
 
 
@@ -157,8 +157,8 @@ def is_flipped(cell: Cell | None, before: Cell | None) -> bool:
     """
     Whether a cell seems to be described by other vectors of its lattice than in the frame before.
 
-    Then whole vectors were added to some, which also brings them nearer to those before, and
-    neither cell leans further than where programs flip them.
+    It is if whole vectors, added to its own, bring these nearer to the vectors before, and if
+    neither cell leans further than to the point where programs flip them.
     """
     if cell is None or before is None or not (cell.is_endless and before.is_endless):
         return False
@@ -178,7 +178,7 @@ class Strains:
     """What the strains of a series are measured by, since its first frame that has grains."""
 
     mode: str
-    """As for :func:`axial_length`; of no meaning if there is a file."""
+    """As for :func:`axial_length`; unused if there is a file."""
     axis: Vector
     file: FrameFile | None = None
     length: float | None = None

@@ -67,9 +67,9 @@ class Errors(NamedTuple):
 
 class Goal:
     """
-    What is scanned, and what is to meet the tolerance: here the error of each variant.
+    What a scan adds up, and which error is to meet the tolerance: here that of each variant.
 
-    A subclass (a map's) scans to ScanSums with more beside, and tells their errors.
+    The goal of a map is a subclass whose sums also have the fabric of each block.
     """
 
     def scan(
@@ -82,7 +82,7 @@ class Goal:
         )  # fmt: skip
 
     def errors(self, sums: Any, plan: Plan, variant: str) -> Errors:
-        """By the replicates, and about a polynomial."""
+        """The standard error by the scatter of the replicates and by the fit of a polynomial."""
         length, segments = sums.kept(variant)
         empty = float(np.mean(segments == 0))
         fabric = void_fabric(sums.axes, plan.rule.weights, length, segments, plan.space)
@@ -95,10 +95,9 @@ class Goal:
 
 def missing_work(errors: Iterable[Errors], plan: Plan, replicates: int) -> float:
     """
-    By what factor the lines must grow for these variants to meet the tolerance; <= 1: done.
+    By what factor the number of lines must grow until these errors meet the tolerance; 1: done.
 
-    The one rule for all scans that are chosen by their error: ``auto`` ones, and those that a
-    calibration recommends.
+    ``auto`` scans and the settings that a calibration recommends follow the same rule.
     """
     margin = MARGIN
     if plan.auto != "replicates" and replicates > 1:
@@ -145,7 +144,7 @@ def scan_to_tolerance(
 
 @dataclass
 class _AutoScan:
-    """A scan that goes on round by round."""
+    """A scan that adds replicates, round by round, until its tolerance is met."""
 
     solids: Solids
     plan: Plan
@@ -159,7 +158,7 @@ class _AutoScan:
     """How many more replicates the budget allows."""
 
     def run(self, where: str) -> list[Note]:
-        """Scan until the tolerance holds or nothing can be added; tell what was not reached."""
+        """Scan until the tolerance holds or nothing can be added; the notes say what was missed."""
         planned, begun = self.plan.spacing, time.perf_counter()
         start, stop, missed = 0, self.plan.replicates, []
         while True:
@@ -189,7 +188,7 @@ class _AutoScan:
         return [*missed, *self._dropped(counted)]
 
     def _scan(self, start: int, stop: int) -> None:
-        """Add some replicates; the first of all start afresh."""
+        """Scan some replicates and add them to those before; the first round starts afresh."""
         if start == 0:
             batch = self.sums = self._first_round()
         else:
