@@ -92,21 +92,6 @@ def test_an_rv_within_another_differs_from_it_by_less_than_two_samples_do():
     assert 0.005 * 400 < unsteady < 0.08 * 400
 
 
-def test_ladders_of_equal_values_are_seldom_called_unsteady():
-    """One in twenty by chance, however many steps and variants there are."""
-    random, unsteady = np.random.default_rng(0), 0
-    for _ in range(400):
-        steps = []
-        for k in range(7):
-            for variant in "cd":
-                error = 0.001 / 2**k
-                scatter = random.normal(0.01, error * 4, 16)  # of 16 replicates
-                mean, se = scatter.mean(), scatter.std(ddof=1) / 4
-                steps.append(step(k, mean, se, variant=variant))
-        unsteady += first_steady(judged(steps)) != 0
-    assert unsteady < 0.15 * 400
-
-
 @pytest.mark.parametrize(
     "doubt", [{"alpha_vs_axial_se": None}, {"note": "few"}, {"alpha_vs_axial": None}]
 )

@@ -125,8 +125,8 @@ def test_solid_fraction_is_that_of_a_lattice_and_empty_at_an_open_surface(kind):
     position, radius = simple_cubic(16)
     table, _ = mapped(Packing(position, radius * 0.98), contact_tolerance=0.05, **kind)
     outer = table["at_surface"] == 1
-    assert outer.any()
-    assert not outer.all()
+    # all but the middle ones
+    assert np.count_nonzero(~outer) == (8 if "grid" in kind else 3)
     assert np.isnan(table["solid_fraction"][outer]).all()
     expected = np.pi / 6 * 0.98**3
     # shells cut a lattice's cells, of which the innermost holds but 33
@@ -153,20 +153,6 @@ def test_a_frame_of_discs_among_spheres_is_refused():
         mapped(frames, slices=2)
     with pytest.raises(SettingsError, match="all grains are discs in the plane x-y: `compute`"):
         fabric_map(frames[1], grid=(2, 2, 1))
-
-
-def test_blocks_in_the_middle_of_an_open_sample_lose_no_segments():
-    """Overlapping spheres: their mean length is known, and lower where segments leave."""
-    random = np.random.default_rng(4)
-    count = random.poisson(0.25 * 24**3)
-    packing = Packing(random.uniform(0, 24, (count, 3)), random.uniform(0.5, 1.5, count))
-    table, _ = mapped(packing, spacing=0.4, grid=(5, 5, 5), cutoff=0.5)
-    outer = table["at_surface"] == 1
-    expected = 0.5 + 1 / (0.25 * np.pi * 13 / 12)
-    inner = table["mean_length"][~outer]
-    assert len(inner) == 27
-    error = inner.std(ddof=1) / np.sqrt(27)
-    assert abs(inner.mean() - expected) < 4 * error
 
 
 def test_the_rv_and_its_rules(packing):
@@ -279,15 +265,6 @@ def tiling(half, parts):
     """A box about the centre in equal parts."""
     half = np.asarray(half)
     return Blocks(CENTER - half, np.diag(2 * half), parts)
-
-
-@pytest.mark.parametrize("slices", [1, 3, 5, 16])
-def test_slices_of_a_ball_have_their_volume(slices):
-    blocks = tiling([2.0, 2.0, 2.0], (1, 1, slices))
-    found = volumes_inside(blocks, Window(CENTER, sphere(2.0)))
-    z = np.linspace(-2, 2, slices + 1)
-    below = np.pi * (4 * z - z**3 / 3)
-    np.testing.assert_allclose(found.sum(axis=1), np.diff(below), rtol=5e-4)
 
 
 @pytest.mark.parametrize("parts", [(1, 1, 1), (2, 2, 2), (3, 2, 1), (4, 5, 6)])

@@ -83,29 +83,6 @@ def test_a_surface_lies_where_its_file_says_or_about_the_centre_that_is_asked_fo
         window_of(flat, rv_shape=file)
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"rv_shape": "box", "rv_size": "14,2,2"}, "beyond the sample, .*or a smaller `rv_size`"),
-        ({"rv_shape": "ellipsoid", "rv_size": "2,2,5"}, "beyond the sample"),
-        ({"rv_shape": "cylinder", "rv_size": "1,9"}, "beyond the sample"),
-        ({"rv_shape": "box", "rv": 2.0}, "beyond the sample"),
-        (
-            {"rv_shape": "ellipsoid", "rv_size": "1e-12,1,1"},
-            "rv: the ellipsoid .* is nothing beside the smallest grain",
-        ),
-        ({"rv_shape": "box", "rv_size": "2,2,1e-11"}, "is nothing beside"),
-        (
-            {"rv_shape": "box", "rv_size": "0.1,0.1,0.1", "rv_center": "10.8,8.8,5.8"},
-            r"holds no grain: choose another `rv_center` or a larger one \(`rv_radius`, `rv_size`",
-        ),
-    ],
-)
-def test_windows_that_say_nothing_of_the_sample_are_refused(flat, options, words):
-    with pytest.raises(SettingsError, match=words):
-        make_plan(Settings(**options), flat)
-
-
 TILTED = np.array([[6.0, 0.0, 0.0], [2.5, 6.0, 0.0], [-2.0, 1.5, 6.0]])
 
 
@@ -152,19 +129,34 @@ def test_a_window_across_periodic_faces_is_that_of_the_repeated_packing(tilted, 
     assert np.array_equal(window.may_meet(packing.position, packing.radius, packing), meets)
 
 
+BEYOND, NOTHING, IMAGE = "beyond the sample", "is nothing beside", "overlaps its own image"
+
+
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("sample", "shape", "options", "words"),
     [
-        ({"rv": 1.5}, "wider than the cell's shortest period"),
-        ({"rv_shape": "box", "rv_size": "6.1,1,1"}, r"overlaps its own image, \(.*\) away"),
-        ({"rv_shape": "ellipsoid", "rv_size": "3.1,1,1"}, "overlaps its own image"),
-        ({"rv_shape": "cylinder", "rv_size": "0.4,100"}, "overlaps its own image"),
-        ({"rv_shape": "box", "rv_size": "1e9,1e9,1e9"}, "more than 10 periods"),
+        ("flat", "box", {"rv_size": "14,2,2"}, "beyond the sample, .*or a smaller `rv_size`"),
+        ("flat", "ellipsoid", {"rv_size": "2,2,5"}, BEYOND),
+        ("flat", "cylinder", {"rv_size": "1,9"}, BEYOND),
+        ("flat", "box", {"rv": 2.0}, BEYOND),
+        ("flat", "ellipsoid", {"rv_size": "1e-12,1,1"}, f"rv: the ellipsoid .* {NOTHING}"),
+        ("flat", "box", {"rv_size": "2,2,1e-11"}, NOTHING),
+        (
+            "flat", "box", {"rv_size": "0.1,0.1,0.1", "rv_center": "10.8,8.8,5.8"},
+            r"holds no grain: choose another `rv_center` or a larger one \(`rv_radius`, `rv_size`",
+        ),
+        ("tilted", "sphere", {"rv": 1.5}, "wider than the cell's shortest period"),
+        ("tilted", "box", {"rv_size": "6.1,1,1"}, rf"{IMAGE}, \(.*\) away"),
+        ("tilted", "ellipsoid", {"rv_size": "3.1,1,1"}, IMAGE),
+        ("tilted", "cylinder", {"rv_size": "0.4,100"}, IMAGE),
+        ("tilted", "box", {"rv_size": "1e9,1e9,1e9"}, "more than 10 periods"),
     ],
-)
-def test_a_window_must_not_overlap_its_own_images(tilted, options, words):
+)  # fmt: skip
+def test_windows_that_say_nothing_or_overlap_themselves_are_refused(
+    request, sample, shape, options, words
+):
     with pytest.raises(SettingsError, match=words):
-        make_plan(Settings(**options), tilted)
+        make_plan(Settings(rv_shape=shape, **options), request.getfixturevalue(sample))
 
 
 def test_a_window_that_follows_the_cell_is_deformed_as_the_cell(tilted):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import warnings
 
 import numpy as np
 import pytest
@@ -240,39 +239,31 @@ def test_stress_and_strong_and_weak_contacts_are_those_of_yade():
     np.testing.assert_allclose(whole(exported).stress, expected, rtol=0, atol=2.0)
 
 
-def test_one_state_written_by_each_program_has_the_same_tensors():
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning", "ignore::scanfab.ScanfabNote")
+@pytest.mark.parametrize(
+    ("grains", "contacts", "tolerance"),
+    [
+        # its box has six digits
+        ("liggghts.1.txt.gz", "liggghts_contacts.1.txt.gz", 3e-6),
+        ("yade.xml.bz2", None, 1e-11),
+        ("yade-spheres-00000000.vtk.gz", "yade-intrs-00000000.vtk.gz", 1e-5),
+    ],
+)
+def test_one_state_written_by_each_program_has_the_same_tensors(grains, contacts, tolerance):
     columns = (
         "id1=c_ids[1],id2=c_ids[2],fx=c_pair[2],fy=c_pair[3],fz=c_pair[4],"
         "tx=c_pair[5],ty=c_pair[6],tz=c_pair[7]"
     )
-    lammps = scanfab.read(
-        SAME / "lammps.0.lammpstrj.gz",
-        contacts=SAME / "lammps.0.local.gz",
-        contact_columns=columns,
-    )
-    others = {
-        # its box has six digits
-        3e-6: scanfab.read(
-            SAME / "liggghts.1.txt.gz", contacts=SAME / "liggghts_contacts.1.txt.gz"
-        ),
-        1e-11: scanfab.read(SAME / "yade.xml.bz2"),
-        1e-5: scanfab.read(
-            SAME / "yade-spheres-00000000.vtk.gz", contacts=SAME / "yade-intrs-00000000.vtk.gz"
-        ),
-    }
-    with pytest.warns(scanfab.ScanfabWarning, match="no contact has a tangential force"):
-        expected = table(lammps)
-    for tolerance, packing in others.items():
-        with warnings.catch_warnings():
-            # of six digits something tangential is left
-            warnings.simplefilter("ignore", scanfab.ScanfabWarning)
-            found = table(packing)
-        assert found["contacts"][0] == 1819
-        for name in ("gc", "bn", "fn", "ft", "gc_strong", "gc_weak", "stress"):
-            one, two = expected.tensor(name)[0], found.tensor(name)[0]
-            scale = np.abs(one).max() if name == "stress" else 1.0
-            np.testing.assert_allclose(two, one, rtol=0, atol=tolerance * scale)
-        assert found["void_ratio"][0] == pytest.approx(expected["void_ratio"][0], rel=2e-5)
+    listed = {"contacts": SAME / "lammps.0.local.gz", "contact_columns": columns}
+    expected = table(scanfab.read(SAME / "lammps.0.lammpstrj.gz", **listed))
+    listed = {"contacts": SAME / contacts} if contacts else {}
+    found = table(scanfab.read(SAME / grains, **listed))
+    assert found["contacts"][0] == 1819
+    for name in ("gc", "bn", "fn", "ft", "gc_strong", "gc_weak", "stress"):
+        one, two = expected.tensor(name)[0], found.tensor(name)[0]
+        scale = np.abs(one).max() if name == "stress" else 1.0
+        np.testing.assert_allclose(two, one, rtol=0, atol=tolerance * scale)
+    assert found["void_ratio"][0] == pytest.approx(expected["void_ratio"][0], rel=2e-5)
 
 
 def test_stress_force_and_fabric_go_together(lammps):
