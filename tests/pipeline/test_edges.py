@@ -54,20 +54,6 @@ def test_periodic_wholes_have_no_edge():
     assert [row.left_out for row in start[2:]] == [0.0, 0.0]
 
 
-@pytest.mark.parametrize("edge", ["start", "ends"])
-def test_every_cut_off_has_its_row_and_all_errors(ball, edge):
-    table = compute(ball, variants="ac", edge=edge, rv=0.35, cutoffs="0.3,0.6", **OPTIONS)
-    assert len(table) == 4
-    for row in table:
-        cutoff = {**OPTIONS, "cutoff": row.cutoff}
-        same = compute(ball, variants="ac", edge=edge, rv=0.35, **cutoff)
-        single = same[row.variant == "c"]
-        assert row.mean_length == pytest.approx(single.mean_length, rel=1e-9)
-        assert row.segments == single.segments
-        assert row.alpha_vs_axial_se > 0
-        assert row.alpha_vs_axial_sample_se is None or row.alpha_vs_axial_sample_se > 0
-
-
 def test_second_moment_is_that_of_full_lengths_or_refused(ball):
     first, second = (
         compute(ball, variants="c", edge="start", moment=moment, rv=0.35, **OPTIONS)[0]
@@ -90,25 +76,3 @@ def test_a_whole_without_an_ellipsoid_has_no_void_fabric():
     with pytest.warns(ScanfabWarning, match="flat or too small: by the rule `edge=ends`"):
         table = compute(packing, variants="a", edge="ends", **OPTIONS)
     assert table[0].mean_length is None
-
-
-@pytest.mark.parametrize("shape", ["box", "cylinder", "ellipsoid"])
-def test_a_window_of_any_shape_has_no_anisotropy_of_its_own_without_bias(shape):
-    """Of an isotropic medium, by a window twice as high as wide."""
-    random = np.random.default_rng(3)
-    cell = Cell([24.0, 24.0, 24.0])
-    packing = Packing(24 * random.random((2800, 3)), random.uniform(0.5, 1.5, 2800), cell=cell)
-    size = {"box": "7,7,14", "cylinder": "3.5,14", "ellipsoid": "4,4,8"}[shape]
-    words = {"rv_shape": shape, "rv_size": size, "variants": "c", "cutoff": 0.5}
-    scan = {"spacing": 1.0, "directions": "lebedev:11", "workers": 1}
-    clip, start, ends = (
-        compute(packing, edge=edge, **words, **scan)[0] for edge in ("clip", "start", "ends")
-    )
-    assert abs(clip.window_alpha_vs_axial) > 3e-3
-    assert start.window_alpha_vs_axial == ends.window_alpha_vs_axial == 0.0
-    # the sample's own scatter is in all three
-    assert clip.alpha_vs_axial - start.alpha_vs_axial == pytest.approx(
-        clip.window_alpha_vs_axial, abs=4e-3
-    )
-    assert start.alpha_vs_axial == pytest.approx(ends.alpha_vs_axial, abs=5e-3)
-    assert clip.mean_length < start.mean_length
