@@ -153,12 +153,13 @@ def _axes(
 
 
 def near_surface(
-    blocks: Blocks, normals: FloatArray, furthest: FloatArray, depth: float
+    blocks: Blocks, normals: FloatArray, furthest: FloatArray, mean: float
 ) -> BoolArray:
     """
-    Which blocks reach beyond a depth below the surface of a convex region, shape (B,).
+    Which blocks lie so near to the surface of a convex region that they lose segments, shape (B,).
 
     The planes n·x = f touch the region; ``normals`` n has the shape (K, 3), ``furthest`` f (K,).
+    ``mean`` is the mean radius of the grains.
     """
     outline = blocks.corners
     if blocks.radius:
@@ -166,7 +167,7 @@ def near_surface(
         outline = blocks.middles[:, None] + blocks.bounds[1:, None, None] * units
     found = np.zeros(len(blocks), bool)
     for normal, distance in zip(normals, furthest, strict=True):
-        found |= np.any(outline @ normal - distance > -depth, axis=1)
+        found |= np.any(outline @ normal - distance > -DEPTH * mean, axis=1)
     return found
 
 

@@ -21,13 +21,7 @@ from scanfab.fabric.tensor import FabricTensor, axial, tensor_values
 from scanfab.fabric.void import BlockFabrics, block_fabrics
 from scanfab.packing.sample import VARIANTS, Sample, Variant
 from scanfab.packing.window import Window
-from scanfab.pipeline.maps.blocks import (
-    DEPTH,
-    hull_of,
-    near_surface,
-    surface_of,
-    volumes_inside,
-)
+from scanfab.pipeline.maps.blocks import hull_of, near_surface, surface_of, volumes_inside
 from scanfab.pipeline.measurement import coarse_spacing, gap_scan, solids_of
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.tolerance import Errors, Goal, scan_to_tolerance
@@ -212,7 +206,7 @@ class BlocksOfVariant:
     @cached_property
     def at_surface(self) -> BoolArray:
         """Which blocks lie so near to a surface that they lose segments, shape (B,)."""
-        depth = DEPTH * float(self.sample.packing.radius[self.sample.gathered].mean())
+        mean = float(self.sample.packing.radius[self.sample.gathered].mean())
         window, inner = self.window, self.solids.inner
         if window is not None and self.plan.edge == START:
             # segments are followed beyond the RV, and each end counts in the block that it is in
@@ -220,7 +214,7 @@ class BlocksOfVariant:
         if window is None and self.plan.edge == ENDS and inner is not None:
             window = Window(inner.center + self.solids.origin, inner.shape)
         surface = hull_of(self.sample) if window is None else surface_of(window)
-        return near_surface(self.blocks, *surface, depth)
+        return near_surface(self.blocks, *surface, mean)
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """The values of each block by their columns."""
