@@ -7,10 +7,9 @@ from functools import cache
 from typing import Any
 
 from scanfab.base.column import LENGTH, Column
+from scanfab.fabric.predicted import PREDICTED_ALPHA, WINDOW_ALPHA
 from scanfab.fabric.registry import GROUPS, OWN_FABRICS, Fabric, load_fabrics
-from scanfab.fabric.spectrum import PREDICTED_ALPHA
 from scanfab.fabric.usual import Contact, Void
-from scanfab.fabric.window import WINDOW_ALPHA
 from scanfab.packing.columns import RV_COLUMN, SAMPLE_COLUMNS
 from scanfab.scan.columns import EDGE_COLUMNS, SCAN_COLUMNS
 from scanfab.table.row import Row

@@ -15,8 +15,7 @@ from scanfab.base.column import Column
 from scanfab.base.errors import SettingsError, note, warn
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.errors import variance_without_noise
-from scanfab.fabric.jackknife import BLOCKS
+from scanfab.fabric.errors import BLOCKS, variance_without_noise
 from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
 from scanfab.table.curves import is_turned, strain_column, why_not_strain
 from scanfab.table.row import (

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from scanfab import box, cylinder, direction_rule, ellipsoid, sphere
+from scanfab.fabric.predicted import window_alpha
 from scanfab.fabric.void import void_fabric
-from scanfab.fabric.window import window_alpha
 from scanfab.scan.scan import scan_lines
 from tests.helpers.lattices import Spheres, ball_points, poisson_spheres, rotation, separate_spheres
 from tests.helpers.scanning import mean_lengths, scan_along, solids_of
