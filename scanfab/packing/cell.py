@@ -1,7 +1,8 @@
-"""The periodic cell of a packing: three lattice vectors, an origin, and which of them repeat."""
+"""The periodic cell of a packing, and the lattice of its periodic vectors, with nearest images."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
@@ -13,10 +14,11 @@ from scanfab.base.errors import PackingError
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.packing.lattice import Lattice, reduced_lattice
 
 # longest periodic edge over the smallest height: the search for images cannot count further
 WIDEST = 1e9
+# A step that makes a vector shorter by less is rounding; without this, reducing might never end.
+SHORTER = 1.0 - 1e-9
 
 
 class Cell:
@@ -48,6 +50,9 @@ class Cell:
     array([[0.5, 2.5, 9. ]])
     """
 
+    vectors: FloatArray
+    origin: FloatArray
+
     def __init__(
         self,
         vectors: npt.ArrayLike,
@@ -56,13 +61,13 @@ class Cell:
         space: Space = SPACE,
     ) -> None:
         try:
-            lattice = np.asarray(vectors, dtype=np.float64)
-            self.vectors: FloatArray = np.diag(lattice) if lattice.shape == (3,) else lattice
-            self.origin: FloatArray = np.asarray(origin, dtype=np.float64)
-            fits = self.vectors.shape == (3, 3) and self.origin.shape == (3,)
+            self.vectors = np.asarray(vectors, dtype=np.float64)
+            self.origin = np.asarray(origin, dtype=np.float64)
         except (TypeError, ValueError):
-            fits = False
-        if not fits:
+            self.vectors = self.origin = np.zeros(0)
+        if self.vectors.shape == (3,):
+            self.vectors = np.diag(self.vectors)
+        if self.vectors.shape != (3, 3) or self.origin.shape != (3,):
             raise PackingError(
                 f"a cell needs vectors of shape (3, 3) or (3,) and an origin of shape (3,), "
                 f"found {vectors!r} and {origin!r}"
@@ -215,7 +220,7 @@ class Cell:
     @cached_property
     def lattice(self) -> Lattice:
         """The periodic vectors, reduced: the same lattice by vectors that are short."""
-        return reduced_lattice(self.vectors, self.periodic)
+        return Lattice.of(self.vectors, self.periodic)
 
     @property
     def short_vectors(self) -> FloatArray:
@@ -240,11 +245,11 @@ class Cell:
         """
         return self.lattice.nearest(np.asarray(branch, dtype=np.float64))
 
-    def images(
+    def with_images(
         self, position: FloatArray, margin: float
-    ) -> tuple[FloatArray, npt.NDArray[np.intp]]:
+    ) -> tuple[FloatArray, npt.NDArray[np.intp], IntArray]:
         """
-        The periodic images of points that lie outside the cell, but within a margin of it.
+        Points in the cell, and their periodic images that lie outside within a margin of it.
 
         Parameters
         ----------
@@ -256,19 +261,29 @@ class Cell:
         Returns
         -------
         position : ndarray, shape (K, 3)
-            The images.
+            The points and their images, all of one point behind one another.
         row : ndarray of int, shape (K,)
-            The point that each image repeats.
+            The point that each one is, or repeats.
+        image : ndarray of int, shape (K, 3)
+            Lattice translation from that point; 0 for the point itself. Those of one point ascend.
         """
-        fractions = self.fractional(position)
-        reach = np.where(self.periodic, margin / self.heights, 0.0)
-        images, rows = [np.zeros((0, 3))], [np.arange(0)]
-        for shift in product(*(range(-int(n), int(n) + 1) for n in np.ceil(reach))):
-            if any(shift):
-                near = (fractions + shift >= -reach) & (fractions + shift <= 1.0 + reach)
-                rows.append(np.flatnonzero(np.all(near | ~np.array(self.periodic), axis=1)))
-                images.append(position[rows[-1]] + np.array(shift, np.float64) @ self.vectors)
-        return np.concatenate(images), np.concatenate(rows)
+        periodic = list(self.periodic)
+        fractions, reach = self.fractional(position)[:, periodic], margin / self.heights[periodic]
+        # only points near a face have images near the cell
+        near = np.flatnonzero(np.any((fractions <= reach) | (fractions >= 1.0 - reach), axis=1))
+        shifts = np.array(list(product(*(range(-int(n), int(n) + 1) for n in np.ceil(reach)))))
+        rows = []
+        for shift in shifts:
+            moved = fractions[near] + shift
+            inside = np.all((moved >= -reach) & (moved <= 1.0 + reach), axis=1)
+            rows.append(near[inside] if shift.any() else np.arange(len(position)))
+        row = np.concatenate(rows)
+        image = np.zeros((len(row), 3), np.int64)
+        image[:, periodic] = np.repeat(shifts, [len(some) for some in rows], axis=0)
+        order = np.argsort(row, kind="stable")
+        row, image = row[order], image[order]
+        places = np.take(position, row, axis=0) + image.astype(np.float64) @ self.vectors
+        return places, row, image
 
     def images_near_origin(
         self, position: FloatArray, reach: FloatArray
@@ -291,11 +306,120 @@ class Cell:
             The point that each image repeats.
         """
         nearest = position + self.nearest_image(position) @ self.vectors
-        most = np.floor(reach.max(initial=0.0) / self.lattice.heights + 1.0).astype(int)
-        images, rows = [np.zeros((0, 3))], [np.arange(0)]
-        for steps in product(*(range(-n, n + 1) for n in most)):
-            moved = nearest + np.array(steps, dtype=np.float64) @ self.lattice.vectors
-            chosen = np.flatnonzero(np.linalg.norm(moved, axis=1) < reach)
-            images.append(moved[chosen])
-            rows.append(chosen)
+        most = np.floor(reach.max(initial=0.0) / self.lattice.heights + 1.0)
+        images, rows = [], []
+        for shift in self.lattice.steps(most) @ self.lattice.vectors:
+            moved = nearest + shift
+            rows.append(np.flatnonzero(np.linalg.norm(moved, axis=1) < reach))
+            images.append(moved[rows[-1]])
         return np.concatenate(images), np.concatenate(rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """
+    The translations that leave a packing the same: 0 to 3 vectors, as short as they can be.
+
+    Attributes
+    ----------
+    vectors : ndarray, shape (K, 3)
+        Dump's length unit.
+    combination : ndarray of int, shape (K, 3)
+        Each of them in whole vectors of the cell.
+    """
+
+    vectors: FloatArray
+    combination: IntArray
+
+    @classmethod
+    def of(cls, vectors: FloatArray, periodic: tuple[bool, bool, bool]) -> Lattice:
+        """That of the vectors of a cell, as rows, that repeat."""
+        combination = np.eye(3, dtype=np.int64)[list(periodic)]
+        reduced = vectors[list(periodic)]
+        while (found := _shortening(reduced)) is not None:
+            place, weights = found
+            combination[place] += weights @ combination
+            # from the cell's own vectors each time: rounding does not add up
+            reduced[place] = combination[place] @ vectors
+        return cls(reduced, combination)
+
+    @property
+    def heights(self) -> FloatArray:
+        """Distances between neighbouring planes of the lattice in its span, shape (K,)."""
+        return np.asarray(1.0 / np.linalg.norm(np.linalg.pinv(self.vectors), axis=0))
+
+    @property
+    def shortest(self) -> float:
+        """Length of the shortest translation; infinite if there is none."""
+        return float(np.linalg.norm(self.vectors, axis=1).min(initial=np.inf))
+
+    @property
+    def half_extent(self) -> float:
+        """No branch to a nearest image is longer, of those in the span of the lattice."""
+        return 0.5 * float(np.linalg.norm(self.vectors, axis=1).sum())
+
+    def steps(self, most: FloatArray) -> FloatArray:
+        """All translations by at most so many of each vector, 0 among them, shape (T, K)."""
+        counts = [np.arange(-n, n + 1.0) for n in most]
+        return np.array(list(product(*counts)))
+
+    def within(self, length: float) -> FloatArray:
+        """Translations but 0 that are shorter than a length, the shortest first, shape (T, 3)."""
+        shifts: FloatArray = self.steps(np.floor(length / self.heights)) @ self.vectors
+        lengths = np.linalg.norm(shifts, axis=1)
+        near = np.flatnonzero((lengths > 0.0) & (lengths < length))
+        return shifts[near[np.argsort(lengths[near], kind="stable")]]
+
+    def nearest(self, branch: FloatArray) -> IntArray:
+        """Vectors of the cell to add to each branch, shape (M, 3), to make it shortest."""
+        if len(self.vectors) == 0:
+            return np.zeros((len(branch), 3), np.int64)
+        # components outside the span are the same for all images
+        inverse = np.linalg.pinv(self.vectors)
+        image = -np.rint(branch @ inverse)
+        gram = self.vectors @ self.vectors.T
+        if np.any(gram - np.diag(np.diagonal(gram))):
+            rest = branch @ inverse @ self.vectors + image @ self.vectors
+            # what is shorter than half of the shortest vector has no shorter image
+            far = np.flatnonzero(np.linalg.norm(rest, axis=1) >= 0.5 * self.shortest)
+            image[far] += self._steps_to_nearest(rest[far])
+        return image.astype(np.int64) @ self.combination
+
+    def _steps_to_nearest(self, rest: FloatArray) -> FloatArray:
+        """
+        Further steps for branches whose components are at most half a vector each, shape (M, K).
+
+        A shorter image is no longer than the longest of these branches, so it lies between planes
+        of the lattice that are no further away than that.
+        """
+        corners = 0.5 * self.steps(np.ones(len(self.vectors))) @ self.vectors
+        longest = np.linalg.norm(corners, axis=1).max()
+        steps = self.steps(np.floor(0.5 + longest / self.heights + 1e-9))
+        steps = steps[np.argsort(np.abs(steps).sum(axis=1), kind="stable")]
+        best, shortest = np.zeros((len(rest), steps.shape[1])), np.full(len(rest), np.inf)
+        for step in steps:
+            length = np.linalg.norm(rest + step @ self.vectors, axis=1)
+            # the first of equals: no step rather than some
+            better = length < shortest * (1.0 - 1e-12)
+            best[better], shortest[better] = step, length[better]
+        return best
+
+
+def _shortening(vectors: FloatArray) -> tuple[int, IntArray] | None:
+    """
+    A vector, and how many of each vector to add to make it shorter; None if nothing does.
+
+    Long steps along one other vector are tried first, then short ones along all others.
+    """
+    count = len(vectors)
+    for place in np.argsort(-np.linalg.norm(vectors, axis=1), kind="stable").tolist():
+        length = float(np.linalg.norm(vectors[place]))
+        others = [k for k in range(count) if k != place]
+        steps = np.zeros((len(others) + 3 ** len(others), count), np.int64)
+        for row, k in enumerate(others):
+            steps[row, k] = -np.rint(vectors[place] @ vectors[k] / (vectors[k] @ vectors[k]))
+        steps[len(others) :, others] = list(product((-1, 0, 1), repeat=len(others)))
+        for weights in steps:
+            if np.linalg.norm(vectors[place] + weights @ vectors) < length * SHORTER:
+                return place, weights
+    return None

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from scanfab.base.arrays import cast, grains_named
 from scanfab.base.errors import PackingError, warn
 from scanfab.base.spelling import counted
-from scanfab.base.typing import BoolArray, FloatArray, IntArray
+from scanfab.base.typing import BoolArray, FloatArray, IntArray, RowArray
 from scanfab.packing.bodies import Bodies
 from scanfab.packing.cell import Cell
 
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from scanfab.packing.packing import Packing
 
 ContactSource = Literal["file", "geometric"]
+
+# contacts whose geometry is worked out at a time: some megabytes
+CHUNK = 1 << 16
 
 
 class ContactList(NamedTuple):
@@ -101,8 +104,8 @@ class Contacts:
     (array([[1., 0., 0.]]), array([[0.75, 0.  , 0.  ]]))
     """
 
-    pairs: IntArray
-    image: IntArray
+    pairs: RowArray
+    image: RowArray
     normal: FloatArray
     point: FloatArray
     force: FloatArray | None
@@ -129,7 +132,7 @@ class Contacts:
             forces = " with normal forces"
         return f"{counted(len(self), 'contact')} {whence}{forces}"
 
-    def neighbours(self, bodies: Bodies | None, without: BoolArray | None = None) -> IntArray:
+    def neighbours(self, bodies: Bodies | None, without: BoolArray | None = None) -> RowArray:
         """
         The pairs of grains that touch, each once, in however many points.
 
@@ -157,12 +160,12 @@ class Contacts:
 
 
 def branches(
-    position: FloatArray, pairs: IntArray, image: IntArray, cell: Cell | None
+    position: FloatArray, pairs: RowArray, image: RowArray, cell: Cell | None
 ) -> FloatArray:
     """From the first to the second place of each pair, shape (M, 3), dump's length unit."""
-    one, two = pairs.T
-    branch: FloatArray = position[two] - position[one]
-    return branch if cell is None else branch + image @ cell.vectors
+    branch: FloatArray = np.take(position, pairs[:, 1], axis=0)
+    branch -= np.take(position, pairs[:, 0], axis=0)
+    return branch if cell is None else branch + image.astype(np.float64) @ cell.vectors
 
 
 def resolve_contacts(listed: ContactList, packing: Packing, turns: IntArray | None) -> Contacts:
@@ -196,26 +199,68 @@ def resolve_contacts(listed: ContactList, packing: Packing, turns: IntArray | No
     rows = np.arange(len(pairs))
     if packing.bodies is not None:
         rows = np.flatnonzero(packing.bodies.between(pairs, image))
-        pairs, image = pairs[rows], image[rows]
-    branch = branches(packing.position, pairs, image, packing.cell)
-    length: FloatArray = np.linalg.norm(branch, axis=1)
-    _refuse_itself(pairs, image, packing)
-    if listed.source == "file":
+    _refuse_itself(pairs[rows], image[rows], packing)
+    rows = rows[_first_of_each(pairs[rows], image[rows])]
+    force, force_n = (None if one is None else one[rows] for one in (force, force_n))
+    return contacts_of(packing, pairs[rows], image[rows], listed.source, force, force_n)
+
+
+def contacts_of(
+    packing: Packing,
+    pairs: RowArray,
+    image: RowArray,
+    source: ContactSource,
+    force: FloatArray | None = None,
+    force_n: FloatArray | None = None,
+) -> Contacts:
+    """
+    Contacts by pairs of rows and images, each once, with their normals and points.
+
+    Parameters
+    ----------
+    packing : Packing
+        Its grains.
+    pairs, image : ndarray of int, shape (M, 2) and (M, 3)
+        As in :class:`Contacts`.
+    source : str
+        ``file``, whose contacts are refused if they are too far apart, or ``geometric``.
+    force : ndarray, shape (M, 3), optional
+        Force on the second grain.
+    force_n : ndarray, shape (M,) or (M, 3), optional
+        Normal force, or a force whose normal part it is.
+
+    Warns
+    -----
+    ScanfabWarning
+        If two centres are the same: such a contact has no direction, and is left out.
+    """
+    pairs, image = pairs.astype(np.int32, copy=False), image.astype(np.int32, copy=False)
+    normal, point = np.empty((len(pairs), 3)), np.empty((len(pairs), 3))
+    length = np.empty(len(pairs))
+    # some contacts at a time, so that what is known of them on the way takes little memory
+    for start in range(0, len(pairs), CHUNK):
+        some = slice(start, start + CHUNK)
+        one, two = pairs[some].T
+        branch = branches(packing.position, pairs[some], image[some], packing.cell)
+        apart = np.linalg.norm(branch, axis=1)
+        normal[some] = branch / np.where(apart > 0.0, apart, 1.0)[:, None]
+        middle = 0.5 * (apart + packing.radius[one] - packing.radius[two])
+        point[some] = np.take(packing.position, one, axis=0) + middle[:, None] * normal[some]
+        length[some] = apart
+    if source == "file":
         _refuse_long(pairs, length, packing)
-    keep = _first_of_each(pairs, image)
-    same = length[keep] == 0
-    if np.any(same):
-        warn_of_same_centre(pairs[keep][same], packing.id)
-        keep = keep[~same]
-    pairs, image, branch, length = pairs[keep], image[keep], branch[keep], length[keep]
-    normal = branch / length[:, None]
-    radius = packing.radius[pairs]
-    middle = 0.5 * (length + radius[:, 0] - radius[:, 1])
-    point = packing.position[pairs[:, 0]] + middle[:, None] * normal
-    force, force_n = (None if one is None else one[rows[keep]] for one in (force, force_n))
+    if not length.all():
+        same = length == 0.0
+        one, two = packing.id[pairs[np.argmax(same)]]
+        warn(
+            f"the grains {one} and {two} have the same centre ({same.sum()} such pairs): a contact "
+            f"between them has no direction and is left out"
+        )
+        pairs, image, normal, point = pairs[~same], image[~same], normal[~same], point[~same]
+        force, force_n = (None if values is None else values[~same] for values in (force, force_n))
     if force_n is not None and force_n.ndim == 2:
         force_n = np.einsum("ci,ci->c", force_n, normal)
-    return Contacts(pairs, image, normal, point, force, listed.source, force_n)
+    return Contacts(pairs, image, normal, point, force, source, force_n)
 
 
 def _forces(listed: ContactList, count: int) -> tuple[FloatArray | None, FloatArray | None]:
@@ -257,7 +302,7 @@ def _refuse_ambiguous(pairs: IntArray, branch: FloatArray, packing: Packing) -> 
     close = close[pairs[close, 0] != pairs[close, 1]]
     if close.size == 0:
         return
-    for step in packing.cell.lattice.steps:
+    for step in packing.cell.lattice.within(2.0 * float(reach.max())):
         touches = np.linalg.norm(branch[close] + step, axis=1) < reach[close]
         if touches.any():
             one, two = packing.id[pairs[close[np.argmax(touches)]]]
@@ -283,7 +328,7 @@ def _refuse_itself(pairs: IntArray, image: IntArray, packing: Packing) -> None:
     )
 
 
-def _refuse_long(pairs: IntArray, length: FloatArray, packing: Packing) -> None:
+def _refuse_long(pairs: RowArray, length: FloatArray, packing: Packing) -> None:
     """An error if the centres of a listed contact are too far apart for a contact."""
     radius = packing.radius[pairs]
     # a gap of half a grain, by the smaller of the two
@@ -304,18 +349,9 @@ def _refuse_long(pairs: IntArray, length: FloatArray, packing: Packing) -> None:
     )
 
 
-def warn_of_same_centre(pairs: IntArray, id: IntArray) -> None:
-    """Say that contacts between grains of one centre are left out."""
-    one, two = id[pairs[0]]
-    warn(
-        f"the grains {one} and {two} have the same centre ({len(pairs)} such pairs): a contact "
-        f"between them has no direction and is left out"
-    )
-
-
-def _first_of_each(pairs: IntArray, image: IntArray) -> npt.NDArray[np.intp]:
+def _first_of_each(pairs: RowArray, image: RowArray) -> npt.NDArray[np.intp]:
     """Rows of the first mention of each contact, whichever grain is named first."""
-    low, high = pairs.min(axis=1), pairs.max(axis=1)
+    low, high = pairs.min(axis=1).astype(np.int64), pairs.max(axis=1)
     # a number for each image, and for the opposite one the same below zero
     base = 2 * int(np.abs(image).max(initial=0)) + 1
     code = image @ base ** np.arange(3)

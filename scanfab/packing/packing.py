@@ -24,7 +24,9 @@ from scanfab.packing.contacts import (
     resolve_contacts,
     resolve_wall_forces,
 )
-from scanfab.packing.plane import cell_in_plane, flat_space, refuse_outside
+
+# centres below which to lie in one plane may be chance
+FEWEST = 10
 
 
 class Packing:
@@ -100,20 +102,23 @@ class Packing:
         self.radius: FloatArray = cast(
             "radius", np.full(count, radii) if radii.ndim == 0 else radii, np.float64, (count,)
         )
-        numbers = np.arange(count) if id is None else id
-        self.id: IntArray = cast("id", numbers, np.int64, (count,))
+        self.id: IntArray = cast("id", np.arange(count) if id is None else id, np.int64, (count,))
         check_lengths(centres, self.radius, self.id)
-        if id is not None:
-            _check_ids(self.id)
+        ordered = np.sort(self.id)
+        again = ordered[1:][ordered[1:] == ordered[:-1]]
+        if again.size:
+            raise PackingError(
+                f"the id {again[0]} occurs twice: {count - again.size} ids for {count} grains"
+            )
         if isinstance(space, Space):
-            refuse_outside(centres, space)
+            _refuse_outside(centres, space)
         else:
             space = flat_space(centres) if space == 2 else SPACE
         self.space: Space = space
         if cell is not None and self.space.is_plane:
-            cell = cell_in_plane(cell, self.space)
+            cell = _cell_in_plane(cell, self.space)
         self.cell, turns = cell, None
-        self.position: FloatArray = centres
+        self.position = centres
         if cell is not None and not cell.surely_holds(centres):
             self.position, turns = cell.place(centres)
         self.position.flags.writeable = False
@@ -196,7 +201,7 @@ class Packing:
 
 
 def _centres(position: npt.ArrayLike, dim: int | Space | None) -> tuple[FloatArray, int | Space]:
-    """Positions of three coordinates, from those of three or of two, and their dimension."""
+    """Positions with three coordinates, of discs 0 along z, and 2, 3 or the space they lie in."""
     if dim not in (None, 2, 3) and not isinstance(dim, Space):
         raise PackingError(f"dim: expected 2 or 3, found {dim!r}")
     try:
@@ -213,7 +218,7 @@ def _centres(position: npt.ArrayLike, dim: int | Space | None) -> tuple[FloatArr
 
 def _wall_contacts(values: npt.ArrayLike | None, count: int) -> IntArray:
     if values is None:
-        # one number, seen as many times
+        # one zero, seen at all places
         return np.broadcast_to(np.int64(0), count)
     numbers = cast("wall_contacts", values, np.int64, (count,))
     if np.any(numbers < 0):
@@ -240,11 +245,79 @@ def check_lengths(position: FloatArray, radius: FloatArray, id: IntArray) -> Non
     )
 
 
-def _check_ids(id: IntArray) -> None:
-    """PackingError if an id occurs twice."""
-    ordered = np.sort(id)
-    again = ordered[1:][ordered[1:] == ordered[:-1]]
-    if again.size:
+def space_of(position: FloatArray) -> Space:
+    """
+    The plane in which centres surely lie; all space where that is not sure.
+
+    They lie in one if they are ten at least, and all share exactly one coordinate.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.packing.packing import space_of
+    >>> line = np.arange(12.0)
+    >>> space_of(np.column_stack([line, line**2, np.ones(12)]))
+    Space: the plane x-y
+    """
+    if len(position) < FEWEST:
+        return SPACE
+    shared = np.flatnonzero((position == position[0]).all(axis=0))
+    return Space(int(shared[0])) if len(shared) == 1 else SPACE
+
+
+def flat_space(position: FloatArray) -> Space:
+    """
+    The plane of discs; of several that hold all centres the one across z, or else y.
+
+    Raises
+    ------
+    PackingError
+        If they do not share a coordinate.
+    """
+    shared = np.flatnonzero((position == position[:1]).all(axis=0))
+    if len(shared) == 0:
+        extents = ", ".join(f"{edge:.4g}" for edge in np.ptp(position, axis=0))
         raise PackingError(
-            f"the id {again[0]} occurs twice: {id.size - again.size} ids for {id.size} grains"
+            f"the centres do not lie in one coordinate plane (they take {extents} along x, y, z): "
+            f"expected discs that share one coordinate exactly; `dim=3` reads them as spheres"
         )
+    return Space(int(shared[-1]))
+
+
+def spelt_plane(position: FloatArray, space: Space) -> str:
+    """Where the plane of some centres lies: ``z = 0``."""
+    assert space.across is not None
+    return f"{'xyz'[space.across]} = {position[0, space.across]:g}"
+
+
+def _refuse_outside(position: FloatArray, space: Space) -> None:
+    """PackingError if centres do not lie in the plane of a series."""
+    if space.across is None or not len(position):
+        return
+    along, name = position[:, space.across], "xyz"[space.across]
+    elsewhere = along[along != along[0]]
+    if elsewhere.size:
+        raise PackingError(
+            f"the series is read as discs in {space}, as its first frame has them, but here "
+            f"centres lie at {name} = {along[0]:g} and at {name} = {elsewhere[0]:g}: `dim=3` reads "
+            f"all frames as spheres"
+        )
+
+
+def _cell_in_plane(cell: Cell, space: Space) -> Cell:
+    """
+    The cell of discs, which does not repeat across their plane.
+
+    One of its vectors stands across the plane, and the others lie in it; PackingError if they
+    cannot.
+    """
+    leaving = np.flatnonzero(cell.vectors[:, space.across])
+    if len(leaving) != 1:
+        raise PackingError(
+            f"the cell's vectors {cell.vectors.tolist()} do not fit discs in {space}: expected two "
+            f"of them in the plane, and one that leads out of it"
+        )
+    vectors, periodic = cell.vectors.copy(), list(cell.periodic)
+    vectors[leaving[0]] *= space.normal
+    periodic[leaving[0]] = False
+    return Cell(vectors, (periodic[0], periodic[1], periodic[2]), cell.origin, space)

@@ -15,7 +15,7 @@ from scanfab.base.errors import Note, SettingsError
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.io.surface import read_surface
-from scanfab.packing.plane import spelt_plane
+from scanfab.packing.packing import spelt_plane
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import RV_MEANING, SurfaceBox, Window
 from scanfab.pipeline.settings import Settings

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import qmc
 
 from scanfab import Cell, ContactList, Packing
-from scanfab.packing.clump_volumes import own_shares
+from scanfab.packing.bodies import own_shares
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.pipeline.state import _rays, contact_forces, sample_state
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import scanfab
+from scanfab.packing.doubts import fitting_periods
 from scanfab.packing.packing import Packing
-from scanfab.packing.periodicity import fitting_periods
 from tests.helpers.truth import BOX, CELL, FLOOR, PERIODIC, TRIAXIAL, YADE
 
 pytestmark = pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabNote")
