@@ -22,6 +22,8 @@ OPERATORS = {
 }
 # values that a message lists one by one
 MOST_LISTED = 10
+# classes of one column, and particles, with which it may tell a boundary
+MOST_CLASSES, FEWEST = 20, 50
 # columns that sort particles into classes
 CLASS_COLUMNS = ("type", "mask", "material", "matid", "materialid", "mat", "group")
 
@@ -130,21 +132,19 @@ def enclosing_class(packing: Packing) -> str | None:
     All particles of the class lie farther out than nearly all others, measured in the box of the
     sample, round or square.
     """
-    columns = {
-        name: values
-        for name, values in packing.columns.items()
-        if name.lower() in CLASS_COLUMNS and values.ndim == 1 and values.dtype.kind in "iuf"
-    }
-    if len(packing) < 50 or not columns:
+    classes: list[tuple[str, npt.NDArray[Any], npt.NDArray[Any]]] = []
+    for name, values in packing.columns.items():
+        if name.lower() in CLASS_COLUMNS and values.ndim == 1 and values.dtype.kind in "iuf":
+            # a side column may have gaps
+            found = np.unique(values[values == values])
+            classes += [(name, values, found)] if 2 <= found.size <= MOST_CLASSES else []
+    if len(packing) < FEWEST or not classes:
         return None
     low, high = packing.position.min(axis=0), packing.position.max(axis=0)
     scaled = (packing.position - 0.5 * (low + high)) / np.maximum(high - low, 1e-300)
     distances = np.linalg.norm(scaled, axis=1), np.abs(scaled).max(axis=1)
-    for name, values in columns.items():
-        classes = np.unique(values[values == values])  # a side column may have gaps
-        if not 2 <= classes.size <= 20:
-            continue
-        for value in classes:
+    for name, values, found in classes:
+        for value in found:
             inside = values != value
             if any(d[~inside].min() > np.quantile(d[inside], 0.98) for d in distances):
                 return f"{name}={value:g}"

@@ -278,58 +278,50 @@ def _images(
     listed: ContactList, pairs: IntArray, packing: Packing, turns: IntArray | None
 ) -> IntArray:
     """Lattice translations of the second grains, from positions inside the cell."""
-    cell = packing.cell
+    cell, (one, two) = packing.cell, pairs.T
     if listed.image is not None:
         image: IntArray = cast("image", listed.image, np.int64, (len(pairs), 3))
         if np.any(image[:, ~np.array((False,) * 3 if cell is None else cell.periodic)]):
             raise PackingError("image: a contact passes a face that is not periodic")
-        if turns is None:
-            return image
-        return image + turns[pairs[:, 1]] - turns[pairs[:, 0]]
+        return image if turns is None else image + turns[two] - turns[one]
     if cell is None:
         return np.zeros((len(pairs), 3), np.int64)
-    branch = packing.position[pairs[:, 1]] - packing.position[pairs[:, 0]]
-    image = cell.nearest_image(branch)
-    _refuse_ambiguous(pairs, branch + image @ cell.vectors, packing)
+    image = cell.nearest_image(packing.position[two] - packing.position[one])
+    # a list without images cannot mean both images through which a pair touches
+    branch, reach = (
+        branches(packing.position, pairs, image, cell),
+        packing.radius[pairs].sum(axis=1),
+    )
+    close = np.flatnonzero((cell.lattice.shortest < 2.0 * reach) & (one != two))
+    for step in cell.lattice.within(2.0 * float(reach[close].max(initial=0.0))):
+        touches = np.linalg.norm(branch[close] + step, axis=1) < reach[close]
+        if touches.any():
+            first, second = packing.id[pairs[close[np.argmax(touches)]]]
+            raise PackingError(
+                f"the grains {first} and {second} touch through more than one image, and the "
+                f"contact list does not say through which: the cell is too thin for this format; "
+                f'find the contacts by geometry (`contacts="geometric"`)'
+            )
     return image
 
 
-def _refuse_ambiguous(pairs: IntArray, branch: FloatArray, packing: Packing) -> None:
-    """An error if a pair touches through two images, of which the list cannot mean both."""
-    assert packing.cell is not None
-    reach = packing.radius[pairs].sum(axis=1)
-    close = np.flatnonzero(packing.cell.lattice.shortest < 2 * reach)
-    close = close[pairs[close, 0] != pairs[close, 1]]
-    if close.size == 0:
-        return
-    for step in packing.cell.lattice.within(2.0 * float(reach.max())):
-        touches = np.linalg.norm(branch[close] + step, axis=1) < reach[close]
-        if touches.any():
-            one, two = packing.id[pairs[close[np.argmax(touches)]]]
-            raise PackingError(
-                f"the grains {one} and {two} touch through more than one image, and the contact "
-                f"list does not say through which: the cell is too thin for this format; find the "
-                f'contacts by geometry (`contacts="geometric"`)'
-            )
-
-
 def _refuse_itself(pairs: IntArray, image: IntArray, packing: Packing) -> None:
+    """PackingError if a grain is listed as a contact of itself, not of an image of it."""
     itself = (pairs[:, 0] == pairs[:, 1]) & ~image.any(axis=1)
-    if not np.any(itself):
+    if not itself.any():
         return
-    advice = ""
-    if packing.is_periodic:
-        advice = (
-            "; if it touches its own image, the list does not say which one: find the contacts by "
-            'geometry (`contacts="geometric"`)'
-        )
+    advice = (
+        "; if it touches its own image, the list does not say which one: find the contacts by "
+        'geometry (`contacts="geometric"`)'
+    )
     raise PackingError(
-        f"{grains_named(packing.id[pairs[:, 0]], itself)}: in contact with itself{advice}"
+        f"{grains_named(packing.id[pairs[:, 0]], itself)}: in contact with itself"
+        f"{advice if packing.is_periodic else ''}"
     )
 
 
 def _refuse_long(pairs: RowArray, length: FloatArray, packing: Packing) -> None:
-    """An error if the centres of a listed contact are too far apart for a contact."""
+    """PackingError if the centres of a listed contact are too far apart for a contact."""
     radius = packing.radius[pairs]
     # a gap of half a grain, by the smaller of the two
     excess = length - radius.sum(axis=1) - radius.min(axis=1)
@@ -337,12 +329,12 @@ def _refuse_long(pairs: RowArray, length: FloatArray, packing: Packing) -> None:
         return
     worst = int(np.argmax(excess))
     one, two = packing.id[pairs[worst]]
-    advice = (
-        "is this the contact list of another step?"
-        if packing.is_periodic
-        else "if the sample is periodic, name its cell (`cell` and `periodic`); "
-        "otherwise the contact list belongs to another step"
-    )
+    advice = "is this the contact list of another step?"
+    if not packing.is_periodic:
+        advice = (
+            "if the sample is periodic, name its cell (`cell` and `periodic`); otherwise the "
+            "contact list belongs to another step"
+        )
     raise PackingError(
         f"the grains {one} and {two} are listed as a contact, but their centres are "
         f"{length[worst]:g} apart and their radii add up to {radius[worst].sum():g}: {advice}"

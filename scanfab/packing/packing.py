@@ -148,10 +148,9 @@ class Packing:
         if len(self):
             low, high = self.radius.min(), self.radius.max()
             what += f" of radius {low:.4g}" + ("" if low == high else f" to {high:.4g}")
-        if self.space.is_plane:
-            what += f", 2D in {self.space}"
+        what += f", 2D in {self.space}" if self.space.is_plane else ""
         if self.bodies is not None:
-            what += f", parts of {counted(len(np.unique(self.bodies.head)), 'grain')}"
+            what += f", parts of {counted(np.count_nonzero(self.bodies.is_head), 'grain')}"
         what += ", contacts not known" if self.contacts is None else f", {self.contacts.in_words()}"
         what += "" if self.step is None else f", step {self.step}"
         return f"Packing: {what}" + ("" if self.cell is None else f"\n  {self.cell!r}")
@@ -231,13 +230,13 @@ def check_lengths(position: FloatArray, radius: FloatArray, id: IntArray) -> Non
     if all_within(position, -MOST, MOST) and all_within(radius, LEAST, MOST):
         return
     finite = np.isfinite(position).all(axis=1) & np.isfinite(radius)
-    odd = (np.abs(position) > MOST).any(axis=1) | (radius > MOST) | (radius < LEAST)
-    reasons = [
-        (~finite, "position and radius must be finite numbers"),
-        (radius <= 0, "the radius must be larger than zero"),
-        (odd, f"a radius below {LEAST:g} or a number above {MOST:g} cannot be a length"),
-    ]
-    wrong, reason = next((wrong, reason) for wrong, reason in reasons if wrong.any())
+    odd = ~(np.abs(position) <= MOST).all(axis=1) | ~((radius >= LEAST) & (radius <= MOST))
+    reasons = {
+        "position and radius must be finite numbers": ~finite,
+        "the radius must be larger than zero": radius <= 0,
+        f"a radius below {LEAST:g} or a number above {MOST:g} cannot be a length": odd,
+    }
+    reason, wrong = next((reason, wrong) for reason, wrong in reasons.items() if wrong.any())
     first = int(np.argmax(wrong))
     place = ", ".join(f"{x:g}" for x in position[first])
     raise PackingError(

@@ -111,20 +111,19 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
     if "forces" in plan.groups or "state" in plan.groups:
         refuse_forces(frame, plan.groups)
     measurements = measure(frame, plan.in_frame(frame), f"frame {number}")
-    columns = [
-        VariantColumns(measurement, VARIANTS[variant], place)
-        for variant in plan.variants
-        for measurement, _ in zip(measurements, plan.rvs_of(variant), strict=False)
-        for place in range(len(plan.cutoffs))
-    ]
-    rows = [
-        complete_row({**known, "variant": one.variant.name, **one.columns()}, plan.more_columns)
-        for one in columns
-    ]
+    rows, told = [], []
+    for variant in plan.variants:
+        for measurement, _ in zip(measurements, plan.rvs_of(variant), strict=False):
+            for place in range(len(plan.cutoffs)):
+                # one at a time, as each holds the contacts of its variant
+                one = VariantColumns(measurement, VARIANTS[variant], place)
+                values = {**known, "variant": variant, **one.columns()}
+                rows.append(complete_row(values, plan.more_columns))
+                told += one.notes()
     notes = [
         *frame.doubts_of_escaped(),
         *(note for one in measurements for note in one.notes),
-        *joined(note for one in columns for note in one.notes()),
+        *joined(told),
         *_large_errors(rows, plan),
     ]
     return FrameResult(source, number, frame, measurements, rows, tuple(notes))

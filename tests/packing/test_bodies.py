@@ -59,7 +59,7 @@ def test_a_rattler_goes_whole_with_the_contacts_of_all_its_spheres():
     assert sample.rattlers.tolist() == [True, True, False, False, True, True]
     assert sample.fabric_contacts(B, None).sum() == 0
     assert sample.coordination(B, None) == 0.0
-    assert sample.contact_numbers_without_rattlers[2:4].tolist() == [0, 0]
+    assert sample.numbers_of(B)[2:4].tolist() == [0, 0]
 
 
 def test_recursion_takes_bodies_off_one_after_the_other():
