@@ -260,8 +260,10 @@ def space_of(position: FloatArray) -> Space:
     """
     if len(position) < FEWEST:
         return SPACE
-    shared = np.flatnonzero((position == position[0]).all(axis=0))
-    return Space(int(shared[0])) if len(shared) == 1 else SPACE
+    # as a rule a few centres show that no coordinate is shared by all
+    few = np.flatnonzero((position[:FEWEST] == position[0]).all(axis=0))
+    shared = [int(axis) for axis in few if np.all(position[:, axis] == position[0, axis])]
+    return Space(shared[0]) if len(shared) == 1 else SPACE
 
 
 def flat_space(position: FloatArray) -> Space:
