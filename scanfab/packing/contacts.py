@@ -235,18 +235,7 @@ def contacts_of(
         If two centres are the same: such a contact has no direction, and is left out.
     """
     pairs, image = pairs.astype(np.int32, copy=False), image.astype(np.int32, copy=False)
-    normal, point = np.empty((len(pairs), 3)), np.empty((len(pairs), 3))
-    length = np.empty(len(pairs))
-    # some contacts at a time, so that what is known of them on the way takes little memory
-    for start in range(0, len(pairs), CHUNK):
-        some = slice(start, start + CHUNK)
-        one, two = pairs[some].T
-        branch = branches(packing.position, pairs[some], image[some], packing.cell)
-        apart = np.linalg.norm(branch, axis=1)
-        normal[some] = branch / np.where(apart > 0.0, apart, 1.0)[:, None]
-        middle = 0.5 * (apart + packing.radius[one] - packing.radius[two])
-        point[some] = np.take(packing.position, one, axis=0) + middle[:, None] * normal[some]
-        length[some] = apart
+    normal, point, length = geometry(packing.position, packing.radius, pairs, image, packing.cell)
     if source == "file":
         _refuse_long(pairs, length, packing)
     if not length.all():
@@ -261,6 +250,41 @@ def contacts_of(
     if force_n is not None and force_n.ndim == 2:
         force_n = np.einsum("ci,ci->c", force_n, normal)
     return Contacts(pairs, image, normal, point, force, source, force_n)
+
+
+def geometry(
+    position: FloatArray, radius: FloatArray, pairs: RowArray, image: RowArray, cell: Cell | None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """
+    Unit normals, middles of the overlaps or gaps, and distances of the centres of pairs.
+
+    Parameters
+    ----------
+    position, radius : ndarray, shape (N, 3) and (N,)
+        Of the grains, dump's length unit.
+    pairs, image : ndarray of int, shape (M, 2) and (M, 3)
+        As in :class:`Contacts`.
+    cell : Cell or None
+        Through which the pairs may lie.
+
+    Returns
+    -------
+    normal, point, length : ndarray, shape (M, 3), (M, 3) and (M,)
+        The normal of grains with the same centre is 0, as it has no direction.
+    """
+    normal, point = np.empty((len(pairs), 3)), np.empty((len(pairs), 3))
+    length = np.empty(len(pairs))
+    # some pairs at a time, so that what is known of them on the way takes little memory
+    for start in range(0, len(pairs), CHUNK):
+        some = slice(start, start + CHUNK)
+        one, two = pairs[some].T
+        branch = branches(position, pairs[some], image[some], cell)
+        apart = np.linalg.norm(branch, axis=1)
+        normal[some] = branch / np.where(apart > 0.0, apart, 1.0)[:, None]
+        middle = 0.5 * (apart + radius[one] - radius[two])
+        point[some] = np.take(position, one, axis=0) + middle[:, None] * normal[some]
+        length[some] = apart
+    return normal, point, length
 
 
 def _forces(listed: ContactList, count: int) -> tuple[FloatArray | None, FloatArray | None]:

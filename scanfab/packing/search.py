@@ -11,7 +11,7 @@ from scanfab.base.errors import PackingError, SettingsError
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.packing.cell import Cell
-from scanfab.packing.contacts import branches, contacts_of
+from scanfab.packing.contacts import contacts_of, geometry
 from scanfab.packing.kernels import Grid, PairArray, find_pairs
 from scanfab.packing.packing import Packing
 
@@ -131,23 +131,18 @@ def near_pairs(sample: Sample, variant: Variant, window: Window | None, gap: flo
     solid = sample.grains & ~sample.removed(variant)
     position, radius = packing.position[solid], packing.radius[solid]
     pairs, image = overlapping_pairs(position, radius + 0.5 * gap, 1.0, packing.cell)
-    one, two = pairs.T
-    branch = branches(position, pairs, image, packing.cell)
-    distance = np.linalg.norm(branch, axis=1)
-    normal = branch / np.where(distance > 0.0, distance, 1.0)[:, None]
-    overlap = radius[one] + radius[two] - distance
+    normal, middle, distance = geometry(position, radius, pairs, image, packing.cell)
     chosen = distance > 0.0
-    inside = sample.counted(variant, window)[solid]
     if window is not None:
-        middle = position[one] + normal * (radius[one] - 0.5 * overlap)[:, None]
         chosen &= window.contains(middle, packing)
         volume = window.shape.volume
     else:
         assert packing.cell is not None
         volume = packing.cell.volume
-    reduced = radius[one] * radius[two] / (radius[one] + radius[two])
-    found = normal[chosen], overlap[chosen], reduced[chosen]
-    return NearPairs(*found, packing.space.shadow(radius[inside]), volume, packing.space)
+    one, two = radius[pairs[chosen]].T
+    overlap, reduced = one + two - distance[chosen], one * two / (one + two)
+    shadow = packing.space.shadow(radius[sample.counted(variant, window)[solid]])
+    return NearPairs(normal[chosen], overlap, reduced, shadow, volume, packing.space)
 
 
 def overlapping_pairs(
