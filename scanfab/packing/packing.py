@@ -150,7 +150,7 @@ class Packing:
             what += f" of radius {low:.4g}" + ("" if low == high else f" to {high:.4g}")
         what += f", 2D in {self.space}" if self.space.is_plane else ""
         if self.bodies is not None:
-            what += f", parts of {counted(np.count_nonzero(self.bodies.is_head), 'grain')}"
+            what += f", parts of {counted(int(self.bodies.is_head.sum()), 'grain')}"
         what += ", contacts not known" if self.contacts is None else f", {self.contacts.in_words()}"
         what += "" if self.step is None else f", step {self.step}"
         return f"Packing: {what}" + ("" if self.cell is None else f"\n  {self.cell!r}")
