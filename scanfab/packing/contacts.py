@@ -220,12 +220,10 @@ def contacts_of(
     ----------
     packing : Packing
         Its grains.
-    pairs, image : ndarray of int, shape (M, 2) and (M, 3)
+    pairs, image, force : ndarray
         As in :class:`Contacts`.
     source : str
         ``file``, whose contacts are refused if they are too far apart, or ``geometric``.
-    force : ndarray, shape (M, 3), optional
-        Force on the second grain.
     force_n : ndarray, shape (M,) or (M, 3), optional
         Normal force, or a force whose normal part it is.
 
@@ -258,19 +256,8 @@ def geometry(
     """
     Unit normals, middles of the overlaps or gaps, and distances of the centres of pairs.
 
-    Parameters
-    ----------
-    position, radius : ndarray, shape (N, 3) and (N,)
-        Of the grains, dump's length unit.
-    pairs, image : ndarray of int, shape (M, 2) and (M, 3)
-        As in :class:`Contacts`.
-    cell : Cell or None
-        Through which the pairs may lie.
-
-    Returns
-    -------
-    normal, point, length : ndarray, shape (M, 3), (M, 3) and (M,)
-        The normal of grains with the same centre is 0, as it has no direction.
+    Of shape (M, 3), (M, 3) and (M,), lengths in the dump's unit. The normal of grains with the same
+    centre is 0, as it has no direction.
     """
     normal, point = np.empty((len(pairs), 3)), np.empty((len(pairs), 3))
     length = np.empty(len(pairs))
@@ -406,26 +393,3 @@ class WallForces(NamedTuple):
     """Where it touches the wall, next to where the grain is, shape (K, 3); dump's length unit."""
     force: FloatArray
     """On the grain, shape (K, 3); dump's force unit."""
-
-
-def resolve_wall_forces(
-    listed: ListedWallForces, position: FloatArray, cell: Cell | None
-) -> WallForces:
-    """
-    Listed forces of walls, each beside its grain.
-
-    Raises
-    ------
-    PackingError
-        If a contact names a row that does not exist, or a number is not finite.
-    """
-    row = cast("wall_forces: row", listed.row, np.int64, (None,))
-    point = cast("wall_forces: point", listed.point, np.float64, (len(row), 3))
-    force = cast("wall_forces: force", listed.force, np.float64, (len(row), 3))
-    if np.any((row < 0) | (row >= len(position))):
-        raise PackingError(f"wall_forces: names a row that is none of {len(position)} grains")
-    if not (np.isfinite(point).all() and np.isfinite(force).all()):
-        raise PackingError("wall_forces: expected finite points and forces")
-    if cell is not None and cell.is_periodic:
-        point = point + cell.nearest_image(point - position[row]) @ cell.vectors
-    return WallForces(row, point, force)

@@ -22,7 +22,6 @@ from scanfab.packing.contacts import (
     ListedWallForces,
     WallForces,
     resolve_contacts,
-    resolve_wall_forces,
 )
 
 # centres below which to lie in one plane may be chance
@@ -132,7 +131,7 @@ class Packing:
         self.wall_contacts: IntArray = _wall_contacts(wall_contacts, count)
         self.wall_forces: WallForces | None = None
         if wall_forces is not None:
-            self.wall_forces = resolve_wall_forces(wall_forces, self.position, cell)
+            self.wall_forces = _wall_forces(wall_forces, self.position, cell)
         self.step = None if step is None else int(step)
         self.time = None if time is None else float(time)
         self.contacts: Contacts | None = None
@@ -223,6 +222,20 @@ def _wall_contacts(values: npt.ArrayLike | None, count: int) -> IntArray:
     if np.any(numbers < 0):
         raise PackingError("wall_contacts: expected 0 or more for each grain")
     return numbers
+
+
+def _wall_forces(listed: ListedWallForces, position: FloatArray, cell: Cell | None) -> WallForces:
+    """Listed forces of walls, each beside its grain; PackingError if they cannot be forces."""
+    row = cast("wall_forces: row", listed.row, np.int64, (None,))
+    point = cast("wall_forces: point", listed.point, np.float64, (len(row), 3))
+    force = cast("wall_forces: force", listed.force, np.float64, (len(row), 3))
+    if np.any((row < 0) | (row >= len(position))):
+        raise PackingError(f"wall_forces: names a row that is none of {len(position)} grains")
+    if not (np.isfinite(point).all() and np.isfinite(force).all()):
+        raise PackingError("wall_forces: expected finite points and forces")
+    if cell is not None and cell.is_periodic:
+        point = point + cell.nearest_image(point - position[row]) @ cell.vectors
+    return WallForces(row, point, force)
 
 
 def check_lengths(position: FloatArray, radius: FloatArray, id: IntArray) -> None:
