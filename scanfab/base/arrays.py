@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -14,6 +14,8 @@ from scanfab.base.typing import IntArray
 
 # lengths lie between these, so that their cubes are still finite and above 0
 LEAST, MOST = 1e-100, 1e100
+# rows at a time, whose temporary arrays take some tens of megabytes
+ROWS = 1 << 18
 
 
 def doubles(values: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
@@ -52,6 +54,19 @@ def cast(
 def all_within(values: npt.NDArray[np.float64], least: float, most: float) -> bool:
     """Whether all values lie from least to most; NaN does not. Makes no temporary array."""
     return values.size == 0 or bool(values.min() >= least and values.max() <= most)
+
+
+def compressed(chosen: npt.NDArray[np.bool_], values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """The chosen rows; not a copy if that is all of them."""
+    # several times as fast as to index with a mask
+    return values if chosen.all() else np.compress(chosen, values, axis=0)
+
+
+def in_parts(function: Callable[..., npt.NDArray[Any]], *arrays: npt.NDArray[Any]) -> Any:
+    """What a function makes of arrays, row by row; of many rows some at a time, to save memory."""
+    starts = range(0, max(len(arrays[0]), 1), ROWS)
+    parts = [function(*(one[start : start + ROWS] for one in arrays)) for start in starts]
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def grains_named(id: IntArray, wrong: npt.NDArray[np.bool_]) -> str:

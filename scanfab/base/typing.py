@@ -13,3 +13,5 @@ BoolArray = npt.NDArray[np.bool_]
 AnyArray = npt.NDArray[Any]
 Columns = dict[str, AnyArray]
 """The columns of a table by their names: numbers or texts, a row for each grain or contact."""
+RowArray = npt.NDArray[np.integer[Any]]
+"""Whole numbers that may be stored in four bytes: rows of grains, images."""

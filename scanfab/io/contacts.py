@@ -140,9 +140,7 @@ def _grains_at(grains: GrainTable, points: FloatArray) -> IntArray:
         points, position = grains.cell.wrap(points), grains.cell.wrap(position)
         # rounding may put a point and its centre on opposite faces: images just outside help
         margin = min(SAME_PLACE * float(radius.max()), float(grains.cell.heights.min()))
-        images, of = grains.cell.images(position, margin)
-        position = np.concatenate([position, images])
-        row = np.concatenate([row, of])
+        position, row, _ = grains.cell.with_images(position, margin)
     distance, nearest = KDTree(position).query(points)
     same = distance < SAME_PLACE * radius[row[nearest]]
     return np.where(same, row[nearest], -1)

@@ -21,7 +21,7 @@ from scanfab.io.files import Stamp, stamp_of, unpacking_up_to
 from scanfab.io.frame import Frame
 from scanfab.io.layout import FrameFile
 from scanfab.io.reader import ReadOptions, Snapshot
-from scanfab.packing.plane import flat_space, space_of, spelt_plane
+from scanfab.packing.packing import flat_space, space_of, spelt_plane
 
 # more frames than there can be: where a slice ends while its frames are not counted
 ENDLESS = 2**62

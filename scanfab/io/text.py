@@ -127,7 +127,9 @@ def read_rows(
     body = rows.lstrip(edge)
     layout = layout._replace(line=layout.line + rows.count(b"\n", 0, len(rows) - len(body)))
     has_end = not body or body.rstrip(b" \t").endswith(b"\n")
-    rows = body.rstrip(edge) + b"\n" if body else body
+    # as a rule there is nothing to strip, and no copy to be made
+    is_clean = body.endswith(b"\n") and not body[-2:-1].isspace()
+    rows = body if is_clean or not body else body.rstrip(edge) + b"\n"
     found = rows.count(b"\n")
     if count is not None and found != count:
         step = "" if snapshot.step is None else f", step {snapshot.step}"

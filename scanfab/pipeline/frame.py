@@ -105,29 +105,29 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
     if not frame.grains.any():
         return FrameResult(source, number, frame, (), list(_empty_rows(known, plan)))
     if plan.map_settings is not None:
-        rows, told, blocks = map_rows(frame, plan.in_frame(frame), known, f"frame {number}")
-        told = (*frame.doubts_of_escaped(), *told)
-        return FrameResult(source, number, frame, (), rows, told, blocks)
+        mapped, told, blocks = map_rows(frame, plan.in_frame(frame), known, f"frame {number}")
+        notes = (*frame.doubts_of_escaped(), *told)
+        return FrameResult(source, number, frame, (), mapped, notes, blocks)
     if "forces" in plan.groups or "state" in plan.groups:
         refuse_forces(frame, plan.groups)
     measurements = measure(frame, plan.in_frame(frame), f"frame {number}")
-    columns = [
-        VariantColumns(measurement, VARIANTS[variant], place)
-        for variant in plan.variants
-        for measurement, _ in zip(measurements, plan.rvs_of(variant), strict=False)
-        for place in range(len(plan.cutoffs))
-    ]
-    rows = [
-        complete_row({**known, "variant": one.variant.name, **one.columns()}, plan.more_columns)
-        for one in columns
-    ]
-    notes = [
+    rows: list[Row] = []
+    doubts: list[Note] = []
+    for variant in plan.variants:
+        for measurement, _ in zip(measurements, plan.rvs_of(variant), strict=False):
+            for place in range(len(plan.cutoffs)):
+                # one at a time, as each holds the contacts of its variant
+                one = VariantColumns(measurement, VARIANTS[variant], place)
+                values = {**known, "variant": variant, **one.columns()}
+                rows.append(complete_row(values, plan.more_columns))
+                doubts += one.notes()
+    notes = (
         *frame.doubts_of_escaped(),
         *(note for one in measurements for note in one.notes),
-        *joined(note for one in columns for note in one.notes()),
+        *joined(doubts),
         *_large_errors(rows, plan),
-    ]
-    return FrameResult(source, number, frame, measurements, rows, tuple(notes))
+    )
+    return FrameResult(source, number, frame, measurements, rows, notes)
 
 
 def check_space(sample: Sample, plan: Plan) -> None:

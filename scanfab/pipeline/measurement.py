@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from scanfab.base.arrays import compressed
 from scanfab.base.convex import Convex
 from scanfab.base.errors import Note
 from scanfab.base.shapes import sphere
@@ -146,7 +147,7 @@ def gap_scan(
 def _octants(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
     """Octants about the middle of the sample (of the cell), and about the centre of the RV."""
     packing, cell = sample.packing, sample.packing.cell
-    position = packing.position[sample.gathered]
+    position = compressed(sample.gathered, packing.position)
     low, high = position.min(axis=0), position.max(axis=0)
     radius = float(packing.radius.max())
     reach = float(np.linalg.norm(high - low)) + radius
@@ -230,7 +231,7 @@ def solids_of(
     if window is not None:
         window.check_fits(packing)
     whole = "a" in variants or "b" in variants
-    position, radius = packing.position[grains], packing.radius[grains]
+    position, radius = compressed(grains, packing.position), packing.radius[grains]
     removed = sample.rattlers[grains]
     origin = position.mean(axis=0) if window is None else window.center.copy()
     if space.across is not None:

@@ -15,7 +15,7 @@ from scanfab.base.errors import Note, SettingsError
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.io.surface import read_surface
-from scanfab.packing.plane import spelt_plane
+from scanfab.packing.packing import spelt_plane
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import RV_MEANING, SurfaceBox, Window
 from scanfab.pipeline.settings import Settings
@@ -132,7 +132,8 @@ def doubts_of_rv(window: Window, sample: Sample, box: SurfaceBox, largest: float
     packing, grains = sample.packing, sample.grains
     window.check_fits(packing)
     room = box.room_around(window)
-    if not window.may_meet(packing.position[grains], packing.radius[grains], packing).any():
+    meets = window.may_meet(packing.position, packing.radius, packing)
+    if not np.any(meets & grains):
         raise SettingsError(
             f"the {window} holds no grain: choose another `rv_center` or a larger one "
             f"(`rv_radius`, `rv_size`)"

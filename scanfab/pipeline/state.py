@@ -14,7 +14,7 @@ from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.fabric.measured import ContactForces, SampleState
 from scanfab.fabric.state import love_weber
-from scanfab.packing.clump_volumes import lens_volumes, own_shares
+from scanfab.packing.bodies import lens_volumes, own_shares
 from scanfab.packing.contacts import branches
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample, Variant

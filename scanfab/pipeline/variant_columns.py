@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from scanfab.base.arrays import compressed, in_parts
 from scanfab.base.errors import Note
 from scanfab.fabric import predicted
 from scanfab.fabric.forces import doubts_of_forces
@@ -89,8 +90,7 @@ class VariantColumns:
         if found.gaps is not None:
             count = found.gaps.in_blocks(name, self.place)[1].sum()
         chosen = sample.fabric_contacts(self.variant, self.window)
-        # np.compress is several times as fast as to index with a mask
-        points = np.compress(chosen, sample.contacts.point, axis=0)
+        points = compressed(chosen, sample.contacts.point)
         places = points
         if self.window is not None:
             # next to the centre of the RV
@@ -110,9 +110,9 @@ class VariantColumns:
                 found.blocked.kept(*words),
                 [found.blocked.kept(*words, without=one) for one in range(2**plan.space.dimension)],
             ),
-            normals=np.compress(chosen, sample.contacts.normal, axis=0),
+            normals=compressed(chosen, sample.contacts.normal),
             points=points,
-            blocks=found.blocks[self.variant.in_window].of(places),
+            blocks=in_parts(found.blocks[self.variant.in_window].of, places),
             space=plan.space,
             segment_count=int(count),
             forces=contact_forces(sample, chosen) if "forces" in groups else None,

@@ -10,7 +10,7 @@ from scanfab.fabric.contact import axial_error, contact_fabric
 from scanfab.fabric.forces import directional_mean
 from scanfab.fabric.harmonics import harmonic
 from scanfab.fabric.invariants import bias_of, fabric_deviator, intensity
-from scanfab.packing.clump_volumes import lens_volumes
+from scanfab.packing.bodies import lens_volumes
 from tests.helpers.truth import SAMPLE_DATA
 
 XY = Space(2)

@@ -80,6 +80,8 @@ class TextDump(shared.GrainsOnly):
         """
         data, where = text_of(snapshot), f"{snapshot.path}, step {snapshot.step}"
         header, count = _whole_header(where, data)
+        # the rows of large dumps are not held twice
+        del data
         what, *names = header.words
         # LAMMPS called ids tags until 2008
         names = ["id" if name == "tag" else name for name in names]
