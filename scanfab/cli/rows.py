@@ -36,6 +36,7 @@ def write_table(
     """
     from scanfab.pipeline.cluster import dask_executor
     from scanfab.pipeline.job import Job
+    from scanfab.pipeline.record import asked_for
     from scanfab.viz.paraview import vtk_folders
 
     asked = Output(**{name: chosen.pop(name) for name in vars(Output()) if name in chosen})
@@ -68,10 +69,9 @@ def write_table(
             job = Job(
                 series,
                 settings,
+                asked_for(sources, reading, settings, excerpt),
                 asked.output,
                 excerpt,
-                sources=sources,
-                reading=reading,
                 resume=resume,
                 manifest_path=asked.manifest,
                 more={"settings_file": listed} if (listed := as_listed(ctx)) else {},

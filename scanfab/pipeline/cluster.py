@@ -7,10 +7,9 @@ import logging
 import os
 import platform
 import socket
-import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future, InvalidStateError
+from concurrent.futures import CancelledError, Executor, Future
 from contextlib import contextmanager, suppress
 from functools import cache, partial
 from importlib.metadata import version
@@ -24,12 +23,10 @@ from scanfab.io.families import PathLike
 PACKAGES = ("scanfab", "numpy", "numba", "scipy", "polars", "dask", "distributed")
 # seconds within which a scheduler answers when it is called
 TIMEOUT = 10.0
-# seconds between two questions while frames are computed, and for which it may leave one open
-BEAT, SILENCE = 2.0, 60.0
+# seconds that a scheduler may take to answer while frames are computed
+SILENCE = 60.0
 # how often Dask computes a frame again that raises an error
 RETRIES = 2
-# names that tell what a folder holds
-MOST_NAMES = 5
 
 
 class ClusterError(ScanfabError):
@@ -38,6 +35,10 @@ class ClusterError(ScanfabError):
 
 class DeadWorkersError(ClusterError):
     """All workers that computed a frame have died, as one does that has too little memory."""
+
+
+class UnseenFileError(ClusterError):
+    """A worker cannot read the file of a frame."""
 
 
 @contextmanager
@@ -165,11 +166,8 @@ class DaskExecutor(Executor):
 
     def __init__(self, client: Any, address: str) -> None:
         self.client, self.address = client, address
-        self._is_silent = False
-        self.threads: dict[str, int] = self._asked_for_threads()
-        """How many threads each worker had a moment ago."""
-        threading.Thread(target=self._watch, daemon=True).start()
-        if not self.threads:
+        self._sender = client.get_executor(pure=False, retries=RETRIES)
+        if not self._threads():
             # a warning, so that --quiet shows it too: nothing else tells why nothing happens
             warn(
                 f"{address}: the scheduler has no workers yet: frames wait for them, without a "
@@ -177,95 +175,62 @@ class DaskExecutor(Executor):
             )
 
     def room(self) -> int:
-        """How many frames may be under way: one for each thread, so that none waits at a worker."""
-        return max(sum(self.threads.values()), 1)
+        """How many frames may be under way: one for each thread of the workers, and at least 1."""
+        return max(self._threads(), 1)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Have a function computed by a worker; one that has a ``path`` reads that file."""
-        future: Future[Any] = Future()
         job, path = partial(fn, *args, **kwargs), getattr(fn, "path", None)
         try:
-            sent = self.client.submit(
-                computed_there, job, path, versions_here(), pure=False, retries=RETRIES
-            )
+            future: Future[Any] = self._sender.submit(computed_there, job, path, versions_here())
         except Exception:
-            raise self._gone() from None
-        # what is not waited for any more is neither computed nor kept there
-        future.add_done_callback(lambda _: sent.release())
-        sent.add_done_callback(partial(self._settle, future, fn, path))
+            raise self._gone("has gone") from None
         return future
 
-    def _asked_for_threads(self) -> dict[str, int]:
-        return dict(self.client.nthreads(callback_timeout=SILENCE))
-
-    def _watch(self) -> None:
-        """
-        Ask for the workers every few seconds; leave a scheduler that does not answer.
-
-        A scheduler that is stopped, or lies behind a network that swallows what is sent, closes no
-        connection: whoever waits for a frame would wait without an end.
-        """
-        while self.client.status in ("running", "connecting"):
-            time.sleep(BEAT)
-            try:
-                self.threads = self._asked_for_threads()
-            except Exception as error:
-                self._is_silent = isinstance(error, TimeoutError)
-                with suppress(Exception):
-                    # all that is waited for ends with it
-                    self.client.close(timeout=TIMEOUT)
-                return
-
-    def _gone(self) -> ClusterError:
-        what = f"has not answered for {SILENCE:g} s" if self._is_silent else "has gone"
-        return ClusterError(
-            f"{self.address}: the scheduler {what} while frames were computed: start it again, "
-            f"and go on with `resume`"
-        )
-
-    def _settle(self, future: Future[Any], job: Any, path: Path | None, sent: Any) -> None:
-        """Hand on what has become of a frame, unless nobody waits for it any more."""
-        with suppress(InvalidStateError):
-            try:
-                future.set_result(self._result_of(sent, job, path))
-            except ScanfabError as error:
-                future.set_exception(error)
-
-    def _result_of(self, sent: Any, job: Any, path: Path | None) -> Any:
-        """What a worker has returned; all that can go wrong is a ScanfabError."""
+    def explained(self, error: Exception, job: Any) -> Exception:
+        """What users are told of an error of a job."""
         from distributed.scheduler import KilledWorker
 
-        try:
-            # it is there; without a limit Dask would wait for ever if the scheduler stops just now
-            found = sent.result(timeout=SILENCE)
-        except ScanfabError:
-            raise
-        except KilledWorker as error:
-            raise DeadWorkersError(
+        if isinstance(error, UnseenFileError) and not job.path.exists():
+            # not for this process either: it is an error of the frame
+            return ReadError(str(error))
+        if isinstance(error, ScanfabError):
+            return error
+        if isinstance(error, KilledWorker):
+            return DeadWorkersError(
                 f"{job}: the workers that computed it died, {error.allowed_failures + 1} one after "
                 f"the other: had they too little memory?"
-            ) from None
-        except Exception as error:
-            if sent.status != "error" or self.client.status != "running":
-                self._is_silent |= isinstance(error, TimeoutError)
-                raise self._gone() from None
-            text = f"{job}: {type(error).__name__} at a worker: {error}"
-            if isinstance(error, ImportError):
-                text += f": it needs the same packages as this process ({versions_here()})"
-            raise ClusterError(text) from None
-        if isinstance(found, ClusterError):
-            # a file that is not there for this process either is an error of its frame
-            raise found if path is None or path.exists() else ReadError(str(found))
-        return found
+            )
+        if isinstance(error, CancelledError):
+            return self._gone("has gone")
+        text = f"{job}: {type(error).__name__} at a worker: {error}"
+        if isinstance(error, ImportError):
+            text += f": it needs the same packages as this process ({versions_here()})"
+        return ClusterError(text)
+
+    def _threads(self) -> int:
+        """
+        How many threads the workers have now; ClusterError if the scheduler does not answer.
+
+        A scheduler that is stopped, or lies behind a network that swallows what is sent, closes no
+        connection: without a limit, a run would wait for its frames for ever.
+        """
+        try:
+            return sum(self.client.nthreads(callback_timeout=SILENCE).values())
+        except TimeoutError:
+            raise self._gone(f"has not answered for {SILENCE:g} s") from None
+        except Exception:
+            raise self._gone("has gone") from None
+
+    def _gone(self, what: str) -> ClusterError:
+        return ClusterError(
+            f"{self.address}: the scheduler {what} while frames were computed: start it again, and "
+            f"go on with `resume`"
+        )
 
 
 def computed_there(job: partial[Any], path: Path | None, versions: dict[str, str]) -> Any:
-    """
-    What a function returns, called by a worker.
-
-    A ClusterError is returned, not raised, if this worker cannot do what others can: to compute the
-    frame once more would not help.
-    """
+    """What a function returns, called by a worker; ClusterError if this worker cannot do it."""
     from distributed import get_worker
 
     worker, theirs = get_worker().address, versions_here()
@@ -275,7 +240,7 @@ def computed_there(job: partial[Any], path: Path | None, versions: dict[str, str
             for name, mine in versions.items()
             if theirs.get(name) != mine
         )
-        return ClusterError(
+        raise ClusterError(
             f"{worker}: this worker has other versions than this process: {told}: the same are "
             f"needed for the same numbers"
         )
@@ -284,20 +249,10 @@ def computed_there(job: partial[Any], path: Path | None, versions: dict[str, str
     except Exception:
         if path is None or os.access(path, os.R_OK):
             raise
-        return ClusterError(
-            f"{worker}: this worker cannot read {path}: it sees {_view(path)}: workers need the "
-            f"same files by the same paths as this process"
-        )
-
-
-def _view(path: Path) -> str:
-    """What is there in place of a file that cannot be read."""
-    found = next(folder for folder in path.parents if folder.exists())
-    with suppress(OSError):
-        names = sorted(os.listdir(found))
-        more = ", ..." if len(names) > MOST_NAMES else ""
-        return f"{found} with {', '.join(names[:MOST_NAMES]) + more if names else 'nothing'} in it"
-    return f"{found}, which it cannot list"
+        raise UnseenFileError(
+            f"{worker}: this worker cannot read {path}: workers need the same files by the same "
+            f"paths as this process"
+        ) from None
 
 
 @cache

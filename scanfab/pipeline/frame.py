@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -16,6 +15,7 @@ from scanfab.io.series import other_space
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample
+from scanfab.pipeline.frames import packing_of
 from scanfab.pipeline.maps.rows import map_rows
 from scanfab.pipeline.measurement import Measurement, measure
 from scanfab.pipeline.plan import Plan
@@ -85,24 +85,19 @@ def compute_frame(
     ScanfabError
         If the frame cannot be read or measured.
     """
-    sample = as_sample(frame, plan)
-    with naming_frame(number):
-        return _computed(sample, plan, number, source)
-
-
-@contextmanager
-def naming_frame(number: int) -> Iterator[None]:
-    """In the block errors of a packing begin with the frame."""
+    sample = frame if isinstance(frame, Sample) else plan.samples.sample(packing_of(frame))
     try:
-        yield
+        return _computed(sample, plan, number, source)
     except PackingError as error:
         raise PackingError(f"frame {number}: {error}") from None
 
 
 def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResult:
-    check_space(frame, plan)
-    known = frame_values(frame, plan, number, source)
-    if not frame.grains.any():
+    has_grains = frame.grains.any()
+    if has_grains and frame.packing.space != plan.space:
+        raise PackingError(f"{other_space(frame.packing.space, plan.space)} (`dim`)")
+    known = _frame_values(frame, plan, number, source)
+    if not has_grains:
         return FrameResult(source, number, frame, (), list(_empty_rows(known, plan)))
     if plan.map_settings is not None:
         rows, told, blocks = map_rows(frame, plan.in_frame(frame), known, f"frame {number}")
@@ -130,15 +125,6 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
     return FrameResult(source, number, frame, measurements, rows, tuple(notes))
 
 
-def check_space(sample: Sample, plan: Plan) -> None:
-    """PackingError if the frame lies in another space than the series."""
-    packing = sample.packing
-    if not sample.grains.any():
-        return
-    if packing.space != plan.space:
-        raise PackingError(f"{other_space(packing.space, plan.space)} (`dim`)")
-
-
 def _empty_rows(known: Mapping[str, Any], plan: Plan) -> Iterator[Row]:
     """The rows of a frame without grains."""
     empty = {**no_columns(plan.more_columns), **known}
@@ -153,14 +139,7 @@ def _empty_rows(known: Mapping[str, Any], plan: Plan) -> Iterator[Row]:
                 yield complete_row({**empty, "variant": variant, **own}, plan.more_columns)
 
 
-def as_sample(frame: Packing | Sample | Frame, plan: Plan) -> Sample:
-    """A frame, read if it is not yet, and told apart."""
-    if isinstance(frame, Sample):
-        return frame
-    return plan.samples.sample(frame if isinstance(frame, Packing) else frame.read())
-
-
-def frame_values(sample: Sample, plan: Plan, number: int, source: str) -> dict[str, Any]:
+def _frame_values(sample: Sample, plan: Plan, number: int, source: str) -> dict[str, Any]:
     """The columns that are the same in all rows of a frame."""
     strains = plan.strains.at(number, sample)
     if VOLUMETRIC_STRAIN.name not in plan.more_columns:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
@@ -13,7 +13,7 @@ from scanfab.base.errors import SKIPPED, Note, PackingError, ReadError, Settings
 from scanfab.io.follow import FollowedSeries
 from scanfab.io.frame import Frame
 from scanfab.io.series import ENDLESS, Series
-from scanfab.packing.boundary import enclosing_class, existing_values
+from scanfab.packing.boundary import BoundaryRule, enclosing_class, existing_values
 from scanfab.packing.doubts import cell_doubt, doubts_of
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample, SampleRule
@@ -35,44 +35,43 @@ class _Stream:
     name = ""
 
     def __init__(self, packings: Iterable[Packing]) -> None:
-        self._coming = iter(packings)
+        self._coming = map(_checked, packings)
         self._kept: deque[Packing] = deque()
-        self._number_taken = 0
+        self._taken = 0
 
     def __iter__(self) -> Iterator[Packing]:
-        """Those that are not taken yet; what has come is kept until it is taken."""
-        number = 0
-        while number < len(self._kept) or self._kept_another():
-            yield self._kept[number]
-            number += 1
+        """Those that are not taken yet; a packing that has come is kept until it is taken."""
+        yield from tuple(self._kept)
+        for packing in self._coming:
+            self._kept.append(packing)
+            yield packing
+
+    def __len__(self) -> int:
+        return self._taken + sum(1 for _ in self)
 
     def taken(self) -> Iterator[Packing]:
         """Each for the last time, so that no more of them are in memory than need be."""
-        while self._kept or self._kept_another():
-            self._number_taken += 1
+        while self._kept:
+            self._taken += 1
             yield self._kept.popleft()
-
-    def count(self) -> int:
-        """How many there are in all."""
-        return sum(1 for _ in self) + self._number_taken
-
-    def _kept_another(self) -> bool:
-        """Whether there was one more, which is kept now."""
         for packing in self._coming:
-            if not isinstance(packing, Packing):
-                raise SettingsError(f"expected packings, found {packing!r} among them")
-            self._kept.append(packing)
-            return True
-        return False
+            self._taken += 1
+            yield packing
+
+
+def _checked(packing: object) -> Packing:
+    if not isinstance(packing, Packing):
+        raise SettingsError(f"expected packings, found {packing!r} among them")
+    return packing
 
 
 class Frames:
     """
     One source, frame by frame, for all that look at samples; a packing is a series of one.
 
-    Of damaged frames there is one rule: with ``on_error="stop"`` they are errors, with ``"skip"``
-    they are told and passed over, whether they were chosen or lie before the first that has grains.
-    No frame is read twice: what the search for that one has read is handed on.
+    With ``on_error="stop"`` a damaged frame is an error; with ``"skip"`` a warning names it and it
+    is left out, whether it was chosen or lies before the first frame that has grains. No frame is
+    read twice: the samples that the search for that first frame has read are used again.
 
     Parameters
     ----------
@@ -89,9 +88,7 @@ class Frames:
     """
 
     def __init__(self, source: Source, settings: Settings) -> None:
-        if isinstance(source, Packing):
-            source = [source]
-        if isinstance(source, str) or not isinstance(source, Iterable):
+        if isinstance(source, str) or not isinstance(source, Packing | Iterable):
             raise SettingsError(
                 f"expected a Packing, a Series or an iterable of packings, found {source!r}"
             )
@@ -99,24 +96,23 @@ class Frames:
         if isinstance(source, Series):
             self.source, self.settings = of_whole(source, settings)
         else:
-            self.source, self.settings = _Stream(source), settings
-        if isinstance(self.source, FollowedSeries):
-            bounds = (self.settings.frames.start, self.settings.frames.stop)
-            if any((bound or 0) < 0 for bound in (*bounds, self.settings.frames.step)):
-                raise SettingsError(
-                    f"frames: {as_written(self.settings.frames)} counts from the end of the "
-                    f"series, which nobody knows while it is followed: count from its start, as in "
-                    f"10: or ::5"
-                )
+            packings = [source] if isinstance(source, Packing) else source
+            self.source, self.settings = _Stream(packings), settings
+        if isinstance(self.source, FollowedSeries) and _counts_from_end(self.settings.frames):
+            raise SettingsError(
+                f"frames: {as_written(self.settings.frames)} counts from the end of the series, "
+                f"which nobody knows while it is followed: count from its start, as in 10: or ::5"
+            )
         self.name = self.source.name
+        self.has_grains = False
+        """Whether :meth:`first` has found a frame with grains."""
         self.particles = 0
-        """Of the frames that were read on the way to the first that has grains."""
+        """In the frames that were read on the way to the first that has grains."""
         self.ready: dict[int, Sample | None] = {}
         """Chosen frames that were read on that way; None for damaged ones."""
 
     def __repr__(self) -> str:
-        source, chosen = self.source, as_written(self.settings.frames)
-        return f"Frames {chosen} of {source!r}"
+        return f"Frames {as_written(self.settings.frames)} of {self.source!r}"
 
     def __iter__(self) -> Iterator[tuple[int, Unread]]:
         """All frames with their numbers, not read."""
@@ -145,7 +141,7 @@ class Frames:
             every = self.source.taken()
         elif isinstance(self.source, FollowedSeries):
             every = self.source.as_they_come()
-        # where they are counted from the end, that comes first
+        # if frames are counted from the end, all packings of a stream come here, and are kept
         chosen, found, number = self.chosen, False, 0
         for frame in every:
             if frame is None:
@@ -184,12 +180,13 @@ class Frames:
                 continue
             self.particles += len(sample.packing)
             if sample.grains.any():
+                self.has_grains = True
                 tell(self.check_boundary(sample))
                 return number, frame, sample
         return None
 
     def sample(self, number: int, frame: Unread) -> Sample | None:
-        """A frame told apart; None if it is damaged and such frames are passed over."""
+        """A frame told apart; None if it is damaged and damaged frames are skipped."""
         if number in self.ready:
             return self.ready.pop(number)
         try:
@@ -224,45 +221,44 @@ class Frames:
 
     def read(self, frame: Unread) -> Sample:
         """A frame told apart, by its contacts and the boundary; raises if it is damaged."""
-        packing = frame if isinstance(frame, Packing) else frame.read()
-        return sample_rule(self.settings).sample(packing)
+        return sample_rule(self.settings).sample(packing_of(frame))
 
     def check_boundary(self, first: Sample) -> list[Note]:
         """
-        SettingsError if no frame has any of the boundary's particles.
+        SettingsError if no frame has any of the boundary's particles; a note if one rule fits none.
 
-        A note if one rule fits none. Particles may come in later frames, so those are looked
-        through if the ``first`` has none.
+        Particles may come in later frames, so those are looked through if the ``first`` has none.
         """
         rules = self.settings.boundary
         missing = [rule for rule in rules if not rule.select(first.packing).any()]
         for _, frame in self if missing else ():
             with suppress(PackingError, ReadError, SettingsError):
-                packing = frame if isinstance(frame, Packing) else frame.read()
+                packing = packing_of(frame)
                 missing = [rule for rule in missing if not rule.select(packing).any()]
             if not missing:
                 break
         if not missing:
             return []
-        named = " or ".join(rule.text for rule in missing)
-        values = existing_values(first.packing, missing)
-        message = f"no particle of any frame has {named}: {values}"
+        message = f"no particle of any frame has {_values_there(first, missing)}"
         if len(missing) == len(rules):
             raise SettingsError(f"boundary: {message}")
         return [Note("no_such_boundary", f"`boundary`: {message}")]
 
     def no_such_frames(self) -> SettingsError:
         """The error for a choice that meets no frame."""
-        count = self.source.count() if isinstance(self.source, _Stream) else len(list(self.source))
+        count = len(self.source)
         if count == 0 and isinstance(self.source, FollowedSeries):
             return NoChosenFrameError(self.source.lack)
         if count == 0:
             return SettingsError(f"expected frames, found none in {self.name or 'the source'}")
-        name, frames = self.name or "the packing", self.settings.frames
+        name, frames = self.name or "the packing", as_written(self.settings.frames)
         has = "1 frame, 0" if count == 1 else f"{count} frames, 0 to {count - 1}"
-        return NoChosenFrameError(
-            f"frames: the series has no frame in {as_written(frames)}: {name} has {has}"
-        )
+        return NoChosenFrameError(f"frames: the series has no frame in {frames}: {name} has {has}")
+
+
+def packing_of(frame: Unread) -> Packing:
+    """The packing of a frame, which is read if it lies in a file."""
+    return frame if isinstance(frame, Packing) else frame.read()
 
 
 def sample_rule(settings: Settings) -> SampleRule:
@@ -276,15 +272,17 @@ def sample_rule(settings: Settings) -> SampleRule:
     )
 
 
-def chosen_frames(source: Iterable[Any], frames: slice) -> range:
-    """The frames to compute, in the order of the source."""
+def _counts_from_end(frames: slice) -> bool:
+    return any((bound or 0) < 0 for bound in (frames.start, frames.stop, frames.step))
+
+
+def chosen_frames(source: Series | _Stream, frames: slice) -> range:
+    """The numbers of the frames to compute, in the order of the source."""
     if isinstance(source, Series):
         chosen = source.numbers_of(frames)
-    elif any((bound or 0) < 0 for bound in (frames.start, frames.stop, frames.step)):
-        chosen = range(sum(1 for _ in source))[frames]
     else:
-        # without counting the frames first: they may still come
-        chosen = range(ENDLESS)[frames]
+        # packings are counted only where they must be, as some may still come
+        chosen = range(len(source) if _counts_from_end(frames) else ENDLESS)[frames]
     return chosen if chosen.step > 0 else chosen[::-1]
 
 
@@ -305,11 +303,10 @@ def of_whole(series: Series, settings: Settings) -> tuple[Series, Settings]:
 def boundary_hints(sample: Sample, settings: Settings) -> list[Note]:
     """What to tell of boundary particles that are not named, or of a name that fits none."""
     if settings.boundary:
-        named = " or ".join(rule.text for rule in settings.boundary)
         if sample.boundary.any():
             return []
-        values = existing_values(sample.packing, settings.boundary)
-        return [Note("no_such_boundary", f"`boundary`: no particle has {named}: {values}")]
+        text = f"`boundary`: no particle has {_values_there(sample, settings.boundary)}"
+        return [Note("no_such_boundary", text)]
     expression = enclosing_class(sample.packing)
     if expression is None:
         return []
@@ -318,6 +315,12 @@ def boundary_hints(sample: Sample, settings: Settings) -> list[Note]:
         f'name them: `boundary="{expression}"`'
     )
     return [Note("unnamed_boundary", text)]
+
+
+def _values_there(sample: Sample, rules: Sequence[BoundaryRule]) -> str:
+    """Rules of a boundary that fit no particle, and the values that there are."""
+    named = " or ".join(rule.text for rule in rules)
+    return f"{named}: {existing_values(sample.packing, rules)}"
 
 
 def samples(source: Source, **options: Any) -> Iterator[tuple[int, Sample]]:

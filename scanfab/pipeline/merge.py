@@ -14,38 +14,11 @@ from scanfab.base.spelling import counted
 from scanfab.io.families import PathLike
 from scanfab.io.options import parse_frames
 from scanfab.pipeline.part import is_unfinished, part_of
-from scanfab.pipeline.record import (
-    FREE,
-    FrameRows,
-    differing_settings,
-    read_finished,
-    rows_by_frame,
-    write_manifest,
-)
-from scanfab.pipeline.repeat import restored_settings
-from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.record import FREE, Record, differing_settings, read_table, write_manifest
 from scanfab.pipeline.values import as_written
 from scanfab.table.row import Row
 from scanfab.table.table import Table
 from scanfab.table.writing import Excerpt, check_output, manifest_of, write_rows
-
-
-class _Part(NamedTuple):
-    """The table of one job, and its manifest."""
-
-    path: Path
-    asked: Mapping[str, Any]
-    manifest: Mapping[str, Any]
-    settings: Settings
-    rows: FrameRows
-    columns: frozenset[str] | None
-    """Those that were written; None without a row."""
-    counts: dict[str, int]
-    """How many frames each series has."""
-
-    def frames(self, source: str) -> Iterable[int]:
-        """The frames of a series that this job was to compute."""
-        return range(self.counts.get(source, 0))[self.settings.frames]
 
 
 class Merged(NamedTuple):
@@ -135,33 +108,33 @@ def merged(paths: Sequence[Path], frames: slice) -> Merged:
         raise SettingsError("expected the parts of a table, found none")
     parts = [_read(path) for path in dict.fromkeys(paths)]
     first = parts[0]
+    asked = first.manifest["settings"]
     for part in parts[1:]:
-        if differing := differing_settings(first.asked, part.asked, FREE):
+        if differing := differing_settings(asked, part.manifest["settings"], FREE):
             raise ReadError(
                 f"{part.path}: was made with other settings ({differing}) than {first.path}"
             )
-    inputs = _joined_inputs(parts)
-    series: dict[str, int] = {}
+    inputs, counts = _joined_inputs(parts), dict[str, int]()
     for part in parts:
-        series |= {name: max(count, series.get(name, 0)) for name, count in part.counts.items()}
+        for name, count in _counts(part).items():
+            counts[name] = max(count, counts.get(name, 0))
     rows = [
         row
-        for source, count in series.items()
+        for source, count in counts.items()
         for row in _rows(source, range(count)[frames], parts)
     ]
-    sources = _each_once(part.asked["sources"] for part in parts)
-    asked = {**first.asked, "frames": as_written(frames), "sources": sources}
+    sources = _each_once(part.manifest["settings"]["sources"] for part in parts)
     manifest = {
         **first.manifest,
-        "settings": asked,
+        "settings": {**asked, "frames": as_written(frames), "sources": sources},
         "inputs": inputs,
         "warnings": _each_once(part.manifest["warnings"] for part in parts),
         "notes": _each_once(part.manifest["notes"] for part in parts),
-        "frames": series,
+        "frames": counts,
     }
     fields = asked.get("fields") or [one.name for one in first.settings.columns]
-    has = [part.columns for part in parts if part.columns is not None]
-    fields = [name for name in fields if all(name in columns for columns in has)]
+    for part in parts:
+        fields = [name for name in fields if name in part.columns or not part.rows]
     excerpt = Excerpt(tuple(fields), asked.get("digits", Excerpt.digits))
     return Merged(rows, excerpt.columns(first.settings.columns), excerpt, manifest)
 
@@ -170,7 +143,8 @@ def _each_once(lists: Iterable[Iterable[Any]]) -> list[str]:
     return list(dict.fromkeys(str(one) for some in lists for one in some))
 
 
-def _read(path: Path) -> _Part:
+def _read(path: Path) -> Record:
+    """The record of a part; ReadError if it is not finished."""
     if is_unfinished(path):
         raise ReadError(
             f"{path}: is not finished: {part_of(path).name} is there, which holds the rows of a "
@@ -179,26 +153,26 @@ def _read(path: Path) -> _Part:
         )
     if not path.exists():
         raise ReadError(f"{path}: there is no such part: its job has not been run, or has failed")
-    done = read_finished(path, lambda reason: ReadError(f"{path}: {reason}: run its job again"))
     try:
-        settings = restored_settings(done.asked)
+        part = read_table(path, lambda reason: ReadError(f"{path}: {reason}: run its job again"))
     except SettingsError as error:
         raise ReadError(f"{path}: {error}") from None
-    found = rows_by_frame(done.rows, settings.columns)
-    counts: dict[str, int] = {}
-    for (source, frame), rows in found.items():
-        if len(rows) != settings.rows_per_frame:
+    for (source, frame), rows in part.rows.items():
+        if len(rows) != part.settings.rows_per_frame:
             raise ReadError(
-                f"{path}: expected {settings.rows_per_frame} rows of frame {frame} of {source}, "
-                f"found {len(rows)}: run its job again"
+                f"{path}: expected {part.settings.rows_per_frame} rows of frame {frame} of "
+                f"{source}, found {len(rows)}: run its job again"
             )
-        counts[source] = max(counts.get(source, 0), frame + 1)
-    counts |= done.manifest.get("frames", {})
-    columns = frozenset(done.rows[0]) if done.rows else None
-    return _Part(path, done.asked, done.manifest, settings, found, columns, counts)
+    return part
 
 
-def _joined_inputs(parts: Sequence[_Part]) -> list[Mapping[str, Any]]:
+def _counts(part: Record) -> dict[str, int]:
+    """How many frames each series of a part has, also those that it was not to compute."""
+    ends = {source: frame + 1 for source, frame in sorted(part.rows)}
+    return {**ends, **part.manifest.get("frames", {})}
+
+
+def _joined_inputs(parts: Sequence[Record]) -> list[Mapping[str, Any]]:
     """The inputs of all parts; ReadError if a file has changed between two jobs."""
     known: dict[str, tuple[Mapping[str, Any], Path]] = {}
     for part in parts:
@@ -212,33 +186,29 @@ def _joined_inputs(parts: Sequence[_Part]) -> list[Mapping[str, Any]]:
     return [known[path][0] for path in sorted(known)]
 
 
-def _rows(source: str, chosen: range, parts: Sequence[_Part]) -> Iterator[Row]:
+def _rows(source: str, chosen: range, parts: Sequence[Record]) -> Iterator[Row]:
     """The rows of one series in the order of its frames, each once."""
-    own = [part for part in parts if source in part.counts]
+    own = [part for part in parts if source in _counts(part)]
     for frame in chosen if chosen.step > 0 else chosen[::-1]:
         having = [part for part in own if (source, frame) in part.rows]
-        for part in having[1:]:
-            _check_same(having[0], part, source, frame)
-        if having:
-            yield from having[0].rows[source, frame]
-        else:
+        if not having:
             _check_skipped(source, frame, own)
+            continue
+        first, rows = having[0], having[0].rows[source, frame]
+        for part in having[1:]:
+            for before, now in zip(rows, part.rows[source, frame], strict=True):
+                for name in [name for name in before if before[name] != now[name]]:
+                    raise ReadError(
+                        f"{part.path}: frame {frame} of {source} is in {first.path} too, with "
+                        f"other values: {name} is {now[name]} here and {before[name]} there"
+                    )
+        yield from rows
 
 
-def _check_same(first: _Part, part: _Part, source: str, frame: int) -> None:
-    """ReadError if a frame has other values in two parts."""
-    for before, now in zip(first.rows[source, frame], part.rows[source, frame], strict=True):
-        for name in [name for name in before if before[name] != now[name]]:
-            raise ReadError(
-                f"{part.path}: frame {frame} of {source} is in {first.path} too, with other "
-                f"values: {name} is {now[name]} here and {before[name]} there"
-            )
-
-
-def _check_skipped(source: str, frame: int, parts: Sequence[_Part]) -> None:
+def _check_skipped(source: str, frame: int, parts: Sequence[Record]) -> None:
     """ReadError for a frame without rows, unless a job was to compute it and has skipped it."""
-    asked = next((part for part in parts if frame in part.frames(source)), None)
-    if asked is None:
+    asked = [part for part in parts if frame in range(_counts(part)[source])[part.settings.frames]]
+    if not asked:
         named = ", ".join(str(part.path) for part in parts[:3])
         named += ", ..." if len(parts) > 3 else ""
         raise ReadError(
@@ -246,6 +216,6 @@ def _check_skipped(source: str, frame: int, parts: Sequence[_Part]) -> None:
             f"{counted(len(parts), 'part')} ({named}): name all parts, or with `frames` the frames "
             f"that the table is to have"
         )
-    if asked.settings.on_error != "skip":
-        raise ReadError(f"{asked.path}: lacks frame {frame} of {source}: run its job again")
-    warn(f"{asked.path}: frame {frame} of {source} was skipped, see its manifest")
+    if asked[0].settings.on_error != "skip":
+        raise ReadError(f"{asked[0].path}: lacks frame {frame} of {source}: run its job again")
+    warn(f"{asked[0].path}: frame {frame} of {source} was skipped, see its manifest")

@@ -27,7 +27,7 @@ from scanfab.base.ending import undone_at_end
 from scanfab.base.errors import ReadError, SettingsError, note
 from scanfab.base.files import kind_of, locked, named_errors, whole_file
 from scanfab.base.spelling import counted
-from scanfab.pipeline.record import Finished
+from scanfab.pipeline.record import Record
 from scanfab.table.formats import json_line
 from scanfab.table.row import Row
 from scanfab.table.writing import ALL
@@ -85,7 +85,7 @@ class PartFile:
             finally:
                 self._remove_if_empty()
 
-    def read(self) -> Finished:
+    def read(self) -> Record:
         """
         The finished frames, in a block of :meth:`alone`; what is not finished is cut off.
 
@@ -98,18 +98,16 @@ class PartFile:
         try:
             first, *frames = map(json.loads, lines)
             inputs = [dict(one) for frame in frames for one in frame["inputs"]]
-            found = Finished(
-                dict(first["settings"]), inputs, [r for frame in frames for r in frame["rows"]], {}
-            )
+            found = {"settings": dict(first["settings"]), "inputs": inputs}
+            record = Record.of(self.path, found, [row for frame in frames for row in frame["rows"]])
         except (ValueError, TypeError, KeyError, RecursionError):
             raise ReadError(
                 f"{self.path}: expected what an interrupted run has kept there, found something "
                 f"else: leave out `resume` to start afresh"
             ) from None
-        size = sum(map(len, lines))
-        if size < self.path.stat().st_size:
+        if (size := sum(map(len, lines))) < self.path.stat().st_size:
             self._stream.truncate(size)
-        return found
+        return record
 
     def begin(self, asked: Mapping[str, Any]) -> None:
         """Start afresh with these settings; finished frames are kept under another name."""
@@ -134,13 +132,11 @@ class PartFile:
             self._write({"inputs": list(inputs), "rows": [ALL.of(row) for row in rows]})
 
     def remove(self) -> None:
-        """Remove it if it is ours: once it is gone, the next run may have one."""
-        if self._stream.closed or not self.path.exists():
-            return
-        if os.path.samestat(os.fstat(self._stream.fileno()), self.path.stat()):
-            if sys.platform == "win32":
-                self._stream.close()  # Windows removes no file that is open
-            self.path.unlink()
+        """Remove it, in a block of :meth:`alone`; from then on the next run may have one."""
+        if sys.platform == "win32":
+            self._stream.close()  # Windows removes no file that is open
+        self.path.unlink(missing_ok=True)
+        self._stream.close()
 
     def _write(self, line: Mapping[str, Any]) -> None:
         # not by way of a buffer, which would be written once more at the end where the disk is full

@@ -1,8 +1,9 @@
 """
-What a table was made of: settings, versions, and the inputs with size and hash.
+Which rows of a table are there, and what made them: settings, versions, inputs with size and hash.
 
-FILE.manifest.json says it of FILE, and FILE.part of its own rows. By it a run that goes on with
-finished rows, or a merge of several tables, tells whether they are what it would compute now.
+FILE.manifest.json says it of a complete FILE, and FILE.part of its own rows: both are read as a
+:class:`Record`. By it a run that goes on with finished rows, and a merge of several tables, tell
+whether the rows are those that they would compute now.
 """
 
 from __future__ import annotations
@@ -17,11 +18,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from scanfab.base.column import Column
-from scanfab.base.errors import ReadError, ScanfabError
+from scanfab.base.errors import ReadError, ScanfabError, SettingsError
 from scanfab.base.files import whole_file
 from scanfab.base.option import options_of
 from scanfab.io.series import Series
+from scanfab.pipeline.maps.settings import MapSettings, is_map
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import SHAPES, STRAIN_MODES, as_written
 from scanfab.table.columns import row_of
@@ -45,16 +46,27 @@ Refuse = Callable[[str], ScanfabError]
 """The error for rows that cannot be used, made from the reason."""
 
 
-class Finished(NamedTuple):
-    """Rows that are there, and what they were made of."""
+class Record(NamedTuple):
+    """Finished rows by source and frame, and what made them."""
 
-    asked: dict[str, Any]
-    """The settings."""
-    inputs: list[dict[str, Any]]
-    """Path, size and hash of files."""
-    rows: list[dict[str, Any]]
+    path: Path
+    """Of the table, or of its FILE.part."""
+    settings: Settings
     manifest: dict[str, Any]
-    """Empty where there is none yet."""
+    """Of FILE.part only ``settings`` and ``inputs``."""
+    rows: FrameRows
+    """The rows of a frame may be fewer than it has."""
+    columns: frozenset[str]
+    """Those that were written; none without a row."""
+
+    @classmethod
+    def of(cls, path: Path, manifest: dict[str, Any], rows: Sequence[Mapping[str, Any]]) -> Record:
+        """A record of rows as they were read; SettingsError for settings that cannot be used."""
+        settings, found = restored_settings(manifest["settings"]), FrameRows()
+        for row in rows:
+            complete = row_of(settings.columns, row)
+            found.setdefault((row["source"], row["frame"]), []).append(complete)
+        return cls(path, settings, manifest, found, frozenset(rows[0] if rows else ()))
 
 
 def asked_for(
@@ -95,11 +107,27 @@ def differing_settings(
     return ", ".join(sorted("version of scanfab" if n == "scanfab" else n for n in names))
 
 
-def named_files(asked: Mapping[str, Any]) -> tuple[list[Path], list[Path]]:
-    """The files that the settings name: of strains (``strain``), and of surfaces (``rv_shape``)."""
+def restored_settings(asked: Mapping[str, Any]) -> Settings:
+    """
+    The settings of a manifest.
+
+    Raises
+    ------
+    SettingsError
+        If one of them cannot be used any more.
+    """
+    kind = MapSettings if is_map(asked) else Settings
+    try:
+        return kind(**{name: asked[name] for name in kind.__dataclass_fields__ if name in asked})
+    except (AttributeError, TypeError, ValueError) as error:
+        raise SettingsError(f"the settings of the manifest cannot be used: {error}") from None
+
+
+def named_files(asked: Mapping[str, Any]) -> list[Path]:
+    """The files that the settings name: of strains (``strain``), of a surface (``rv_shape``)."""
     strain, shape = asked.get("strain", "auto"), asked.get("rv_shape", "sphere")
-    strains = [] if strain in STRAIN_MODES else [Path(strain)]
-    return strains, [] if shape in SHAPES else [Path(shape)]
+    named = ((strain, STRAIN_MODES), (shape, SHAPES))
+    return [Path(name) for name, words in named if name not in words]
 
 
 def input_entry(path: Path) -> dict[str, Any]:
@@ -144,8 +172,7 @@ def manifest(
         What the user was told.
     """
     series = list(series)
-    strains, surfaces = named_files(asked)
-    files = {*strains, *surfaces, *(path for one in series for path in one.files())}
+    files = {*named_files(asked), *(path for one in series for path in one.files())}
     versions = {name: version(name) for name in PACKAGES}
     return {
         "settings": asked,
@@ -202,64 +229,45 @@ def read_manifest(table: Path) -> dict[str, Any] | None:
     return found
 
 
-def read_finished(table: Path, refuse: Refuse) -> Finished:
-    """A finished table, with its manifest."""
+def read_table(table: Path, refuse: Refuse) -> Record:
+    """The record of a finished table, whose manifest is beside it."""
     found = read_manifest(table)
     if found is None:
         raise refuse(f"there is no {table.name}.manifest.json, which says what made it")
     rows = read_rows(table, whole=True)
     if rows and not {"source", "frame"} <= set(rows[0]):
         raise refuse("it lacks the columns source and frame, which tell its rows apart")
-    found = {"inputs": [], "warnings": [], "notes": [], **found}
-    return Finished(found["settings"], found["inputs"], rows, found)
+    return Record.of(table, {"inputs": [], "warnings": [], "notes": [], **found}, rows)
 
 
-def rows_by_frame(rows: Iterable[Mapping[str, Any]], columns: Sequence[Column]) -> FrameRows:
-    """The rows of each frame, by its source and number; they may be fewer than a frame has."""
-    found: FrameRows = {}
-    for row in rows:
-        found.setdefault((row["source"], row["frame"]), []).append(row_of(columns, row))
-    return found
-
-
-def check_inputs(
-    inputs: Iterable[Mapping[str, Any]],
-    asked: Mapping[str, Any],
-    series: Sequence[Series],
-    rows: FrameRows,
-    refuse: Refuse,
-) -> None:
+def check_inputs(record: Record, series: Sequence[Series], refuse: Refuse) -> None:
     """
     Refuse rows whose inputs are not what they were.
 
     New frames may have come behind the last one, as files or at the end of the last file. A file
-    whose frame was skipped may have been mended.
+    whose frame was skipped may have been mended, and a file of cells or strains may have new lines.
 
     Parameters
     ----------
-    inputs : iterable of mapping
-        Path, size and hash of each file that was read for the rows.
-    asked : mapping
-        The settings of the rows.
+    record : Record
+        The rows, and the files that were read for them.
     series : sequence of Series
         What is read now.
-    rows : mapping
-        The rows by source and frame.
     refuse : callable
         Makes the error.
     """
-    before = {str(one.get("path")): one for one in inputs}
-    strains, surfaces = named_files(asked)
+    before = {str(one.get("path")): one for one in record.manifest["inputs"]}
+    named = named_files(record.manifest["settings"])
     cells = [one.cells.path for one in series if one.cells is not None]
-    read = {*strains, *surfaces, *(file for one in series for file in one.files())}
-    for gone in before.keys() - {str(file) for file in read}:
+    read = {str(file) for file in named} | {str(file) for one in series for file in one.files()}
+    for gone in before.keys() - read:
         raise refuse(f"{gone} is not among the files that are read now")
     for one in series:
-        _check_frames(one, before, rows, refuse)
+        _check_frames(one, before, record.rows, refuse)
     # new lines may name the strain of a frame that had none
-    lacks_strain = any(row.strain is None for some in rows.values() for row in some)
-    for file in (*surfaces, *strains, *cells):
-        may_grow = file in cells or (file in strains and not lacks_strain)
+    lacks_strain = any(row.strain is None for some in record.rows.values() for row in some)
+    for file in (*named, *cells):
+        may_grow = file in cells or (str(file) == record.settings.strain and not lacks_strain)
         if not _is_same(file, before, may_grow, by_lines=True):
             raise refuse(f"{file} has changed since, in more than new lines at its end")
 
@@ -268,21 +276,24 @@ def _check_frames(
     series: Series, before: Mapping[str, Any], rows: FrameRows, refuse: Refuse
 ) -> None:
     """Refuse what has changed of the files of a series, and of those read with them."""
-    grains = series.grains.files
-    steps = [step for step, file in grains.items() if str(file) in before]
+    steps = [step for step, file in series.grains.files.items() if str(file) in before]
     last = max((step for step in steps if step is not None), default=None)
-    for step, file in (f for one in (series.grains, *series.contacts) for f in one.files.items()):
-        if str(file) not in before:
-            if steps and (step is None or last is None or step <= last):
-                raise refuse(f"{file} is new, and not behind the last frame")
-            continue
-        beside = series.beside(file) if grains.get(step) == file else []
-        changed = [one for one in beside if not _is_same(one, before)]
-        if not _is_same(file, before, may_grow=step is None or step == last):
-            changed.append(file)
-        if changed and not _was_skipped(series, step, rows):
-            what = "has changed since" if str(changed[0]) in before else "is new, beside the grains"
-            raise refuse(f"{changed[0]} {what}")
+    for family in (series.grains, *series.contacts):
+        for step, file in family.files.items():
+            if str(file) not in before:
+                if steps and (step is None or last is None or step <= last):
+                    raise refuse(f"{file} is new, and not behind the last frame")
+                continue
+            beside = series.beside(file) if family is series.grains else []
+            changed = [one for one in beside if not _is_same(one, before)]
+            if not _is_same(file, before, may_grow=step is None or step == last):
+                changed.append(file)
+            # a broken file counts as one frame: if it has more now, later frames have other numbers
+            numbers = [frame.number for frame in series if changed and frame.name_step == step]
+            if changed and (len(numbers) != 1 or (series.name, numbers[0]) in rows):
+                is_new = str(changed[0]) not in before
+                what = "is new, beside the grains" if is_new else "has changed since"
+                raise refuse(f"{changed[0]} {what}")
 
 
 def _is_same(
@@ -296,10 +307,3 @@ def _is_same(
     digest, ends_line = _hash(file, size)
     # a number at the end may have got more digits
     return digest == known.get("sha256") and (ends_line or not by_lines)
-
-
-def _was_skipped(series: Series, step: int | None, rows: FrameRows) -> bool:
-    """Whether the files of a step have given no row."""
-    frames = [number for number, frame in enumerate(series) if frame.name_step == step]
-    # a broken file counts as one frame: if it has more now, later frames have other numbers
-    return len(frames) == 1 and (series.name, frames[0]) not in rows
