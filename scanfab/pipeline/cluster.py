@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future
 from contextlib import contextmanager, suppress
-from functools import cache, partial
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -35,10 +35,6 @@ class ClusterError(ScanfabError):
 
 class DeadWorkersError(ClusterError):
     """All workers that computed a frame have died, as one does that has too little memory."""
-
-
-class UnseenFileError(ClusterError):
-    """A worker cannot read the file of a frame."""
 
 
 @contextmanager
@@ -83,37 +79,43 @@ def dask_executor(
     if (scheduler is None) == (scheduler_file is None):
         raise SettingsError("a cluster is named by just one of `scheduler` and `scheduler_file`")
     try:
-        import distributed
+        from distributed import Client
     except ImportError:
         raise SettingsError(
             "a Dask cluster needs the package distributed: pip install 'scanfab[cluster]'"
         ) from None
-    connect: Any = distributed.Client
     address = str(scheduler) if scheduler_file is None else _address_in(Path(scheduler_file))
-    with _quiet():
-        _check_that_one_listens(address)
-        try:
-            client = connect(address, timeout=TIMEOUT, set_as_default=False)
-        except Exception as error:
-            raise _no_answer(address, str(error)) from None
-        try:
-            yield DaskExecutor(client, address)
-        finally:
-            client.close(timeout=2)
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Silence what Dask logs of lost connections: the error that we raise says it."""
-    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
-    levels = [one.level for one in loggers]
-    for one in loggers:
-        one.setLevel(logging.CRITICAL + 1)
+    # Dask logs lost connections, which the error that we raise says
+    levels = {name: logging.getLogger(name).level for name in ("distributed", "distributed.client")}
+    for name in levels:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    client = None
     try:
-        yield
+        client = _connected(Client, address)
+        yield DaskExecutor(client, address)
     finally:
-        for one, level in zip(loggers, levels, strict=True):
-            one.setLevel(level)
+        if client is not None:
+            client.close(timeout=2)
+        for name, level in levels.items():
+            logging.getLogger(name).setLevel(level)
+
+
+def _connected(connect: Any, address: str) -> Any:
+    """The client of a scheduler; ClusterError if none answers at this address."""
+    kind, _, place = address.rpartition("://")
+    host, _, port = place.rpartition(":")
+    try:
+        if kind in ("", "tcp"):
+            with socket.create_connection((host.strip("[]"), int(port)), TIMEOUT) as stream:
+                stream.settimeout(TIMEOUT)
+                # a scheduler speaks first; Dask would wait without an end for one that does not
+                if not stream.recv(1):
+                    raise ConnectionError("it says nothing")
+        return connect(address, timeout=TIMEOUT, set_as_default=False)
+    except Exception as error:
+        what = f"no Dask scheduler answers there within {TIMEOUT:g} s ({error})"
+        advice = "start one by `dask scheduler`, and name the address that it prints"
+        raise ClusterError(f"{address}: {what}: {advice}, as tcp://HOST:8786") from None
 
 
 def _address_in(path: Path) -> str:
@@ -123,42 +125,9 @@ def _address_in(path: Path) -> str:
         with suppress(OSError, ValueError, KeyError, TypeError):
             return str(json.loads(path.read_text("utf-8"))["address"])
         time.sleep(0.1)
+    expected = f"expected the file that a Dask scheduler writes, within {TIMEOUT:g} s"
     found = "something else" if path.exists() else "nothing"
-    raise ClusterError(
-        f"{path}: expected the file that a Dask scheduler writes, with its address, within "
-        f"{TIMEOUT:g} s, found {found}: is the scheduler started with this file?"
-    )
-
-
-def _check_that_one_listens(address: str) -> None:
-    """ClusterError if nobody answers there; addresses of other kinds than tcp are left to Dask."""
-    kind, _, place = address.rpartition("://")
-    host, _, port = place.rpartition(":")
-    if kind not in ("", "tcp"):
-        return
-    if not host or not port.isdigit():
-        raise ClusterError(f"{address}: expected the address of a scheduler, as tcp://HOST:8786")
-    try:
-        with socket.create_connection((host.strip("[]"), int(port)), TIMEOUT) as stream:
-            stream.settimeout(TIMEOUT)
-            # a scheduler speaks first; if it does not, Dask would wait for it without an end
-            speaks = bool(stream.recv(1))
-    except TimeoutError:
-        speaks = False
-    except (OSError, OverflowError) as error:
-        raise ClusterError(
-            f"{address}: no scheduler is there ({error}): start one with `dask scheduler`, or name "
-            f"the address that it prints"
-        ) from None
-    if not speaks:
-        raise _no_answer(address, "it says nothing")
-
-
-def _no_answer(address: str, reason: str) -> ClusterError:
-    return ClusterError(
-        f"{address}: does not answer as a Dask scheduler within {TIMEOUT:g} s ({reason}): is "
-        f"another program there, another version of Dask, or does it hang?"
-    )
+    raise ClusterError(f"{path}: {expected}, found {found}: is it started with this file?")
 
 
 class DaskExecutor(Executor):
@@ -166,93 +135,64 @@ class DaskExecutor(Executor):
 
     def __init__(self, client: Any, address: str) -> None:
         self.client, self.address = client, address
-        self._sender = client.get_executor(pure=False, retries=RETRIES)
-        if not self._threads():
+        self._submit: Callable[..., Future[Any]]
+        self._submit = client.get_executor(pure=False, retries=RETRIES).submit
+        if not client.nthreads():
             # a warning, so that --quiet shows it too: nothing else tells why nothing happens
-            warn(
-                f"{address}: the scheduler has no workers yet: frames wait for them, without a "
-                f"limit: start some with `dask worker {address}`"
-            )
-
-    def room(self) -> int:
-        """How many frames may be under way: one for each thread of the workers, and at least 1."""
-        return max(self._threads(), 1)
+            what = "the scheduler has no workers yet: frames wait for them, without a limit"
+            warn(f"{address}: {what}: start some with `dask worker {address}`")
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Have a function computed by a worker; one that has a ``path`` reads that file."""
-        job, path = partial(fn, *args, **kwargs), getattr(fn, "path", None)
-        try:
-            future: Future[Any] = self._sender.submit(computed_there, job, path, versions_here())
-        except Exception:
-            raise self._gone("has gone") from None
-        return future
+        return self._submit(computed_there, fn, versions_here(), *args, **kwargs)
 
-    def explained(self, error: Exception, job: Any) -> Exception:
-        """What users are told of an error of a job."""
+    def room(self) -> int:
+        """
+        How many frames may be under way: one for each thread of the workers, and at least 1.
+
+        A scheduler that is stopped, or lies behind a network that swallows what is sent, closes no
+        connection: ClusterError if it does not answer this question for a minute.
+        """
+        try:
+            threads: dict[str, int] = self.client.nthreads(callback_timeout=SILENCE)
+            return max(sum(threads.values()), 1)
+        except Exception as error:
+            raise self.explained(error, "") from None
+
+    def explained(self, error: Exception, job: object) -> Exception:
+        """What users are told of an error of a job, or of asking the scheduler."""
         from distributed.scheduler import KilledWorker
 
-        if isinstance(error, UnseenFileError) and not job.path.exists():
-            # not for this process either: it is an error of the frame
-            return ReadError(str(error))
         if isinstance(error, ScanfabError):
             return error
         if isinstance(error, KilledWorker):
-            return DeadWorkersError(
-                f"{job}: the workers that computed it died, {error.allowed_failures + 1} one after "
-                f"the other: had they too little memory?"
-            )
-        if isinstance(error, CancelledError):
-            return self._gone("has gone")
-        text = f"{job}: {type(error).__name__} at a worker: {error}"
-        if isinstance(error, ImportError):
-            text += f": it needs the same packages as this process ({versions_here()})"
-        return ClusterError(text)
-
-    def _threads(self) -> int:
-        """
-        How many threads the workers have now; ClusterError if the scheduler does not answer.
-
-        A scheduler that is stopped, or lies behind a network that swallows what is sent, closes no
-        connection: without a limit, a run would wait for its frames for ever.
-        """
-        try:
-            return sum(self.client.nthreads(callback_timeout=SILENCE).values())
-        except TimeoutError:
-            raise self._gone(f"has not answered for {SILENCE:g} s") from None
-        except Exception:
-            raise self._gone("has gone") from None
-
-    def _gone(self, what: str) -> ClusterError:
-        return ClusterError(
-            f"{self.address}: the scheduler {what} while frames were computed: start it again, and "
-            f"go on with `resume`"
-        )
+            died = f"{error.allowed_failures + 1} one after the other: had they too little memory?"
+            return DeadWorkersError(f"{job}: the workers that computed it died, {died}")
+        if isinstance(error, CancelledError) or not job:
+            is_silent = isinstance(error, TimeoutError)
+            what = f"has not answered for {SILENCE:g} s" if is_silent else "has gone"
+            what = f"the scheduler {what} while frames were computed"
+            return ClusterError(f"{self.address}: {what}: start it again, and go on with `resume`")
+        return ClusterError(f"{job}: {type(error).__name__} at a worker: {error}")
 
 
-def computed_there(job: partial[Any], path: Path | None, versions: dict[str, str]) -> Any:
-    """What a function returns, called by a worker; ClusterError if this worker cannot do it."""
-    from distributed import get_worker
-
-    worker, theirs = get_worker().address, versions_here()
-    if theirs != versions:
-        told = ", ".join(
-            f"{name} {theirs.get(name)} there and {mine} here"
-            for name, mine in versions.items()
-            if theirs.get(name) != mine
-        )
-        raise ClusterError(
-            f"{worker}: this worker has other versions than this process: {told}: the same are "
-            f"needed for the same numbers"
-        )
-    try:
-        return job()
-    except Exception:
-        if path is None or os.access(path, os.R_OK):
-            raise
-        raise UnseenFileError(
-            f"{worker}: this worker cannot read {path}: workers need the same files by the same "
-            f"paths as this process"
-        ) from None
+def computed_there(
+    fn: Callable[..., Any], versions: dict[str, str], *args: Any, **kwargs: Any
+) -> Any:
+    """What a function returns, called by a worker; ScanfabError if this worker cannot do it."""
+    here, path, theirs = platform.node(), getattr(fn, "path", None), versions_here()
+    told = ", ".join(
+        f"{name} {theirs.get(name)} there and {mine} here"
+        for name, mine in versions.items()
+        if theirs.get(name) != mine
+    )
+    if told:
+        what = f"the worker on {here} has other versions than this process: {told}"
+        raise ClusterError(f"{what}: the same are needed for the same numbers")
+    if path is not None and not os.access(path, os.R_OK):
+        need = "workers need the same files by the same paths as this process"
+        raise ReadError(f"{path}: the worker on {here} cannot read it: {need}")
+    return fn(*args, **kwargs)
 
 
 @cache

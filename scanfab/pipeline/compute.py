@@ -37,6 +37,8 @@ LOGGER = logging.getLogger("scanfab")
 
 Observer = Callable[[FrameResult], None]
 
+# codes of notes that are true of later frames too: a grain that flew away goes on flying
+ONCE_A_SERIES = {ESCAPED, "other_bodies", "grains_left"}
 # seconds after which a run that waits for a frame looks again how many may be under way
 PAUSE = 2.0
 # what a thread of another process was warned of while it computed a frame
@@ -166,8 +168,6 @@ def compute_frames(
     finally:
         # an interrupted run does not wait for the frames under way
         own.shutdown(wait=False, cancel_futures=True)
-    if not frames.has_grains:
-        tell([frames.without_grains()], frames.name)
 
 
 def _plan(frames: Frames) -> Plan:
@@ -175,11 +175,13 @@ def _plan(frames: Frames) -> Plan:
     # an error in a file of strains comes before the first frame
     plan = plan_without_grains(frames.settings)
     first = frames.first()
-    if first is not None:
-        _, frame, sample = first
-        tell(frames.notes(frame, sample))
-        plan = make_plan(frames.settings, sample)
-        tell(plan.notes)
+    if first is None:
+        tell([Note("no_grains", "no frame has any grains")], frames.name)
+        return plan
+    _, frame, sample = first
+    tell(frames.notes(frame, sample))
+    plan = make_plan(frames.settings, sample)
+    tell(plan.notes)
     return plan
 
 
@@ -270,26 +272,22 @@ class _SeriesNotes:
 
     def __init__(self, settings: Settings) -> None:
         self._flips = Flips(settings.frames.step)
-        self._first_grouping: tuple[int, Grouping] | None = None
+        self._first: tuple[int, Grouping] | None = None
         self._told: set[str] = set()
 
     def tell(self, computed: _Computed) -> None:
         """Tell what there is to tell of a frame."""
         for warning in computed.heard:
             warnings.warn(warning, stacklevel=3)
-        self._tell_once(computed.number, computed.notes, ESCAPED)
-        tell(self._flips.notes(computed.number, computed.cell))
+        notes = list(computed.notes)
         if computed.grouping is not None:
-            self._first_grouping = self._first_grouping or (computed.number, computed.grouping)
-            note = regrouped(*self._first_grouping, computed.grouping)
-            self._tell_once(computed.number, [note] if note else [], note and note.code)
-
-    def _tell_once(self, number: int, notes: Iterable[Note], code: str | None) -> None:
-        """Tell notes on a frame, but only the first note of a series that has this code."""
+            self._first = self._first or (computed.number, computed.grouping)
+            notes += filter(None, [regrouped(*self._first, computed.grouping)])
         for note in notes:
-            if note.code != code or code not in self._told:
-                tell([note], f"frame {number}")
+            if note.code not in ONCE_A_SERIES & self._told:
+                tell([note], f"frame {computed.number}")
             self._told.add(note.code)
+        tell(self._flips.notes(computed.number, computed.cell))
 
 
 def _in_order(

@@ -135,8 +135,8 @@ def _empty_rows(known: Mapping[str, Any], plan: Plan) -> Iterator[Row]:
     for variant in plan.variants:
         for rv in plan.rvs_of(variant):
             own = {RV_COLUMN.name: rv.fraction} if RV_COLUMN.name in plan.more_columns else {}
-            for _ in plan.cutoffs:
-                yield complete_row({**empty, "variant": variant, **own}, plan.more_columns)
+            row = complete_row({**empty, "variant": variant, **own}, plan.more_columns)
+            yield from [row] * len(plan.cutoffs)
 
 
 def _frame_values(sample: Sample, plan: Plan, number: int, source: str) -> dict[str, Any]:
@@ -156,17 +156,11 @@ def _frame_values(sample: Sample, plan: Plan, number: int, source: str) -> dict[
 
 def _large_errors(rows: list[Row], plan: Plan) -> Iterator[Note]:
     """Other cut-offs, RVs and the second moment are measured along lines chosen for one."""
-    if not (plan.auto and (plan.lists_gaps or len(plan.rvs) > 1)):
-        return
     worst = max(rows, key=lambda row: row.alpha_vs_axial_se or 0.0)
-    error = worst.alpha_vs_axial_se or 0.0
-    if error > plan.tolerance:
+    error, rv = worst.alpha_vs_axial_se or 0.0, worst.get(RV_COLUMN.name)
+    if plan.auto and (plan.lists_gaps or len(plan.rvs) > 1) and error > plan.tolerance:
         reached, tolerance = spelt_apart(error, plan.tolerance)
-        rv = worst.get(RV_COLUMN.name)
-        text = (
-            f"at the cut-off {worst.cutoff:g}{f' in the RV {rv:g}' if rv else ''} "
-            f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}, which holds for "
-            f"the mean length at the cut-off {plan.cutoff:g}"
-            f"{f' in the RV {plan.rvs[0].fraction:g}' if rv else ''}: choose a smaller `tolerance`"
-        )
-        yield Note(OTHER_CUTOFFS, text, (worst.variant,))
+        where = f"at the cut-off {worst.cutoff:g}{f' in the RV {rv:g}' if rv else ''}"
+        met = f"which holds at {plan.cutoff:g}{f' in {plan.rvs[0].fraction:g}' if rv else ''}"
+        text = f"{where} alpha_vs_axial_se is {reached}, above the tolerance {tolerance}, {met}"
+        yield Note(OTHER_CUTOFFS, f"{text}: choose a smaller `tolerance`", (worst.variant,))

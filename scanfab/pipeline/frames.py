@@ -35,7 +35,7 @@ class _Stream:
     name = ""
 
     def __init__(self, packings: Iterable[Packing]) -> None:
-        self._coming = map(_checked, packings)
+        self._coming = iter(packings)
         self._kept: deque[Packing] = deque()
         self._taken = 0
 
@@ -43,26 +43,19 @@ class _Stream:
         """Those that are not taken yet; a packing that has come is kept until it is taken."""
         yield from tuple(self._kept)
         for packing in self._coming:
+            if not isinstance(packing, Packing):
+                raise SettingsError(f"expected packings, found {packing!r} among them")
             self._kept.append(packing)
             yield packing
 
     def __len__(self) -> int:
         return self._taken + sum(1 for _ in self)
 
-    def taken(self) -> Iterator[Packing]:
+    def as_they_come(self) -> Iterator[Packing]:
         """Each for the last time, so that no more of them are in memory than need be."""
-        while self._kept:
+        while self._kept or next(iter(self), None) is not None:
             self._taken += 1
             yield self._kept.popleft()
-        for packing in self._coming:
-            self._taken += 1
-            yield packing
-
-
-def _checked(packing: object) -> Packing:
-    if not isinstance(packing, Packing):
-        raise SettingsError(f"expected packings, found {packing!r} among them")
-    return packing
 
 
 class Frames:
@@ -88,31 +81,21 @@ class Frames:
     """
 
     def __init__(self, source: Source, settings: Settings) -> None:
-        if isinstance(source, str) or not isinstance(source, Packing | Iterable):
-            raise SettingsError(
-                f"expected a Packing, a Series or an iterable of packings, found {source!r}"
-            )
+        source = [source] if isinstance(source, Packing) else source
+        if isinstance(source, str) or not isinstance(source, Iterable):
+            expected = "a Packing, a Series or an iterable of packings"
+            raise SettingsError(f"expected {expected}, found {source!r}")
         self.source: Series | _Stream
         if isinstance(source, Series):
             self.source, self.settings = of_whole(source, settings)
         else:
-            packings = [source] if isinstance(source, Packing) else source
-            self.source, self.settings = _Stream(packings), settings
+            self.source, self.settings = _Stream(source), settings
         if isinstance(self.source, FollowedSeries) and _counts_from_end(self.settings.frames):
-            raise SettingsError(
-                f"frames: {as_written(self.settings.frames)} counts from the end of the series, "
-                f"which nobody knows while it is followed: count from its start, as in 10: or ::5"
-            )
+            what = f"{as_written(self.settings.frames)} counts from the end of the series"
+            raise SettingsError(f"frames: {what}, which nobody knows while it is followed")
         self.name = self.source.name
-        self.has_grains = False
-        """Whether :meth:`first` has found a frame with grains."""
-        self.particles = 0
-        """In the frames that were read on the way to the first that has grains."""
         self.ready: dict[int, Sample | None] = {}
-        """Chosen frames that were read on that way; None for damaged ones."""
-
-    def __repr__(self) -> str:
-        return f"Frames {as_written(self.settings.frames)} of {self.source!r}"
+        """Chosen frames that :meth:`first` has read; None for damaged ones."""
 
     def __iter__(self) -> Iterator[tuple[int, Unread]]:
         """All frames with their numbers, not read."""
@@ -124,22 +107,22 @@ class Frames:
         return chosen_frames(self.source, self.settings.frames)
 
     def due(self) -> Iterator[tuple[int, Unread]]:
+        """The same as :meth:`as_they_come`, which waits for the frames of a series."""
+        return (one for one in self.as_they_come() if one is not None)
+
+    def as_they_come(self) -> Iterator[tuple[int, Unread] | None]:
         """
         The chosen frames with their numbers, not read; the last time that frames are gone through.
+
+        Where the next frame of a series that is followed is not there yet, None comes in its place.
 
         Raises
         ------
         SettingsError
             At the end, if there is none.
         """
-        return (one for one in self.as_they_come() if one is not None)
-
-    def as_they_come(self) -> Iterator[tuple[int, Unread] | None]:
-        """The same of a series that is followed, with None where the next is not there yet."""
         every: Iterable[Unread | None] = self.source
-        if isinstance(self.source, _Stream):
-            every = self.source.taken()
-        elif isinstance(self.source, FollowedSeries):
+        if isinstance(self.source, _Stream | FollowedSeries):
             every = self.source.as_they_come()
         # if frames are counted from the end, all packings of a stream come here, and are kept
         chosen, found, number = self.chosen, False, 0
@@ -158,10 +141,10 @@ class Frames:
 
     def one(self) -> tuple[int, Unread]:
         """The first chosen frame; SettingsError if there is none."""
-        for number, frame in self:
-            if number in self.chosen:
-                return number, frame
-        raise self.no_such_frames()
+        found = next((one for one in self if one[0] in self.chosen), None)
+        if found is None:
+            raise self.no_such_frames()
+        return found
 
     def first(self) -> tuple[int, Unread, Sample] | None:
         """
@@ -170,19 +153,20 @@ class Frames:
         Raises
         ------
         SettingsError
-            If the boundary is that of no frame.
+            If the boundary is that of no frame, or all particles are boundary.
         """
+        particles = 0
         for number, frame in self:
             sample = self.sample(number, frame)
             if number in self.chosen:
                 self.ready[number] = sample
-            if sample is None:
-                continue
-            self.particles += len(sample.packing)
-            if sample.grains.any():
-                self.has_grains = True
+            if sample is not None and sample.grains.any():
                 tell(self.check_boundary(sample))
                 return number, frame, sample
+            particles += 0 if sample is None else len(sample.packing)
+        if particles:
+            named = " or ".join(rule.text for rule in self.settings.boundary)
+            raise SettingsError(f"boundary: {named} selects all particles: no grain is left")
         return None
 
     def sample(self, number: int, frame: Unread) -> Sample | None:
@@ -199,25 +183,12 @@ class Frames:
 
     def notes(self, frame: Unread, sample: Sample) -> list[Note]:
         """What looks wrong in a frame before anything is measured."""
-        if isinstance(frame, Packing):
-            # whoever makes a packing of arrays knows its cell
-            notes, no_cell = doubts_of(sample), cell_doubt(sample, "cell")
-        else:
-            notes, no_cell = doubts_of(sample, **frame.named), cell_doubt(sample, frame.carries)
-        if no_cell:
+        file = frame if isinstance(frame, Frame) else None
+        notes = doubts_of(sample, **(file.named if file else {}))
+        # whoever makes a packing of arrays knows its cell
+        if no_cell := cell_doubt(sample, file.carries if file else "cell"):
             notes.append(Note("no_cell", no_cell))
-        if not self.settings.boundary:
-            notes += boundary_hints(sample, self.settings)
-        return notes
-
-    def without_grains(self) -> Note:
-        """What to tell where no frame has any; SettingsError if the boundary takes them all."""
-        if self.particles:
-            named = " or ".join(rule.text for rule in self.settings.boundary)
-            raise SettingsError(
-                f"boundary: {named} selects all particles of every frame: no grain is left"
-            )
-        return Note("no_grains", "no frame has any grains")
+        return notes if self.settings.boundary else notes + boundary_hints(sample, self.settings)
 
     def read(self, frame: Unread) -> Sample:
         """A frame told apart, by its contacts and the boundary; raises if it is damaged."""
@@ -231,12 +202,11 @@ class Frames:
         """
         rules = self.settings.boundary
         missing = [rule for rule in rules if not rule.select(first.packing).any()]
-        for _, frame in self if missing else ():
+        others = iter(self)
+        while missing and (following := next(others, None)) is not None:
             with suppress(PackingError, ReadError, SettingsError):
-                packing = packing_of(frame)
+                packing = packing_of(following[1])
                 missing = [rule for rule in missing if not rule.select(packing).any()]
-            if not missing:
-                break
         if not missing:
             return []
         message = f"no particle of any frame has {_values_there(first, missing)}"

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,23 +17,23 @@ from scanfab.io.follow import FollowedSeries
 from scanfab.io.series import Series
 from scanfab.pipeline.compute import Observer, compute_frames
 from scanfab.pipeline.frames import NoChosenFrameError, chosen_frames
-from scanfab.pipeline.part import PartFile
 from scanfab.pipeline.record import (
     FREE,
     FrameRows,
+    PartFile,
     Record,
-    check_inputs,
+    Refuse,
     differing_settings,
+    hash_of,
     input_entry,
-    manifest,
     named_files,
     read_table,
+    versions_used,
     write_manifest,
 )
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.told import Told
 from scanfab.pipeline.values import as_written
-from scanfab.table.formats import read_rows
 from scanfab.table.row import Row
 from scanfab.table.writing import ALL, Excerpt, check_output, manifest_of, write_rows
 
@@ -90,12 +90,8 @@ class Job:
 
     def __post_init__(self) -> None:
         names = [one.name for one in self.series]
-        for name in names:
-            if names.count(name) > 1:
-                raise SettingsError(
-                    f"{name}: named twice among the series: the rows of a table are told apart by "
-                    f"their source and frame"
-                )
+        if twice := {name for name in names if names.count(name) > 1}:
+            raise SettingsError(f"{min(twice)}: named twice among the series of one table")
         if self.manifest_path is not None:
             check_folder(self.manifest_path)
         if self.output is not None:
@@ -169,12 +165,9 @@ class Job:
             If the file cannot be written to.
         """
         assert self.output is not None
-        replaces = not self.resume and manifest_of(self.output).is_file() and self.output.is_file()
-        if replaces:
-            note(
-                f"{self.output}: the table that is there will be replaced at the end of this run; "
-                f"`resume` would go on with it"
-            )
+        if not self.resume and manifest_of(self.output).is_file() and self.output.is_file():
+            what = "the table that is there will be replaced at the end of this run"
+            note(f"{self.output}: {what}; `resume` would go on with it")
         if not (self.resume and self._part.frames):
             self._part.begin(self.asked)
         known = set[Path]()
@@ -183,24 +176,29 @@ class Job:
             new = [file for file in dict.fromkeys(files) if file not in known]
             self._part.add([input_entry(file) for file in new], rows)
             known.update(new)
-        if replaces and not self.finished and read_rows(self.output):
-            raise SettingsError(
-                f"{self.output}: this run has no rows, and the table that is there stays as it "
-                f"is: choose frames that there are (`frames`), or another file"
-            )
         columns = self.settings.columns
         write_rows(self.output, self.every_row, columns, self.excerpt, self.save_manifests)
         self._part.remove()
 
     def save_manifests(self) -> None:
         """Write the manifest where it was asked for, and beside the file."""
-        warned = [*(self.warned_before or ()), *self.told.warnings]
-        found = manifest(self.asked, self.series, list(dict.fromkeys(warned)), self.told.notes)
+        files = {*named_files(self.asked), *(path for one in self.series for path in one.files())}
+        found = {
+            "settings": self.asked,
+            "seed": self.asked["seed"],
+            "versions": versions_used(),
+            "inputs": [input_entry(path) for path in sorted(files)],
+            "warnings": list(dict.fromkeys([*(self.warned_before or ()), *self.told.warnings])),
+            "notes": self.told.notes,
+            # of the whole series, so that a merge of parts knows which frames are missing
+            "frames": {one.name: len(one) for one in self.series},
+            **self.more,
+        }
         if self.manifest_path is not None:
-            write_manifest(self.manifest_path, {**found, **self.more})
+            write_manifest(self.manifest_path, found)
         if self.output is not None:
             outdated = self.output if self.warned_before is None else None
-            write_manifest(manifest_of(self.output), {**found, **self.more}, outdated)
+            write_manifest(manifest_of(self.output), found, outdated)
 
     def _computed(self, advance: Advance) -> Iterator[tuple[Series, list[Row]]]:
         """The rows of each frame that is computed now, with its series."""
@@ -240,82 +238,137 @@ class Job:
                 if not self._part.frames:
                     raise
         if self._part.frames:
-            frames = self._checked(self._part.read(), series)
+            frames = _usable_rows(self._part.read(), self.asked, series)
             chosen = {one.name: chosen_frames(one, self.settings.frames) for one in series}
-            for source, frame in sorted(frames):
-                if frame not in chosen[source]:
-                    reason = f"it holds frame {frame}, which is not chosen now"
-                    raise _refusal(self._part.path, reason)
-            self._finish(frames)
+            self._finish({key: rows for key, rows in frames.items() if key[1] in chosen[key[0]]})
 
     def _take_table(self, path: Path, series: Sequence[Series], needed: Iterable[str]) -> None:
         record = read_table(path, partial(_refusal, path))
-        frames = self._checked(record, series, FREE)
+        frames = _usable_rows(record, self.asked, series, FREE)
         lacking = [name for name in needed if name not in record.columns]
         if frames and lacking:
-            raise SettingsError(
-                f"{path}: its rows lack {', '.join(lacking)} (`fields`), which the figure needs: "
-                f"leave out `plot`, or `resume` to compute all frames again"
-            )
-        frames_asked = _joined_frames(record, frames, self.settings.frames, series)
-        self.settings = replace(self.settings, frames=frames_asked)
-        self.asked = {**self.asked, "frames": as_written(frames_asked)}
+            lack = f"its rows lack {', '.join(lacking)} (`fields`), which the figure needs"
+            raise SettingsError(f"{path}: {lack}: leave out `plot`, or `resume`")
+        joined = _joined_frames(record, self.settings.frames, [len(one) for one in series])
+        self.settings = replace(self.settings, frames=joined)
+        self.asked = {**self.asked, "frames": as_written(joined)}
         self.warned_before = [str(text) for text in record.manifest["warnings"]]
         self._finish(frames)
         # a choice of columns may say nothing of the void fabric
         if not {"alpha_vs", "alpha_vs_axial"} & record.columns:
             self.found_void_fabric |= bool(frames)
 
-    def _checked(
-        self, record: Record, series: Sequence[Series], free: Sequence[str] = ()
-    ) -> FrameRows:
-        """The complete frames of a record, if they are those that this run would compute."""
-        refuse = partial(_refusal, record.path)
-        if differing := differing_settings(record.manifest["settings"], self.asked, free):
-            raise refuse(f"it was made with other settings ({differing})")
-        others = {source for source, _ in record.rows} - {one.name for one in series}
-        if others:
-            raise refuse(f"its source {min(others)} is not named now")
-        count = self.settings.rows_per_frame
-        frames = {key: rows for key, rows in record.rows.items() if len(rows) == count}
-        if record.rows:
-            check_inputs(record._replace(rows=frames), series, refuse)
-        return frames
-
 
 def _refusal(path: Path, reason: str) -> SettingsError:
     """The error for rows that a run cannot go on with."""
-    return SettingsError(
-        f"{path}: `resume` cannot go on with it: {reason}: name another `output=FILE`, or leave "
-        f"out `resume` to compute all frames again"
-    )
+    advice = "name another `output=FILE`, or leave out `resume` to compute all frames again"
+    return SettingsError(f"{path}: `resume` cannot go on with it: {reason}: {advice}")
 
 
-def _joined_frames(
-    record: Record, frames: FrameRows, chosen: slice, series: Sequence[Series]
-) -> slice:
+def _usable_rows(
+    record: Record, asked: Mapping[str, Any], series: Sequence[Series], free: Collection[str] = ()
+) -> FrameRows:
     """
-    The frames of a complete FILE and those that are chosen now, as one slice.
+    The complete frames of a record, if they are what a run would compute now.
+
+    New frames may have come behind the last one, as files or at the end of the last file. A file
+    whose frame was skipped may have been mended, and a file of cells or strains may have new lines.
+
+    Parameters
+    ----------
+    record : Record
+        Of an earlier run.
+    asked : mapping
+        The settings of this run.
+    series : sequence of Series
+        What is read now.
+    free : collection of str, optional
+        Settings that may differ.
+
+    Raises
+    ------
+    SettingsError
+        If settings or inputs are not what they were.
+    """
+    refuse = partial(_refusal, record.path)
+    if differing := differing_settings(record.manifest["settings"], asked, free):
+        raise refuse(f"it was made with other settings ({differing})")
+    if not record.rows:
+        return {}
+    count = record.settings.rows_per_frame
+    frames = {key: rows for key, rows in record.rows.items() if len(rows) == count}
+    if others := {source for source, _ in frames} - {one.name for one in series}:
+        raise refuse(f"its source {min(others)} is not named now")
+    before = {str(one.get("path")): one for one in record.manifest["inputs"]}
+    named, cells = named_files(asked), [one.cells.path for one in series if one.cells is not None]
+    read = {str(file) for file in (*named, *(file for one in series for file in one.files()))}
+    for gone in before.keys() - read:
+        raise refuse(f"{gone} is not among the files that are read now")
+    for one in series:
+        _check_frames(one, before, frames, refuse)
+    # new lines may name the strain of a frame that had none
+    lacks_strain = any(row.strain is None for rows in frames.values() for row in rows)
+    for file in (*named, *cells):
+        may_grow = file in cells or (str(file) == asked["strain"] and not lacks_strain)
+        if not _is_same(file, before, may_grow, by_lines=True):
+            raise refuse(f"{file} has changed since, in more than new lines at its end")
+    return frames
+
+
+def _check_frames(
+    series: Series, before: Mapping[str, Any], rows: FrameRows, refuse: Refuse
+) -> None:
+    """Refuse what has changed of the files of a series, and of those read with them."""
+    steps = [step for step, file in series.grains.files.items() if str(file) in before]
+    last = max((step for step in steps if step is not None), default=None)
+    files = [(s, f) for one in (series.grains, *series.contacts) for s, f in one.files.items()]
+    for step, file in files:
+        if str(file) not in before:
+            if steps and (step is None or last is None or step <= last):
+                raise refuse(f"{file} is new, and not behind the last frame")
+            continue
+        beside = series.beside(file) if series.grains.files.get(step) == file else []
+        changed = [one for one in beside if not _is_same(one, before)]
+        if not _is_same(file, before, may_grow=step is None or step == last):
+            changed.append(file)
+        # a broken file counts as one frame: if it has more now, later frames have other numbers
+        numbers = [frame.number for frame in series if changed and frame.name_step == step]
+        if changed and (len(numbers) != 1 or (series.name, numbers[0]) in rows):
+            raise refuse(f"{changed[0]} has changed since, or is new beside the grains")
+
+
+def _is_same(
+    file: Path, before: Mapping[str, Any], may_grow: bool = False, by_lines: bool = False
+) -> bool:
+    """Whether a file is what it was, or begins as it was: with whole lines if ``by_lines``."""
+    known, found = before.get(str(file), {}), file.stat()
+    size = known.get("size", math.inf)
+    if found.st_size < size or (found.st_size > size and not may_grow):
+        return False
+    digest, ends_line = hash_of(file, size, found.st_mtime_ns)
+    # a number at the end may have got more digits
+    return digest == known.get("sha256") and (ends_line or not by_lines)
+
+
+def _joined_frames(record: Record, chosen: slice, counts: Sequence[int]) -> slice:
+    """
+    The frames of a complete FILE and those chosen now, of series of so many frames, as one slice.
 
     Raises
     ------
     SettingsError
         If together they make none: no frame of FILE may be lost.
     """
-    known = {frame for _, frame in frames}
-    last = max(known, default=0)
-    now = {frame for one in series for frame in range(len(one))[chosen]}
+    known = {frame for _, frame in record.rows}
+    now = {frame for count in counts for frame in range(count)[chosen]}
     if known <= now:
         return chosen
     # frames that were skipped leave no hole
-    then = {frame for one in series for frame in range(len(one))[record.settings.frames]}
-    every = sorted(known | now | {frame for frame in then if frame < last})
-    steps = {right - left for left, right in pairwise(every)} or {1}
-    if len(steps) > 1:
-        raise SettingsError(
-            f"frames: {record.path} holds frames {min(known)} to {last}, which with those chosen "
-            f"now make no slice A:B:C: choose `frames` so that they do, or another `output=FILE`"
-        )
-    (step,) = steps
+    then = {frame for count in counts for frame in range(count)[record.settings.frames]}
+    every = sorted(known | now | {frame for frame in then if frame < max(known)})
+    step = every[1] - every[0] if len(every) > 1 else 1
+    if every != list(range(every[0], every[-1] + 1, step)):
+        has = f"{record.path} holds frames {min(known)} to {max(known)}"
+        raise SettingsError(f"frames: {has}, which with those chosen now make no slice A:B:C")
     stop = None if chosen.stop is None else every[-1] + 1
     return slice(every[0], stop, None if step == 1 else step)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Collection, Mapping
-from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ReadError
@@ -83,9 +82,6 @@ def reopen(asked: Mapping[str, Any]) -> Series:
     sources = [str(source) for source in asked["sources"]]
     if "-" in sources:
         raise ReadError("the frames came by standard input, which cannot be read again")
-    missing = [source for source in sources if not Path(source).exists()]
-    if missing:
-        raise ReadError(f"the source {missing[0]} is not there any more")
     given = given_settings(asked)
     return open_sources(sources, **{name: given[name] for name in READING if name in given})[0]
 

@@ -115,9 +115,11 @@ def compute_file(
     if kind is Settings:
         options = {name: one for name, one in options.items() if name not in BLOCK_OPTIONS}
     with recorded() as told:
-        series, sources, reading = _opened(source, options)
-        parts = [of_whole(one, kind(**options)) for one in series]
+        opened = _opened(source, options)
+        parts = [of_whole(one, kind(**options)) for one in opened]
         settings = _same(one for _, one in parts)
+        sources = [name for one in opened for name in one.sources or (one.name,)]
+        reading = take_reading(dict(_same(one.reading for one in opened)))
         excerpt = Excerpt.make(settings.columns, fields, digits)
         job = Job(
             [one for one, _ in parts],
@@ -131,36 +133,26 @@ def compute_file(
             told=told,
             executor=executor,
         )
-
-        def advance() -> None:
-            if progress is not None:
-                progress(job.done, job.frames())
-
         with job.begun():
-            job.write(advance)
+            job.write(lambda: progress and progress(job.done, job.frames()))
     return load(Path(output))
 
 
-def _opened(
-    source: Source | Sequence[Source], options: dict[str, Any]
-) -> tuple[list[Series], list[str], dict[str, Any]]:
-    """Series, with what they were opened by; its options are taken out of others."""
+def _opened(source: Source | Sequence[Source], options: dict[str, Any]) -> Sequence[Series]:
+    """The series of a source; the options of reading are taken out of others."""
     one = isinstance(source, Series | str | os.PathLike) or not isinstance(source, Iterable)
     given: list[Any] = [source] if one else list(source)  # type: ignore[arg-type]
     if given and all(isinstance(one, Series) for one in given):
-        for name in READING:
-            if name in options:
-                raise SettingsError(f"{name}: the series is open already: hand it to `read_series`")
-        sources = [source for one in given for source in one.sources or (one.name,)]
-        return given, sources, _same(take_reading(dict(one.reading)) for one in given)
+        for name in {*READING} & {*options}:
+            raise SettingsError(f"{name}: the series is open already: hand it to `read_series`")
+        return given
     if not given or not all(isinstance(one, str | os.PathLike) for one in given):
         raise SettingsError(
             f"expected a Series or the path of dumps, or several of one kind, found {source!r}: "
             f"of packings, compute() makes a table, which has save()"
         )
-    sources = [os.fspath(path) for one in given for path in expanded(one)]
-    reading = take_reading(options)
-    return open_sources(sources, **reading), sources, reading
+    paths = [os.fspath(path) for one in given for path in expanded(one)]
+    return open_sources(paths, **take_reading(options))
 
 
 def _same(found: Iterable[T]) -> T:

@@ -21,7 +21,7 @@ import pytest
 
 from scanfab.base import plugins
 from scanfab.io import reader
-from scanfab.pipeline.part import PartFile
+from scanfab.pipeline.record import PartFile
 from tests.helpers.dumps import (
     cubic_rows,
     dump_text,

@@ -50,8 +50,14 @@ def finished_run(*words: str) -> bytes:
     return Path("finished.csv").read_bytes()
 
 
-def test_an_empty_folder_waits_for_frames(folder, finished):
-    thread = meanwhile([partial(time.sleep, 0.5), *copied(folder, sorted(finished.iterdir()))])
+@pytest.mark.parametrize("suffix", ["txt", "npz"])
+def test_an_empty_folder_waits_for_frames(folder, finished, suffix):
+    files = sorted(finished.iterdir())
+    if suffix == "npz":
+        Path("converted").mkdir()
+        assert run(["convert", str(finished), "converted/f_{step}.npz"]) == 0
+        files = sorted(Path("converted").iterdir())
+    thread = meanwhile([partial(time.sleep, 0.5), *copied(folder, files)])
     assert follow() == 0
     thread.join()
     assert Path("t.csv").read_bytes() == finished_run()
@@ -100,16 +106,6 @@ def test_one_file_that_grows(folder, finished):
     thread.join()
     assert run([*words, "-o", "finished.csv"]) == 0
     assert Path("t.csv").read_bytes() == Path("finished.csv").read_bytes()
-
-
-def test_frames_of_every_kind_of_file(folder):
-    frames = write_series(folder.parent / "series", 3)
-    Path("converted").mkdir()
-    assert run(["convert", str(frames), "converted/f_{step}.npz"]) == 0
-    thread = meanwhile(copied(folder, sorted(Path("converted").iterdir())))
-    assert follow() == 0
-    thread.join()
-    assert Path("t.csv").read_bytes() == finished_run()
 
 
 @pytest.fixture
@@ -168,29 +164,23 @@ def test_without_any_frame_the_table_has_no_rows(folder, capsys):
     assert "scanfab: note: dumps: no reader knows" in capsys.readouterr().err
 
 
-def test_a_broken_file_stops_it_or_is_skipped(folder, finished, capsys):
+def test_a_broken_file_stops_it_or_is_skipped_and_a_last_one_left_out(folder, finished, capsys):
     files = sorted(finished.iterdir())
-    for path in files:
+    broken, half = folder / files[1].name, files[1].read_bytes()[:300]
+    shutil.copy(files[0], folder)
+    broken.write_bytes(half)
+    assert follow(seconds=1.5) == 0
+    assert f"warning: dumps/{broken.name}: is left out, as it was not" in capsys.readouterr().err
+    broken.unlink()
+    assert Path("t.csv").read_bytes() == finished_run()
+    for path in files[2:]:
         shutil.copy(path, folder)
-    (folder / files[1].name).write_bytes(files[1].read_bytes()[:300])
+    broken.write_bytes(half)
     assert follow(seconds=0.5) == 1
-    said = capsys.readouterr().err
-    assert f"dumps/{files[1].name}" in said
+    assert f"dumps/{broken.name}" in capsys.readouterr().err
     assert Path("t.csv.part").read_text().count("\n") == 2
-    Path("t.csv.part").unlink()
     assert follow("--on-error", "skip", seconds=0.5) == 1
     assert Path("t.csv").read_bytes() == finished_run("--on-error", "skip")
-
-
-def test_a_last_file_that_is_never_whole_is_left_out(folder, finished, capsys):
-    files = sorted(finished.iterdir())
-    shutil.copy(files[0], folder)
-    (folder / files[1].name).write_bytes(files[1].read_bytes()[:300])
-    assert follow(seconds=1.5) == 0
-    said = capsys.readouterr().err
-    assert f"warning: dumps/{files[1].name}: is left out, as it was not whole" in said
-    (folder / files[1].name).unlink()
-    assert Path("t.csv").read_bytes() == finished_run()
 
 
 def test_a_folder_that_vanishes_is_named_and_nothing_is_lost(folder, finished, capsys):
@@ -208,29 +198,21 @@ def test_a_folder_that_vanishes_is_named_and_nothing_is_lost(folder, finished, c
     assert Path("t.csv").read_bytes() == finished_run()
 
 
-def test_what_belongs_before_is_an_error(folder, finished):
+def test_files_that_change_before_the_next_frame_are_an_error(folder, finished):
     files = sorted(finished.iterdir())
     for path in files[1:3]:
         shutil.copy(path, folder)
-    series = scanfab.follow_series(folder, seconds=5)
-    frames = iter(series)
-    assert next(frames).number == 0
-    assert next(frames).number == 1
+    growing, other = (iter(scanfab.follow_series(folder, seconds=5)) for _ in range(2))
+    for frames in (growing, other):
+        assert [next(frames).number, next(frames).number] == [0, 1]
+    with open(folder / files[2].name, "a") as stream:
+        stream.write("\n")
+    with pytest.raises(ReadError, match=f"{files[2].name}: has changed after its frame was taken"):
+        next(growing)
+    shutil.copy(files[2], folder)
     shutil.copy(files[0], folder)
     with pytest.raises(ReadError, match=f"{files[0].name}: is new, and belongs before"):
-        next(frames)
-
-
-def test_a_file_that_grows_after_it_was_taken_is_an_error(folder, finished):
-    files = sorted(finished.iterdir())
-    for path in files[:2]:
-        shutil.copy(path, folder)
-    frames = iter(scanfab.follow_series(folder, seconds=5))
-    next(frames), next(frames)
-    with open(folder / files[1].name, "a") as stream:
-        stream.write("\n")
-    with pytest.raises(ReadError, match=f"{files[1].name}: has changed after its frame was taken"):
-        next(frames)
+        next(other)
 
 
 def test_the_plot_is_drawn_again(folder, finished, monkeypatch):

@@ -76,22 +76,16 @@ def whole_table(shrinking):
 # one frame
 
 
-def test_a_packing_has_a_row_for_each_variant():
-    table = scanfab.compute(packing_of(heap()), **SCAN)
-    assert [row.variant for row in table] == ["a", "b", "c", "d"]
-    assert {row.frame for row in table} == {0}
-    assert {row.source for row in table} == {""}
-    assert {row.contacts_from for row in table} == {"geometric"}
-
-
-@pytest.mark.parametrize("variants", ["a", "b", "c", "d", "ad", "bc"])
+@pytest.mark.parametrize("variants", ["a", "d", "bc"])
 def test_each_variant_is_the_same_alone(variants):
     packing = packing_of(heap())
     everything = scanfab.compute(packing, **SCAN)
+    assert [row.variant for row in everything] == ["a", "b", "c", "d"]
+    assert {(row.frame, row.source, row.contacts_from) for row in everything} == {
+        (0, "", "geometric")
+    }
     for row in scanfab.compute(packing, variants=variants, **SCAN):
         expected = everything.select(variant=row.variant)[0]
-        if variants in ("ad", "bc", "c", "d"):
-            assert row.segments == pytest.approx(expected.segments, rel=0.02)
         for name in ("grains", "rattlers", "contacts", "coordination", "gc_xx", "cutoff"):
             assert getattr(row, name) == getattr(expected, name)
 
@@ -150,25 +144,14 @@ def test_lengths_scale_with_the_dump():
 # series
 
 
-def test_frames_are_numbered_and_keep_their_steps(whole_table):
-    whole = whole_table.select(variant="a")
-    np.testing.assert_array_equal(whole["frame"], [0, 1, 2, 3])
-    np.testing.assert_array_equal(whole["step"], [0, 100, 200, 300])
-    assert whole_table[0].source.endswith("dump.txt")
-
-
 @pytest.mark.parametrize(
     ("frames", "numbers"),
     [
         ("1:3", [1, 2]),
         ("2", [2]),
         ("::2", [0, 2]),
-        ("1::2", [1, 3]),
         ("-1", [3]),
-        ("-1:", [3]),
         ("-3:-1", [1, 2]),
-        (":-2", [0, 1]),
-        ("::-1", [0, 1, 2, 3]),
         ("::-2", [1, 3]),
         ("2:100", [2, 3]),
         (slice(1, 2), [1]),
@@ -179,9 +162,10 @@ def test_chosen_frames_have_the_rows_that_they_have_among_all(
 ):
     table = scanfab.compute(shrinking, frames=frames, **SCAN)
     assert table.rows == tuple(row for row in whole_table if row.frame in numbers)
+    assert [row.step for row in table.select(variant="a")] == [100 * k for k in numbers]
 
 
-@pytest.mark.parametrize("frames", ["4:", "9", "2:1", "-9:-5"])
+@pytest.mark.parametrize("frames", ["4:", "2:1", "-9:-5"])
 def test_no_frames_at_all_are_an_error(shrinking, frames):
     found = rf"^frames: the series has no frame in .*: {shrinking.name} has 4 frames, 0 to 3$"
     with pytest.raises(SettingsError, match=found):
@@ -191,7 +175,6 @@ def test_no_frames_at_all_are_an_error(shrinking, frames):
 @pytest.mark.parametrize(
     ("part", "frames", "alone"),
     [
-        (slice(1, 3), None, "1:3"),
         (slice(-2, None), None, "-2:"),
         (slice(None, None, 2), None, "::2"),
         (slice(1, None), "1:", "2:"),
@@ -219,16 +202,14 @@ def test_a_part_looks_for_its_first_frame_with_grains_in_the_whole(shrinking):
     assert look.strains == whole.strains
 
 
-def test_no_frames_of_a_part_are_an_error(shrinking):
+def test_frames_that_are_not_there_are_an_error(shrinking):
     with pytest.raises(SettingsError, match="the series has no frame in"):
         scanfab.compute(shrinking[1:1], **SCAN)
-
-
-def test_a_packing_is_frame_zero():
-    packing = packing_of(heap())
-    assert len(scanfab.compute(packing, frames="-1", **SCAN)) == 4
+    assert len(scanfab.compute(packing_of(heap()), frames="-1", **SCAN)) == 4
     with pytest.raises(SettingsError, match="no frame in"):
-        scanfab.compute(packing, frames="1:", **SCAN)
+        scanfab.compute(packing_of(heap()), frames="1:", **SCAN)
+    with pytest.raises(SettingsError, match="expected frames, found none in the source"):
+        scanfab.compute([])
 
 
 @pytest.mark.parametrize("strain", ["auto", "grains", "boundary"])
@@ -252,13 +233,8 @@ def test_empty_first_frames_have_rows_without_values(tmp_path, strain):
 
 def test_an_empty_frame_among_others_has_rows_without_values(tmp_path, whole_table):
     table = scanfab.compute(series_of(tmp_path, [SHRINKING[0], [], *SHRINKING[1:]]), **SCAN)
-    assert [row.alpha_vs is None for row in table.select(variant="a")] == [
-        False,
-        True,
-        False,
-        False,
-        False,
-    ]
+    empty = [row.alpha_vs is None for row in table.select(variant="a")]
+    assert empty == [False, True, False, False, False]
     names = ("frame", "step", "source")
     assert [without(row, *names) for row in table if row.frame != 1] == [
         without(row, *names) for row in whole_table
@@ -330,12 +306,9 @@ def test_contacts_by_geometry_stand_in_for_a_missing_file(tmp_path):
 
 
 def test_no_contacts_have_no_contact_fabric():
-    packing = packing_of(heap(), contacts=[])
-    row = scanfab.compute(packing, variants="a", **SCAN)[0]
-    assert row.contacts == 0
-    assert row.coordination == 0
-    assert row.alpha_c is None
-    assert row.gc_xx is None
+    row = scanfab.compute(packing_of(heap(), contacts=[]), variants="a", **SCAN)[0]
+    assert row.contacts == row.coordination == 0
+    assert row.alpha_c is row.gc_xx is None
     assert row.alpha_vs is not None
 
 
@@ -362,27 +335,19 @@ def test_only_rattlers_leave_nothing_to_scan():
 # strain
 
 
-def test_strain_is_measured_from_the_first_frame(shrinking):
-    tables = {mode: scanfab.compute(shrinking, strain=mode, **SCAN) for mode in ("grains", "cell")}
-    found = tables["grains"].select(variant="a")["strain"]
-    np.testing.assert_allclose(found, [0, 0.05, 0.1, 0.15], atol=1e-12)
-    np.testing.assert_array_equal(tables["cell"]["strain"], 0)
+def test_strain_is_measured_from_the_first_frame(shrinking, whole_table):
+    """Along the axis; of a boundary by its centres; unknown without boundary or periodic cell."""
 
+    def strains(**options):
+        return scanfab.compute(shrinking, variants="a", **options, **SCAN)["strain"]
 
-def test_strain_along_another_axis(shrinking):
-    strain = scanfab.compute(shrinking, strain="grains", axis="x", **SCAN)["strain"]
-    np.testing.assert_allclose(strain, 0, atol=1e-12)
-
-
-def test_strain_of_the_boundary_is_that_of_its_centres(shrinking):
-    lowest = np.ptp([row[4] for row in SHRINKING[0] if row[1] == 2])
-    last = np.ptp([row[4] for row in SHRINKING[3] if row[1] == 2])
+    np.testing.assert_allclose(strains(strain="grains"), [0, 0.05, 0.1, 0.15], atol=1e-12)
+    np.testing.assert_array_equal(strains(strain="cell"), 0)
+    np.testing.assert_allclose(strains(strain="grains", axis="x"), 0, atol=1e-12)
+    ends = [np.ptp([row[4] for row in SHRINKING[frame] if row[1] == 2]) for frame in (0, 3)]
     for mode in ("auto", "boundary"):
-        table = scanfab.compute(shrinking, strain=mode, boundary="type=2", **SCAN)
-        assert table[-1].strain == pytest.approx(1 - last / lowest)
-
-
-def test_strain_is_unknown_without_a_boundary_or_a_periodic_cell(whole_table):
+        found = strains(strain=mode, boundary="type=2")
+        assert found[-1] == pytest.approx(1 - ends[1] / ends[0])
     assert {row.strain for row in whole_table} == {None}
 
 
@@ -469,11 +434,6 @@ WRONG = [
 def test_a_value_of_another_kind_is_told_by_its_option(options, told):
     with pytest.raises(SettingsError, match=told):
         scanfab.compute(Packing([[0, 0, 0]], 1.0), **options)
-
-
-def test_no_packings_are_told_as_such():
-    with pytest.raises(SettingsError, match="expected frames, found none in the source"):
-        scanfab.compute([])
 
 
 def test_the_forms_of_options_are_in_the_help():

@@ -51,23 +51,19 @@ def text_of(packing):
 
 
 def test_an_iterable_of_packings_is_a_series():
+    """Each comes with the plan of the first."""
     table = scanfab.compute(list(packings()), strain="grains", **SCAN)
-    assert [row.frame for row in table] == [0, 0, 1, 1, 2, 2, 3, 3]
-    assert [row.step for row in table] == [0, 0, 1, 1, 2, 2, 3, 3]
-    assert [row.source for row in table] == [""] * 8
+    assert [(row.frame, row.step, row.source) for row in table[::2]] == [
+        (k, k, "") for k in range(4)
+    ]
     assert [row.strain for row in table[::2]] == pytest.approx([0.0, 0.01, 0.02, 0.03])
-
-
-def test_each_comes_with_the_plan_of_the_first():
-    every = scanfab.compute(list(packings()), **SCAN)
-    window = make_plan(Settings(**SCAN), Sample(next(packings()), np.zeros(125, bool))).window
-    last = list(packings())[-1]
+    window = make_plan(Settings(**SCAN), plan_sample(next(packings()))).window
     words = {"rv_radius": window.radius, "rv_center": tuple(window.center)}
-    alone = scanfab.compute(last, **SCAN, **words)
-    assert [row.gvs_zz for row in every[-2:]] == [row.gvs_zz for row in alone]
+    alone = scanfab.compute(list(packings())[-1], **SCAN, **words)
+    assert [row.gvs_zz for row in table[-2:]] == [row.gvs_zz for row in alone]
 
 
-@pytest.mark.parametrize("frames", [None, "1:3", "::2", "-2:", "-1"])
+@pytest.mark.parametrize("frames", [None, "1:3", "-2:"])
 def test_a_generator_gives_what_a_list_gives(frames):
     lists = scanfab.compute(list(packings()), frames=frames, **SCAN)
     assert scanfab.compute(packings(), frames=frames, **SCAN) == lists
@@ -100,10 +96,9 @@ def test_a_stream_is_not_kept_in_memory():
 def test_what_is_no_packing_is_named():
     with pytest.raises(SettingsError, match="expected packings, found 3 among them"):
         scanfab.compute([*packings(1), 3], **SCAN)
-    with pytest.raises(SettingsError, match="a Series or an iterable of packings, found 'dumps/'"):
-        scanfab.compute("dumps/", **SCAN)
-    with pytest.raises(SettingsError, match="a Series or an iterable of packings, found 7"):
-        scanfab.compute(7, **SCAN)
+    for source in ("dumps/", 7):
+        with pytest.raises(SettingsError, match=f"or an iterable of packings, found {source!r}"):
+            scanfab.compute(source, **SCAN)
 
 
 @pytest.mark.parametrize("source", [list, iter])
@@ -188,16 +183,18 @@ def test_what_another_process_is_told_is_heard_here(tmp_path, processes):
 
 
 def test_a_damaged_frame_stops_or_is_left_out_elsewhere_too(tmp_path, processes):
-    text = (series_in(tmp_path, 3), (tmp_path / "dump.txt").read_text())[1]
-    lines = text.splitlines(keepends=True)
-    second = [k for k, line in enumerate(lines) if line.startswith("ITEM: ATOMS")][1]
-    lines[second + 1] = "1 1 a b c 0.5\n"
-    series = scanfab.read_series(write(tmp_path / "broken.txt", "".join(lines)))
+    texts = [*map(text_of, packings(3))]
+    texts[1] = texts[1].replace("\n1 1 ", "\n1 1 a ", 1)
+    series = scanfab.read_series(write(tmp_path / "broken.txt", "".join(texts)))
     with pytest.warns(SkippedFrameWarning, match=r"frame 1 skipped: .*broken\.txt"):
         table = scanfab.compute(series, executor=processes, on_error="skip", **SCAN)
     assert [row.frame for row in table] == [0, 0, 2, 2]
     with pytest.raises(scanfab.ReadError, match=r"broken\.txt"):
         scanfab.compute(series, executor=processes, **SCAN)
+
+
+def plan_sample(packing):
+    return Sample(scanfab.find_contacts(packing), np.zeros(len(packing), bool))
 
 
 def test_a_frame_is_computed_alone_from_its_plan(tmp_path):
@@ -208,25 +205,6 @@ def test_a_frame_is_computed_alone_from_its_plan(tmp_path):
     found = compute_frame(last, pickle.loads(pickle.dumps(plan)), number=3, source=series.name)
     assert [row.gvs_zz for row in found.rows] == [row.gvs_zz for row in every[-2:]]
     assert [(row.source, row.frame) for row in found.rows] == [(series.name, 3)] * 2
-
-
-def plan_sample(packing):
-    return Sample(scanfab.find_contacts(packing), np.zeros(len(packing), bool))
-
-
-def test_notes_of_a_frame_are_data():
-    packing = next(packings())
-    plan = make_plan(Settings(**{**SCAN, "cutoff": 50.0}), plan_sample(packing))
-    (note,) = compute_frame(packing, plan).notes
-    assert note.code == "cutoff_too_long"
-    assert note.variants == ("c", "d")
-    assert note.text.startswith("no void segment reaches the cut-off 50")
-
-
-def test_a_frame_without_grains_has_rows_without_numbers():
-    plan = make_plan(Settings(**SCAN), plan_sample(next(packings())))
     rows = compute_frame(Packing(np.zeros((0, 3)), []), plan, number=5).rows
-    assert [(row.frame, row.variant, row.grains, row.gvs_zz) for row in rows] == [
-        (5, "c", 0, None),
-        (5, "d", 0, None),
-    ]
+    empty = [(row.frame, row.variant, row.grains, row.gvs_zz) for row in rows]
+    assert empty == [(5, "c", 0, None), (5, "d", 0, None)]
