@@ -181,14 +181,13 @@ def computed_there(
 ) -> Any:
     """What a function returns, called by a worker; ScanfabError if this worker cannot do it."""
     here, path, theirs = platform.node(), getattr(fn, "path", None), versions_here()
-    told = ", ".join(
-        f"{name} {theirs.get(name)} there and {mine} here"
-        for name, mine in versions.items()
-        if theirs.get(name) != mine
-    )
-    if told:
-        what = f"the worker on {here} has other versions than this process: {told}"
-        raise ClusterError(f"{what}: the same are needed for the same numbers")
+    if theirs != versions:
+        there, mine = (
+            dict(theirs.items() - versions.items()),
+            dict(versions.items() - theirs.items()),
+        )
+        what = f"the worker on {here} has {there}, but this process {mine}"
+        raise ClusterError(f"{what}: the same versions are needed for the same numbers")
     if path is not None and not os.access(path, os.R_OK):
         need = "workers need the same files by the same paths as this process"
         raise ReadError(f"{path}: the worker on {here} cannot read it: {need}")

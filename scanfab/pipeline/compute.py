@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 import platform
 import threading
@@ -168,6 +169,8 @@ def compute_frames(
     finally:
         # an interrupted run does not wait for the frames under way
         own.shutdown(wait=False, cancel_futures=True)
+    if math.isnan(plan.cutoff):
+        tell([Note("no_grains", "no frame has any grains")], frames.name)
 
 
 def _plan(frames: Frames) -> Plan:
@@ -175,13 +178,11 @@ def _plan(frames: Frames) -> Plan:
     # an error in a file of strains comes before the first frame
     plan = plan_without_grains(frames.settings)
     first = frames.first()
-    if first is None:
-        tell([Note("no_grains", "no frame has any grains")], frames.name)
-        return plan
-    _, frame, sample = first
-    tell(frames.notes(frame, sample))
-    plan = make_plan(frames.settings, sample)
-    tell(plan.notes)
+    if first is not None:
+        _, frame, sample = first
+        tell(frames.notes(frame, sample))
+        plan = make_plan(frames.settings, sample)
+        tell(plan.notes)
     return plan
 
 
@@ -261,10 +262,9 @@ def _here() -> tuple[str, int]:
     return platform.node(), os.getpid()
 
 
-def _hear(message: Warning | str, *_: Any, **__: Any) -> None:
+def _hear(message: Any, *_: Any, **__: Any) -> None:
     """Take the place of ``warnings.showwarning`` in the process of a worker."""
-    if isinstance(message, Warning) and hasattr(_heard, "warnings"):
-        _heard.warnings.append(message)
+    getattr(_heard, "warnings", []).append(message)
 
 
 class _SeriesNotes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -233,13 +233,7 @@ def packing_of(frame: Unread) -> Packing:
 
 def sample_rule(settings: Settings) -> SampleRule:
     """What settings say of how particles are told apart."""
-    return SampleRule(
-        settings.boundary,
-        settings.min_contacts,
-        settings.rattlers,
-        settings.min_force,
-        settings.contact_tolerance,
-    )
+    return SampleRule(**{one.name: getattr(settings, one.name) for one in fields(SampleRule)})
 
 
 def _counts_from_end(frames: slice) -> bool:

@@ -7,7 +7,6 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,6 @@ from scanfab.pipeline.record import (
     FrameRows,
     PartFile,
     Record,
-    Refuse,
     differing_settings,
     hash_of,
     input_entry,
@@ -232,23 +230,22 @@ class Job:
         series = [one.as_it_is if isinstance(one, FollowedSeries) else one for one in self.series]
         if output.is_file():
             try:
-                self._take_table(output, series, needed)
+                self._take_table(read_table(output), series, needed)
             except (SettingsError, ReadError):
                 # the run that was interrupted last has left FILE.part, whatever made FILE
                 if not self._part.frames:
                     raise
         if self._part.frames:
-            frames = _usable_rows(self._part.read(), self.asked, series)
+            frames = self._checked(self._part.read(), series)
             chosen = {one.name: chosen_frames(one, self.settings.frames) for one in series}
             self._finish({key: rows for key, rows in frames.items() if key[1] in chosen[key[0]]})
 
-    def _take_table(self, path: Path, series: Sequence[Series], needed: Iterable[str]) -> None:
-        record = read_table(path, partial(_refusal, path))
-        frames = _usable_rows(record, self.asked, series, FREE)
+    def _take_table(self, record: Record, series: Sequence[Series], needed: Iterable[str]) -> None:
+        frames = self._checked(record, series, FREE)
         lacking = [name for name in needed if name not in record.columns]
         if frames and lacking:
             lack = f"its rows lack {', '.join(lacking)} (`fields`), which the figure needs"
-            raise SettingsError(f"{path}: {lack}: leave out `plot`, or `resume`")
+            raise SettingsError(f"{record.path}: {lack}: leave out `plot`, or `resume`")
         joined = _joined_frames(record, self.settings.frames, [len(one) for one in series])
         self.settings = replace(self.settings, frames=joined)
         self.asked = {**self.asked, "frames": as_written(joined)}
@@ -258,18 +255,22 @@ class Job:
         if not {"alpha_vs", "alpha_vs_axial"} & record.columns:
             self.found_void_fabric |= bool(frames)
 
+    def _checked(
+        self, record: Record, series: Sequence[Series], free: Collection[str] = ()
+    ) -> FrameRows:
+        """The complete frames of a record; SettingsError if this run would compute others."""
+        for reason in _objections(record, self.asked, series, free):
+            advice = "name another `output=FILE`, or leave out `resume` to compute all again"
+            raise SettingsError(f"{record.path}: `resume` cannot go on with it: {reason}: {advice}")
+        count = record.settings.rows_per_frame
+        return {key: rows for key, rows in record.rows.items() if len(rows) == count}
 
-def _refusal(path: Path, reason: str) -> SettingsError:
-    """The error for rows that a run cannot go on with."""
-    advice = "name another `output=FILE`, or leave out `resume` to compute all frames again"
-    return SettingsError(f"{path}: `resume` cannot go on with it: {reason}: {advice}")
 
-
-def _usable_rows(
-    record: Record, asked: Mapping[str, Any], series: Sequence[Series], free: Collection[str] = ()
-) -> FrameRows:
+def _objections(
+    record: Record, asked: Mapping[str, Any], series: Sequence[Series], free: Collection[str]
+) -> Iterator[str]:
     """
-    The complete frames of a record, if they are what a run would compute now.
+    Why the rows of a record are not those that a run would compute now; nothing if they are.
 
     New frames may have come behind the last one, as files or at the end of the last file. A file
     whose frame was skipped may have been mended, and a file of cells or strains may have new lines.
@@ -282,50 +283,38 @@ def _usable_rows(
         The settings of this run.
     series : sequence of Series
         What is read now.
-    free : collection of str, optional
+    free : collection of str
         Settings that may differ.
-
-    Raises
-    ------
-    SettingsError
-        If settings or inputs are not what they were.
     """
-    refuse = partial(_refusal, record.path)
     if differing := differing_settings(record.manifest["settings"], asked, free):
-        raise refuse(f"it was made with other settings ({differing})")
+        yield f"it was made with other settings ({differing})"
     if not record.rows:
-        return {}
-    count = record.settings.rows_per_frame
-    frames = {key: rows for key, rows in record.rows.items() if len(rows) == count}
-    if others := {source for source, _ in frames} - {one.name for one in series}:
-        raise refuse(f"its source {min(others)} is not named now")
+        return
+    for source in {source for source, _ in record.rows} - {one.name for one in series}:
+        yield f"its source {source} is not named now"
     before = {str(one.get("path")): one for one in record.manifest["inputs"]}
     named, cells = named_files(asked), [one.cells.path for one in series if one.cells is not None]
     read = {str(file) for file in (*named, *(file for one in series for file in one.files()))}
-    for gone in before.keys() - read:
-        raise refuse(f"{gone} is not among the files that are read now")
+    yield from (f"{gone} is not among the files that are read now" for gone in before.keys() - read)
     for one in series:
-        _check_frames(one, before, frames, refuse)
+        yield from _changed_frames(one, before, record.rows)
     # new lines may name the strain of a frame that had none
-    lacks_strain = any(row.strain is None for rows in frames.values() for row in rows)
+    lacks_strain = any(row.strain is None for rows in record.rows.values() for row in rows)
     for file in (*named, *cells):
         may_grow = file in cells or (str(file) == asked["strain"] and not lacks_strain)
         if not _is_same(file, before, may_grow, by_lines=True):
-            raise refuse(f"{file} has changed since, in more than new lines at its end")
-    return frames
+            yield f"{file} has changed since, in more than new lines at its end"
 
 
-def _check_frames(
-    series: Series, before: Mapping[str, Any], rows: FrameRows, refuse: Refuse
-) -> None:
-    """Refuse what has changed of the files of a series, and of those read with them."""
+def _changed_frames(series: Series, before: Mapping[str, Any], rows: FrameRows) -> Iterator[str]:
+    """What has changed of the files of a series, and of those read with them."""
     steps = [step for step, file in series.grains.files.items() if str(file) in before]
     last = max((step for step in steps if step is not None), default=None)
     files = [(s, f) for one in (series.grains, *series.contacts) for s, f in one.files.items()]
     for step, file in files:
         if str(file) not in before:
             if steps and (step is None or last is None or step <= last):
-                raise refuse(f"{file} is new, and not behind the last frame")
+                yield f"{file} is new, and not behind the last frame"
             continue
         beside = series.beside(file) if series.grains.files.get(step) == file else []
         changed = [one for one in beside if not _is_same(one, before)]
@@ -334,7 +323,7 @@ def _check_frames(
         # a broken file counts as one frame: if it has more now, later frames have other numbers
         numbers = [frame.number for frame in series if changed and frame.name_step == step]
         if changed and (len(numbers) != 1 or (series.name, numbers[0]) in rows):
-            raise refuse(f"{changed[0]} has changed since, or is new beside the grains")
+            yield f"{changed[0]} has changed since, or is new beside the grains"
 
 
 def _is_same(

@@ -161,9 +161,9 @@ def _read(path: Path) -> Record:
     if not path.exists():
         raise ReadError(f"{path}: there is no such part: run its job")
     try:
-        part = read_table(path, lambda reason: ReadError(f"{path}: {reason}: run its job again"))
+        part = read_table(path)
     except SettingsError as error:
-        raise ReadError(f"{path}: {error}") from None
+        raise ReadError(str(error)) from None
     count = part.settings.rows_per_frame
     for (source, frame), rows in part.rows.items():
         if len(rows) != count:

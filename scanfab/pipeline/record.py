@@ -21,7 +21,7 @@ import os
 import platform
 import shutil
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import version
@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from scanfab.base.ending import undone_at_end
-from scanfab.base.errors import ReadError, ScanfabError, SettingsError, note
+from scanfab.base.errors import ReadError, SettingsError, note
 from scanfab.base.files import locked, named_errors, whole_file
 from scanfab.base.option import options_of
 from scanfab.base.spelling import counted
@@ -56,8 +56,6 @@ PIECE = 1 << 20
 
 FrameRows = dict[tuple[str, int], list[Row]]
 """The rows of each frame, by its source and number."""
-Refuse = Callable[[str], ScanfabError]
-"""Makes the error for rows that cannot be used from the reason."""
 
 
 class Record(NamedTuple):
@@ -87,10 +85,7 @@ class Record(NamedTuple):
 
 
 def asked_for(
-    sources: Sequence[str],
-    reading: Mapping[str, Any],
-    settings: Settings,
-    excerpt: Excerpt = ALL,
+    sources: Sequence[str], reading: Mapping[str, Any], settings: Settings, excerpt: Excerpt = ALL
 ) -> dict[str, Any]:
     """
     The settings that decide the bytes of a result, as users write them, in the types of JSON.
@@ -204,20 +199,21 @@ def read_manifest(table: Path) -> dict[str, Any] | None:
         if not all(isinstance(one, list) for one in lists):
             raise TypeError
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise ReadError(
-            f"{path}: expected a manifest of scanfab compute, found something else"
-        ) from None
+        expected = "a manifest of scanfab compute"
+        raise ReadError(f"{path}: expected {expected}, found something else") from None
     return {**{name: [] for name in LISTS}, **found}
 
 
-def read_table(table: Path, refuse: Refuse) -> Record:
-    """The record of a finished table, whose manifest is beside it."""
+def read_table(table: Path) -> Record:
+    """The record of a finished table, whose manifest is beside it; SettingsError without one."""
     found = read_manifest(table)
     if found is None:
-        raise refuse(f"there is no {table.name}.manifest.json, which says what made it")
+        what = f"there is no {table.name}.manifest.json, which says what made it"
+        raise SettingsError(f"{table}: {what}: run its command again")
     rows = read_rows(table, whole=True)
     if rows and not {"source", "frame"} <= set(rows[0]):
-        raise refuse("it lacks the columns source and frame, which tell its rows apart")
+        what = "it lacks the columns source and frame, which tell its rows apart"
+        raise SettingsError(f"{table}: {what}: compute it with them")
     return Record.of(table, found, rows)
 
 
@@ -293,10 +289,8 @@ class PartFile:
             # not moved: other runs find this very file locked
             shutil.copyfile(self.path, part_of(other))
             kept = f"{counted(self.frames, 'finished frame')} of an earlier run are kept"
-            note(
-                f"{self.path}: {kept} as {part_of(other)}; what made it goes on with it by "
-                f"`output={other}` `resume`"
-            )
+            how = f"what made it goes on with it by `output={other}` `resume`"
+            note(f"{self.path}: {kept} as {part_of(other)}; {how}")
         with named_errors(self.path):
             self._stream.truncate(0)
             self._write({"settings": asked})

@@ -173,16 +173,6 @@ def test_how_far_an_interrupted_run_is_is_told(dumps, stop, compute, monkeypatch
     assert told.splitlines()[-1].startswith("scanfab: error: ")
 
 
-def test_a_failure_behind_the_last_frame_says_so(compute, capsys, monkeypatch):
-    def full(*_):
-        raise OSError(28, os.strerror(28))
-
-    monkeypatch.setattr(JsonArray, "write", full)
-    assert compute("table.json")[0] == 1
-    said = "stopped after the last frame, before the table was complete; the same command with"
-    assert said in capsys.readouterr().err
-
-
 def test_frames_that_an_earlier_run_skipped_are_not_forgotten(compute, dumps, stop, is_whole):
     """Exit code 1, as without the interruption."""
     (dumps / "dump_100.txt").write_text("ITEM: TIMESTEP\n")
@@ -217,6 +207,15 @@ def test_where_there_are_no_locks_runs_go_on(compute, monkeypatch):
 
     monkeypatch.setattr(fcntl, "flock", none)
     assert compute("table.csv")[0] == 0
+
+
+def test_a_failure_behind_the_last_frame_says_so(compute, capsys, monkeypatch):
+    def full(*_):
+        raise OSError(28, os.strerror(28))
+
+    monkeypatch.setattr(JsonArray, "write", full)
+    assert compute("table.json")[0] == 1
+    assert "stopped after the last frame, before the table was" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("text", ["{", "[1]", '{"settings": 3}', '{"settings": {}}\n7', "\xfc"])
@@ -257,18 +256,9 @@ def test_dumps_behind_the_rows_of_a_part_may_change(dumps, stop, compute, is_who
 # a complete FILE
 
 
-def test_rows_of_several_sources_stay_in_their_order(compute, five_frames, last_frame, is_whole):
-    both = {"sources": ("dumps", str(five_frames))}
-    assert compute("table.csv", **both) == (0, 9)
-    last_frame()
-    assert compute("table.csv", "--resume", **both) == (0, 1)
-    assert is_whole("table.csv", **both)
-
-
 @pytest.mark.parametrize(
     ("first", "then", "every", "computed"),
     [
-        ("1:3", ":3", ":3", 1),
         (":2", "2:", ":", 2),
         (":", ":1", ":", 0),
         ("-1:", "-2:", "-2:", 1),

@@ -10,7 +10,6 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ScanfabWarning, SettingsError
-from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.frames import Frames
@@ -118,20 +117,6 @@ def test_every_number_of_a_row_reads_back_the_same(whole_table):
 # lengths
 
 
-@pytest.mark.parametrize(
-    ("text", "length"),
-    [("0.5rmin", "min"), ("0.5rmean", "mean"), ("0.5rmax", "max"), ("0.25", None)],
-)
-def test_lengths_are_relative_to_the_radii_of_the_grains(text, length):
-    rows = heap()
-    grains = np.array([row[5] for row in rows if row[1] != 2])
-    expected = 0.25 if length is None else 0.5 * getattr(grains, length)()
-    options = {**SCAN, "cutoff": text, "spacing": text, "boundary": "type=2"}
-    table = scanfab.compute(packing_of(rows), **options)
-    np.testing.assert_allclose(table["cutoff"], expected, rtol=1e-15)
-    np.testing.assert_allclose(table["spacing"], expected, rtol=1e-12)
-
-
 def test_lengths_scale_with_the_dump():
     rows = heap()
     small = [(id, type, *(1e-9 * value for value in rest)) for id, type, *rest in rows]
@@ -231,16 +216,6 @@ def test_empty_first_frames_have_rows_without_values(tmp_path, strain):
     assert [row.frame for row in table[8:]] == [row.frame + 2 for row in expected]
 
 
-def test_an_empty_frame_among_others_has_rows_without_values(tmp_path, whole_table):
-    table = scanfab.compute(series_of(tmp_path, [SHRINKING[0], [], *SHRINKING[1:]]), **SCAN)
-    empty = [row.alpha_vs is None for row in table.select(variant="a")]
-    assert empty == [False, True, False, False, False]
-    names = ("frame", "step", "source")
-    assert [without(row, *names) for row in table if row.frame != 1] == [
-        without(row, *names) for row in whole_table
-    ]
-
-
 def test_chosen_frames_start_from_the_first_frame_with_grains(tmp_path):
     series = series_of(tmp_path, [[], *SHRINKING])
     everything = scanfab.compute(series, strain="grains", **SCAN)
@@ -271,16 +246,6 @@ def test_an_empty_vtk_frame_does_not_need_the_columns_of_the_boundary(tmp_path):
     assert np.isfinite(table["alpha_vs"][4:]).all()
 
 
-def test_the_number_of_grains_may_change(tmp_path):
-    frames = [heap()[:count] for count in (60, 80, 40)]
-    table = scanfab.compute(series_of(tmp_path, frames), variants="a", **SCAN)
-    np.testing.assert_array_equal(table["grains"], [60, 80, 40])
-    # lengths are those of the first frame
-    assert len(set(table["cutoff"].tolist())) == 1
-    smallest = min(row[5] for row in heap()[:60])
-    np.testing.assert_allclose(table["cutoff"], 0.2 * smallest)
-
-
 @pytest.mark.parametrize("lines", [SCAN, {"tolerance": 3e-5}], ids=["fixed", "auto"])
 def test_the_rv_is_that_of_the_first_frame(tmp_path, lines):
     large = [(id, type, x, y, z, 1.2 * r) for id, type, x, y, z, r in heap()]
@@ -305,13 +270,6 @@ def test_contacts_by_geometry_stand_in_for_a_missing_file(tmp_path):
     assert table["contacts"][1] > 0
 
 
-def test_no_contacts_have_no_contact_fabric():
-    row = scanfab.compute(packing_of(heap(), contacts=[]), variants="a", **SCAN)[0]
-    assert row.contacts == row.coordination == 0
-    assert row.alpha_c is row.gc_xx is None
-    assert row.alpha_vs is not None
-
-
 def test_only_rattlers_leave_an_rv_without_a_fabric():
     packing = packing_of(heap(), contacts=[])
     with pytest.warns(
@@ -319,17 +277,10 @@ def test_only_rattlers_leave_an_rv_without_a_fabric():
     ):
         solid, empty = scanfab.compute(packing, variants="cd", **SCAN)
     assert solid.alpha_vs is not None
+    assert solid.contacts == solid.coordination == 0
+    assert solid.alpha_c is solid.gc_xx is None
     assert (empty.grains, empty.rattlers, empty.solid_fraction) == (0, solid.grains, 0.0)
     assert empty.mean_length is empty.alpha_vs is empty.alpha_vs_axial_sample_se is None
-
-
-def test_only_rattlers_leave_nothing_to_scan():
-    with pytest.warns(ScanfabWarning, match=f"variant b: no grain is left, all {COUNT} are ratt"):
-        row = scanfab.compute(packing_of(heap(), contacts=[]), variants="b", **SCAN)[0]
-    assert row.grains == 0
-    assert row.rattlers == COUNT
-    assert row.coordination is None
-    assert row.alpha_vs is None
 
 
 # strain
@@ -342,12 +293,9 @@ def test_strain_is_measured_from_the_first_frame(shrinking, whole_table):
         return scanfab.compute(shrinking, variants="a", **options, **SCAN)["strain"]
 
     np.testing.assert_allclose(strains(strain="grains"), [0, 0.05, 0.1, 0.15], atol=1e-12)
-    np.testing.assert_array_equal(strains(strain="cell"), 0)
     np.testing.assert_allclose(strains(strain="grains", axis="x"), 0, atol=1e-12)
-    ends = [np.ptp([row[4] for row in SHRINKING[frame] if row[1] == 2]) for frame in (0, 3)]
-    for mode in ("auto", "boundary"):
-        found = strains(strain=mode, boundary="type=2")
-        assert found[-1] == pytest.approx(1 - ends[1] / ends[0])
+    first, last = (np.ptp([row[4] for row in SHRINKING[k] if row[1] == 2]) for k in (0, 3))
+    assert strains(boundary="type=2")[-1] == pytest.approx(1 - last / first)
     assert {row.strain for row in whole_table} == {None}
 
 
@@ -357,15 +305,6 @@ def test_strain_from_a_file_is_empty_where_the_file_says_nothing(tmp_path, shrin
     path = write(tmp_path / "strain.csv", text)
     table = scanfab.compute(shrinking, strain=path, variants="a", **SCAN)
     assert [row.strain for row in table] == [0.0, None, 0.125, None]
-
-
-def test_strain_of_a_periodic_cell():
-    frames = [packing_of(heap(), cell=Cell([8.0, 8.0, 8.0]))]
-    row = scanfab.compute(frames[0], variants="c", **SCAN)[0]
-    assert row.strain == 0.0
-
-
-# boundary, and what is refused
 
 
 def test_a_class_that_encloses_the_rest_is_a_warning():
@@ -382,12 +321,6 @@ def test_a_class_that_encloses_the_rest_is_a_warning():
     assert table[0].grains == 125
 
 
-def test_an_rv_wider_than_the_cell_is_refused():
-    packing = packing_of(heap(), cell=Cell([8.0, 8.0, 8.0]))
-    with pytest.raises(SettingsError, match="wider than the cell's shortest period"):
-        scanfab.compute(packing, variants="c", rv_radius=4.5, **SCAN)
-
-
 def test_settings_are_checked_before_a_frame_is_read(tmp_path):
     series = series_of(tmp_path, [heap()])
     (tmp_path / "dump.txt").unlink()
@@ -398,13 +331,6 @@ def test_settings_are_checked_before_a_frame_is_read(tmp_path):
 def test_a_boundary_that_is_everything_is_refused(tmp_path):
     with pytest.raises(SettingsError, match="no grain is left"):
         scanfab.compute(series_of(tmp_path, [heap()]), boundary="radius>0", **SCAN)
-
-
-def test_a_boundary_that_no_frame_has_is_an_error_that_lists_the_values(tmp_path):
-    series = series_of(tmp_path, [heap(), heap(squeeze=0.9)])
-    message = "no particle of any frame has type=3 or id>=900: type is 1 or 2; id is 1 to 110"
-    with pytest.raises(SettingsError, match=message):
-        scanfab.compute(series, boundary=["type=3", "id>=900"], variants="a", **SCAN)
 
 
 def test_a_boundary_that_only_a_later_frame_has_is_fine(tmp_path):
