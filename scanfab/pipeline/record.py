@@ -244,16 +244,17 @@ class PartFile:
 
     def __init__(self, output: Path) -> None:
         self.output, self.path = output, part_of(output)
-
-    @property
-    def frames(self) -> int:
-        """How many finished frames it holds."""
-        return max(len(self._whole_lines()) - 1, 0)
+        self.frames = 0
+        """How many finished frames it holds, in a block of :meth:`alone`."""
+        self._lines: list[bytes] = []
 
     @contextmanager
     def alone(self) -> Iterator[None]:
         """Keep other runs away in the block; a ScanfabError if one writes to it."""
         with locked(self.path) as self._stream, undone_at_end(self._remove_if_empty):
+            lines = self.path.read_bytes().splitlines(keepends=True)
+            self._lines = [line for line in lines if line.endswith(b"\n")]
+            self.frames = max(len(self._lines) - 1, 0)
             try:
                 yield
             finally:
@@ -268,15 +269,14 @@ class PartFile:
         ReadError
             If it is damaged.
         """
-        lines = self._whole_lines()
         try:
-            first, *frames = map(json.loads, lines)
+            first, *frames = map(json.loads, self._lines)
             found = {**first, "inputs": [one for frame in frames for one in frame["inputs"]]}
             record = Record.of(self.path, found, [row for frame in frames for row in frame["rows"]])
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
             what = "expected what an interrupted run has kept there, found something else"
             raise ReadError(f"{self.path}: {what}: leave out `resume` to start afresh") from None
-        if (size := sum(map(len, lines))) < self.path.stat().st_size:
+        if (size := sum(map(len, self._lines))) < self.path.stat().st_size:
             self._stream.truncate(size)
         return record
 
@@ -294,11 +294,13 @@ class PartFile:
         with named_errors(self.path):
             self._stream.truncate(0)
             self._write({"settings": asked})
+        self.frames = 0
 
     def add(self, inputs: Iterable[Mapping[str, Any]], rows: Iterable[Row]) -> None:
         """Keep a finished frame, with the files that no earlier frame was made of."""
         with named_errors(self.path):
             self._write({"inputs": list(inputs), "rows": [ALL.of(row) for row in rows]})
+        self.frames += 1
 
     def remove(self) -> None:
         """Remove it, in a block of :meth:`alone`; from then on the next run may have one."""
@@ -315,11 +317,7 @@ class PartFile:
 
     def _remove_if_empty(self) -> None:
         """Without a frame there is nothing to go on with."""
-        if not self._stream.closed and not self.frames:
+        is_there = not self._stream.closed and self.path.exists()
+        # counted in the file, as a signal may come just before a frame is counted
+        if is_there and self.path.read_bytes().count(b"\n") < 2:
             self.remove()
-
-    def _whole_lines(self) -> list[bytes]:
-        if not self.path.exists():
-            return []
-        lines = self.path.read_bytes().splitlines(keepends=True)
-        return [line for line in lines if line.endswith(b"\n")]

@@ -16,7 +16,7 @@ import pytest
 
 from scanfab.cli.main import run
 from scanfab.pipeline.frame import compute_frame
-from scanfab.pipeline.record import PartFile, read_manifest
+from scanfab.pipeline.record import read_manifest
 from scanfab.table.formats import OWN_FORMATS, JsonArray
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.interruptions import PROGRAM, interrupted_at_row, write_series
@@ -173,32 +173,6 @@ def test_how_far_an_interrupted_run_is_is_told(dumps, stop, compute, monkeypatch
     assert told.splitlines()[-1].startswith("scanfab: error: ")
 
 
-def test_frames_that_an_earlier_run_skipped_are_not_forgotten(compute, dumps, stop, is_whole):
-    """Exit code 1, as without the interruption."""
-    (dumps / "dump_100.txt").write_text("ITEM: TIMESTEP\n")
-    stop("table.csv", "--on-error", "skip", row=5)
-    assert compute("table.csv", "--on-error", "skip", "--resume") == (1, 1)
-    assert is_whole("table.csv", "--on-error", "skip")
-
-
-def test_a_second_run_into_the_same_file_is_refused(compute, capsys, monkeypatch, is_whole):
-    """However it begins; and the first goes on undisturbed."""
-    add, codes = PartFile.add, []
-
-    def second_run_meanwhile(self, *words):
-        add(self, *words)
-        if not codes:
-            codes.append(None)
-            codes[:] = [compute("table.csv", *more)[0] for more in (["--resume"], [])]
-
-    with monkeypatch.context() as patch:
-        patch.setattr(PartFile, "add", second_run_meanwhile)
-        assert compute("table.csv")[0] == 0
-    assert codes == [1, 1]
-    assert "error: table.csv.part: another run is writing to it" in capsys.readouterr().err
-    assert is_whole("table.csv")
-
-
 def test_where_there_are_no_locks_runs_go_on(compute, monkeypatch):
     fcntl = pytest.importorskip("fcntl", reason="such locks are POSIX")
 
@@ -292,12 +266,14 @@ def test_a_table_that_does_not_tell_what_made_it_is_refused(compute, capsys):
     assert "there is no few.csv.manifest.json" in capsys.readouterr().err
 
 
-def test_a_frame_that_was_skipped_is_tried_again(compute, dumps, is_whole, capsys):
+def test_a_frame_that_was_skipped_is_tried_again(compute, dumps, stop, is_whole, capsys):
     """As long as it cannot be read the exit code is 1; once it can, its rows are there."""
     second, skip = dumps / "dump_100.txt", ("--on-error", "skip")
     good = second.read_text()
     second.write_text("ITEM: TIMESTEP\n")
-    assert compute("table.csv", *skip) == (1, 3)
+    stop("table.csv", *skip, row=5)
+    assert compute("table.csv", *skip, "--resume") == (1, 1)
+    assert is_whole("table.csv", *skip)
     assert compute("table.csv", *skip, "--resume") == (1, 0)
     assert "frame 1 skipped" in capsys.readouterr().err
     second.write_text(good)
@@ -320,23 +296,15 @@ def test_part_and_table_are_gone_on_with_together(compute, stop, last_frame, is_
     assert is_whole("table.csv")
 
 
-def test_warnings_of_the_first_run_stay_in_the_manifest(compute, last_frame):
-    assert compute("table.csv")[0] == 0
-    path = Path("table.csv.manifest.json")
-    found = json.loads(path.read_text())
-    path.write_text(json.dumps({**found, "warnings": ["frame 1: something was told"]}))
-    last_frame()
-    assert compute("table.csv", "--resume")[0] == 0
-    assert read_manifest(Path("table.csv"))["warnings"][0] == "frame 1: something was told"
-
-
 @pytest.mark.parametrize("fields", ["source,frame,variant,alpha_vs_axial", "source,frame"])
-def test_columns_and_digits_are_those_of_the_table(compute, last_frame, is_whole, fields):
+def test_columns_digits_and_warnings_are_those_of_the_table(compute, last_frame, is_whole, fields):
     """Columns that were left out are no failure."""
-    words = ("--fields", fields, "--digits", "4")
+    words, path = ("--fields", fields, "--digits", "4"), Path("table.csv.manifest.json")
     assert compute("table.csv", *words) == (0, 4)
+    path.write_text(json.dumps({**json.loads(path.read_text()), "warnings": ["frame 1: this"]}))
     last_frame()
     assert compute("table.csv", *words, "--resume") == (0, 1)
+    assert read_manifest(Path("table.csv"))["warnings"] == ["frame 1: this"]
     assert is_whole("table.csv", *words)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.base.errors import ScanfabWarning, SettingsError, SkippedFrameWarning
+from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.compute import compute_rows
@@ -107,15 +107,6 @@ def test_frames_that_do_not_exist_are_told_with_how_many_there_are(source):
         scanfab.compute(source(list(packings())), frames="7:9", **SCAN)
 
 
-def test_an_executor_of_threads_gives_the_same_rows(tmp_path):
-    series = series_in(tmp_path)
-    with ThreadPoolExecutor(2) as executor:
-        found = scanfab.compute(series, executor=executor, **SCAN)
-        # it belongs to whoever made it, and goes on
-        assert executor.submit(int, "3").result() == 3
-    assert found == scanfab.compute(series, **SCAN)
-
-
 class FirstIsSlow(ThreadPoolExecutor):
     """Its first job is begun when a second one is done."""
 
@@ -138,6 +129,8 @@ def test_rows_come_in_the_order_of_the_frames_and_before_the_error_of_the_source
         assert [next(rows).frame for _ in range(8)] == [0, 0, 1, 1, 2, 2, 3, 3]
         with pytest.raises(ValueError, match="no more"):
             next(rows)
+        # the executor belongs to whoever made it, and goes on
+        assert executor.submit(int, "3").result() == 3
 
 
 @pytest.fixture(scope="module")
@@ -180,17 +173,6 @@ def test_what_another_process_is_told_is_heard_here(tmp_path, processes):
     for number in (0, 1):
         about = f"frame {number}, variants c, d: no void segment reaches the cut-off 50"
         assert sum(text.startswith(about) for text in texts) == 1
-
-
-def test_a_damaged_frame_stops_or_is_left_out_elsewhere_too(tmp_path, processes):
-    texts = [*map(text_of, packings(3))]
-    texts[1] = texts[1].replace("\n1 1 ", "\n1 1 a ", 1)
-    series = scanfab.read_series(write(tmp_path / "broken.txt", "".join(texts)))
-    with pytest.warns(SkippedFrameWarning, match=r"frame 1 skipped: .*broken\.txt"):
-        table = scanfab.compute(series, executor=processes, on_error="skip", **SCAN)
-    assert [row.frame for row in table] == [0, 0, 2, 2]
-    with pytest.raises(scanfab.ReadError, match=r"broken\.txt"):
-        scanfab.compute(series, executor=processes, **SCAN)
 
 
 def plan_sample(packing):
