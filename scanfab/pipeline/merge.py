@@ -113,8 +113,9 @@ def merged(paths: Sequence[Path], frames: slice) -> Merged:
     if not paths:
         raise SettingsError("expected the parts of a table, found none")
     parts = [_read(path) for path in dict.fromkeys(paths)]
-    first, inputs, counts = parts[0], dict[str, tuple[Mapping[str, Any], Path]](), dict[str, int]()
-    asked = first.manifest["settings"]
+    first, asked = parts[0], parts[0].manifest["settings"]
+    inputs: dict[str, tuple[Mapping[str, Any], Path]] = {}
+    counts: dict[str, int] = {}
     for part in parts:
         if differing := differing_settings(asked, part.manifest["settings"], FREE):
             raise ReadError(f"{part.path}: has other settings ({differing}) than {first.path}")
