@@ -290,12 +290,13 @@ def _objections(
         yield f"it was made with other settings ({differing})"
     if not record.rows:
         return
-    for source in {source for source, _ in record.rows} - {one.name for one in series}:
+    for source in sorted({source for source, _ in record.rows} - {one.name for one in series}):
         yield f"its source {source} is not named now"
     before = {str(one.get("path")): one for one in record.manifest["inputs"]}
     named, cells = named_files(asked), [one.cells.path for one in series if one.cells is not None]
     read = {str(file) for file in (*named, *(file for one in series for file in one.files()))}
-    yield from (f"{gone} is not among the files that are read now" for gone in before.keys() - read)
+    for gone in sorted(before.keys() - read):
+        yield f"{gone} is not among the files that are read now"
     for one in series:
         yield from _changed_frames(one, before, record.rows)
     # new lines may name the strain of a frame that had none
