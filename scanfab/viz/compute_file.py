@@ -95,8 +95,8 @@ def compute_file(
     Warns
     -----
     ScanfabWarning, ScanfabNote
-        Doubts of frames, and frames that were skipped; the manifest lists them, also those that are
-        filtered away.
+        Doubts of frames, and frames that were skipped, when all is done; the manifest lists them,
+        also those that are filtered away.
 
     Examples
     --------
