@@ -50,6 +50,15 @@ def finished_run(*words: str) -> bytes:
     return Path("finished.csv").read_bytes()
 
 
+def is_followed(steps: list, *words: str) -> bool:
+    """Whether a run beside these steps ends with the bytes of a run behind them."""
+    thread = meanwhile(steps)
+    assert follow(*words) == 0
+    thread.join()
+    assert not Path("t.csv.part").exists()
+    return Path("t.csv").read_bytes() == finished_run(*words)
+
+
 @pytest.mark.parametrize("suffix", ["txt", "npz"])
 def test_an_empty_folder_waits_for_frames(folder, finished, suffix):
     files = sorted(finished.iterdir())
@@ -57,11 +66,7 @@ def test_an_empty_folder_waits_for_frames(folder, finished, suffix):
         Path("converted").mkdir()
         assert run(["convert", str(finished), "converted/f_{step}.npz"]) == 0
         files = sorted(Path("converted").iterdir())
-    thread = meanwhile([partial(time.sleep, 0.5), *copied(folder, files)])
-    assert follow() == 0
-    thread.join()
-    assert Path("t.csv").read_bytes() == finished_run()
-    assert not Path("t.csv.part").exists()
+    assert is_followed([partial(time.sleep, 0.5), *copied(folder, files)])
 
 
 def test_grains_wait_for_their_contacts(folder):
@@ -69,11 +74,8 @@ def test_grains_wait_for_their_contacts(folder):
     steps = []
     for grains, contacts in sample_frames()[:3]:
         steps += [*copied(folder, [grains]), partial(time.sleep, 1.4), *copied(folder, [contacts])]
-    thread = meanwhile(steps)
-    assert follow("--boundary", "mask=3") == 0
-    thread.join()
+    assert is_followed(steps, "--boundary", "mask=3")
     data = Path("t.csv").read_bytes()
-    assert data == finished_run("--boundary", "mask=3")
     assert b",file," in data
     assert b",geometric," not in data
 
@@ -81,16 +83,11 @@ def test_grains_wait_for_their_contacts(folder):
 def test_a_folder_with_contact_files_only_waits(folder):
     (folder / "pairs_0.txt").write_text(pairs_text(step=0))
     grains = dump_text(cubic_rows(), step=0).encode()
-    thread = meanwhile(
-        [partial(time.sleep, 0.5), partial(in_halves, grains, folder / "dump_0.txt", 0.1)]
-    )
-    assert follow() == 0
-    thread.join()
-    assert Path("t.csv").read_bytes() == finished_run()
+    write_it = partial(in_halves, grains, folder / "dump_0.txt", 0.1)
+    assert is_followed([partial(time.sleep, 0.5), write_it])
 
 
 def test_one_file_that_grows(folder, finished):
-    texts = [path.read_bytes() for path in sorted(finished.iterdir())]
     growing = folder / "dump.txt"
     growing.write_bytes(b"")
 
@@ -99,13 +96,9 @@ def test_one_file_that_grows(folder, finished):
             stream.write(part)
         time.sleep(0.1)
 
+    texts = [path.read_bytes() for path in sorted(finished.iterdir())]
     halves = [half for text in texts for half in (text[: len(text) // 2], text[len(text) // 2 :])]
-    thread = meanwhile([partial(append, half) for half in halves])
-    words = ["compute", f"dumps/{growing.name}", *FAST]
-    assert run([*words, "--follow-for", "2", "-o", "t.csv"]) == 0
-    thread.join()
-    assert run([*words, "-o", "finished.csv"]) == 0
-    assert Path("t.csv").read_bytes() == Path("finished.csv").read_bytes()
+    assert is_followed([partial(append, half) for half in halves])
 
 
 @pytest.fixture
@@ -236,10 +229,8 @@ def test_frames_cannot_be_counted_from_the_end(folder, frames):
 
 
 def test_it_ends_with_the_last_frame_that_is_asked_for(folder, finished):
-    for path in finished.iterdir():
-        shutil.copy(path, folder)
-    words = ["compute", "dumps", *FAST, "--follow", "--frames", ":2", "-o", "t.csv"]
-    assert run(words) == 0
+    shutil.copytree(finished, folder, dirs_exist_ok=True)
+    assert run(["compute", "dumps", *FAST, "--follow", "--frames", ":2", "-o", "t.csv"]) == 0
     assert Path("t.csv").read_bytes() == finished_run("--frames", ":2")
 
 

@@ -18,7 +18,7 @@ from scanfab.cli.main import run
 from scanfab.pipeline.frame import compute_frame
 from scanfab.pipeline.record import read_manifest
 from scanfab.table.formats import OWN_FORMATS, JsonArray
-from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.dumps import cubic_rows, dump_text, pairs_text, write
 from tests.helpers.interruptions import PROGRAM, interrupted_at_row, write_series
 from tests.helpers.truth import SAMPLE_DATA
 
@@ -387,15 +387,18 @@ def test_other_settings_are_refused_and_named(begun, is_refused, words, named):
 
 
 def test_other_inputs_are_refused(begun, is_refused, dumps):
-    left, second = begun(), dumps / "dump_100.txt"
-    text = second.read_text()
-    second.write_text(text.replace("0.5", "0.49"))
-    assert is_refused(left, "dumps/dump_100.txt has changed since")
-    second.write_text(text)
-    write(dumps / "dump_50.txt", dump_text(cubic_rows(), step=50, box=((0, 4),) * 3))
-    assert is_refused(left, "dumps/dump_50.txt is new, and not behind the last frame")
-    (dumps / "dump_50.txt").unlink()
-    (dumps / "dump_0.txt").unlink()
+    left, first = begun(), dumps / "dump_0.txt"
+    text = first.read_text()
+    for changed in (text.replace("0.5", "0.49"), text + text):
+        first.write_text(changed)
+        assert is_refused(left, "dumps/dump_0.txt has changed since")
+    first.write_text(text)
+    for new in ("dump_50.txt", "pairs_100.txt"):
+        content = dump_text(cubic_rows(), step=50) if new == "dump_50.txt" else pairs_text(step=100)
+        write(dumps / new, content)
+        assert is_refused(left, f"dumps/{new} is new, and not behind the last frame")
+        (dumps / new).unlink()
+    first.unlink()
     assert is_refused(left, "dumps/dump_0.txt is not among the files that are read")
 
 
