@@ -137,7 +137,7 @@ class DaskExecutor(Executor):
         self.client, self.address = client, address
         self._submit: Callable[..., Future[Any]]
         self._submit = client.get_executor(pure=False, retries=RETRIES).submit
-        if not client.nthreads():
+        if not self._threads():
             # a warning, so that --quiet shows it too: nothing else tells why nothing happens
             what = "the scheduler has no workers yet: frames wait for them, without a limit"
             warn(f"{address}: {what}: start some with `dask worker {address}`")
@@ -147,15 +147,18 @@ class DaskExecutor(Executor):
         return self._submit(computed_there, fn, versions_here(), *args, **kwargs)
 
     def room(self) -> int:
+        """How many frames may be under way: one for each thread of the workers, and at least 1."""
+        return max(self._threads(), 1)
+
+    def _threads(self) -> int:
         """
-        How many frames may be under way: one for each thread of the workers, and at least 1.
+        How many threads the workers have now; ClusterError if the scheduler does not say it.
 
         A scheduler that is stopped, or lies behind a network that swallows what is sent, closes no
-        connection: ClusterError if it does not answer this question for a minute.
+        connection: without this question a run would wait for its frames for ever.
         """
         try:
-            threads: dict[str, int] = self.client.nthreads(callback_timeout=SILENCE)
-            return max(sum(threads.values()), 1)
+            return sum(self.client.nthreads(callback_timeout=SILENCE).values())
         except Exception as error:
             raise self.explained(error, "") from None
 
