@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import fields, replace
 from functools import cached_property
+from itertools import count, islice
 from typing import Any
 
 from scanfab.base.errors import SKIPPED, Note, PackingError, ReadError, SettingsError, tell
@@ -41,12 +42,16 @@ class _Stream:
 
     def __iter__(self) -> Iterator[Packing]:
         """Those that are not taken yet; a packing that has come is kept until it is taken."""
-        yield from tuple(self._kept)
-        for packing in self._coming:
-            if not isinstance(packing, Packing):
-                raise SettingsError(f"expected packings, found {packing!r} among them")
-            self._kept.append(packing)
-            yield packing
+        for number in count():
+            if number == len(self._kept):
+                for packing in islice(self._coming, 1):
+                    if not isinstance(packing, Packing):
+                        raise SettingsError(f"expected packings, found {packing!r} among them")
+                    self._kept.append(packing)
+            # whoever goes through them may have started another round meanwhile
+            if number == len(self._kept):
+                return
+            yield self._kept[number]
 
     def __len__(self) -> int:
         return self._taken + sum(1 for _ in self)
@@ -166,7 +171,8 @@ class Frames:
             particles += 0 if sample is None else len(sample.packing)
         if particles:
             named = " or ".join(rule.text for rule in self.settings.boundary)
-            raise SettingsError(f"boundary: {named} selects all particles: no grain is left")
+            what = f"{named} selects all particles of every frame"
+            raise SettingsError(f"boundary: {what}: no grain is left")
         return None
 
     def sample(self, number: int, frame: Unread) -> Sample | None:
