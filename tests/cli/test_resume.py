@@ -119,6 +119,8 @@ def test_an_interrupted_run_is_gone_on_with(compute, stop, last_frame, is_whole,
         "interrupted after 2 of 4 frames; the same command with --resume goes on\n"
     )
     assert not Path(table).exists()
+    with open(f"{table}.part", "ab") as part:
+        part.write(b'{"inputs": [], "rows"')  # killed while it wrote a frame
     assert compute(table, "--resume", "--workers", "1") == (0, 2)
     assert "interrupted" not in capsys.readouterr().err
     assert is_whole(table)
@@ -245,6 +247,13 @@ def test_other_frames_join_those_of_the_table(compute, is_whole, first, then, ev
     assert compute("table.csv", "--resume", f"--frames={then}") == (0, computed)
     assert is_whole("table.csv", f"--frames={every}")
     assert run(["report", "table.csv", "-o", "report.html"]) == 0
+
+
+def test_frames_that_nobody_has_chosen_stay_out(compute, last_frame, is_whole):
+    assert compute("table.csv") == (0, 4)
+    last_frame()
+    assert compute("table.csv", "--resume", "--frames=:1") == (0, 0)
+    assert is_whole("table.csv", "--frames=:4")
 
 
 def test_frames_that_make_no_slice_are_refused(compute, last_frame, capsys):
