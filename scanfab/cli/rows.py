@@ -30,6 +30,7 @@ def write_table(sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Set
     ``kind`` are the settings of the table.
     """
     from scanfab.pipeline.job import Job
+    from scanfab.pipeline.record import asked_for
     from scanfab.viz.paraview import vtk_folders
 
     ctx = click.get_current_context()
@@ -68,10 +69,9 @@ def write_table(sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Set
             job = Job(
                 series,
                 settings,
+                asked_for(sources, reading, settings, excerpt),
                 asked.output,
                 excerpt,
-                sources=sources,
-                reading=reading,
                 resume=resume,
                 manifest_path=asked.manifest,
                 more={"settings_file": listed} if (listed := as_listed(ctx)) else {},

@@ -12,7 +12,8 @@ from scanfab.base.errors import SettingsError
 from scanfab.io.series import Series
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox
-from scanfab.pipeline.repeat import reopen, restored_settings
+from scanfab.pipeline.record import restored_settings
+from scanfab.pipeline.repeat import reopen
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import Length, Vector
 from scanfab.table.row import number_of
