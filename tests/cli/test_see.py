@@ -19,8 +19,7 @@ from scanfab.pipeline.strain import shear_strain
 from scanfab.table.compare import compare_tables
 from scanfab.table.formats import read_rows
 from scanfab.viz.figures.correlation import fits_of
-from scanfab.viz.overlay import add_words
-from scanfab.viz.window3d import check_drawing
+from scanfab.viz.window3d import add_words, check_drawing
 from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.figures import save_rows

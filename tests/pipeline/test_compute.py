@@ -17,7 +17,7 @@ from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.settings import Settings
 from scanfab.table.columns import COLUMNS
 from scanfab.table.formats import OWN_FORMATS
-from scanfab.viz.frame_view import look_at
+from scanfab.viz.scene import look_at
 from tests.helpers.dumps import dump_text, pairs_text, write, yade_spheres
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin"}

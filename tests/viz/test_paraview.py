@@ -11,7 +11,6 @@ from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
 from scanfab.table.columns import COLUMNS
 from scanfab.viz.paraview import VtkFolder
-from scanfab.viz.vtk_files import Collection
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.lattices import shaken_cubic
 
@@ -140,8 +139,7 @@ def test_spheres_of_clumps_have_the_number_of_their_body(tmp_path):
     number = np.where(np.arange(64) < 60, np.arange(64) // 2, -1)
     packing = scanfab.Packing(spheres.position, spheres.radius, bodies=number)
     settings = Settings(variants="c", directions=9, spacing="1rmin", contact_tolerance=0.02)
-    folder = VtkFolder(tmp_path, settings.axis)
-    (row,) = compute_rows(packing, settings, observe=folder)
+    (row,) = compute_rows(packing, settings, observe=VtkFolder(tmp_path))
     grains = pyvista.read(tmp_path / "grains_000000.vtp")
     assert grains["body"].tolist() == number.tolist()
     inside = number[grains["in_window"] == 1]
@@ -181,13 +179,15 @@ def test_contacts_without_a_force_or_without_any(tmp_path):
     assert mesh.n_cells == 0
 
 
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 def test_a_resumed_collection_keeps_its_frames(tmp_path):
-    path = tmp_path / "grains.pvd"
-    Collection(path).add("a.vtp", 0.5)
-    Collection(path, go_on=True).add("b.vtp", 0.25)
-    assert list(Collection(path, go_on=True).entries.values()) == [0.25, 0.5]
-    Collection(path).add("c.vtp", 1.0)
-    assert list(Collection(path, go_on=True).entries) == ["c.vtp"]
+    for step in (3, 7):
+        write(tmp_path / f"dump_{step}.txt", dump_text(cubic_rows(), step=step))
+    series, scan = scanfab.read_series(tmp_path), {"directions": 9, "spacing": "0.5rmin"}
+    for frame, go_on, times in ((1, False, [7.0]), (0, True, [3.0, 7.0]), (1, False, [7.0])):
+        settings = Settings(variants="c", cutoff="0.2rmin", frames=frame, **scan)
+        list(compute_rows(series, settings, observe=VtkFolder(tmp_path, go_on)))
+        assert pyvista.get_reader(tmp_path / "grains.pvd").time_values == times
 
 
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")

@@ -19,10 +19,10 @@ from scanfab.table.row import number_of
 from scanfab.viz.figures.figure import Figure
 from scanfab.viz.figures.page import drawn_page, make_figures
 from scanfab.viz.figures.style import figure_bytes
-from scanfab.viz.frame_view import Look, look_at
 from scanfab.viz.report.inputs import Input
 from scanfab.viz.report.page import Picture, view_data
 from scanfab.viz.scanned_frames import ScannedFrames
+from scanfab.viz.scene import Look, look_at
 
 # CSS pixels an inch, and those of pictures that are pixels
 PIXELS, DPI = 96, 130

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.viz.frame_view import look_at
 from scanfab.viz.report.page import MOST_GRAINS, view_data
-from scanfab.viz.scene import Grains, Scene
+from scanfab.viz.scene import Grains, Scene, look_at
 from tests.helpers.truth import SAMPLE_DATA
 
 
