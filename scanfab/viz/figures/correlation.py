@@ -2,37 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import FigureBase
+from matplotlib.lines import Line2D
 
 from scanfab.base.typing import FloatArray
 from scanfab.table.compare import Comparison, compare_tables
 from scanfab.table.curves import is_turned
 from scanfab.table.row import number_of
 from scanfab.table.table import Table
-from scanfab.viz.figures.curves import ROW
+from scanfab.viz.figures.curves import ROW, Drawn, Group, group_of, groups_of
 from scanfab.viz.figures.figure import Figure
-from scanfab.viz.figures.groups import Drawn, Group, group_of, groups_of
-from scanfab.viz.figures.style import (
-    CONTACT,
-    CONTACT_AXIAL,
-    CONTACT_INTENSITY,
-    CONTACT_UNIT,
-    VOID,
-    VOID_AXIAL,
-    VOID_INTENSITY,
-    VOID_UNIT,
-    WIDTH,
-    widen,
-)
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Page
-    from matplotlib.figure import SubFigure
-
+from scanfab.viz.figures.style import CONTACT, LABELS, VOID, WIDTH, widen
 
 # as the 2017 paper prints them, of spheres and of discs
 PAPER_SLOPE, PAPER_SLOPE_2D = 0.096, 0.231
@@ -40,8 +24,7 @@ PAPER_SLOPE, PAPER_SLOPE_2D = 0.096, 0.231
 LEGEND, ENTRY = 1.0, 0.32
 
 
-@dataclass(frozen=True)
-class Fit:
+class Fit(NamedTuple):
     """The line of one source and variant, as the comparison has it; dimensionless."""
 
     slope: float
@@ -125,36 +108,31 @@ class Correlation(Figure):
 
     def draw(self, ax: Axes) -> None:
         """With the legend in the panel."""
-        handles, labels = self._draw_group(ax, group_of(self.groups))
-        ax.legend(handles, labels, title=self._title)
+        self._draw_group(ax, ax, group_of(self.groups))
 
-    def panels(self, part: Page | SubFigure) -> list[Axes]:
+    def panels(self, part: FigureBase) -> list[Axes]:
         """A panel for each group, beside it the legend, which has the numbers."""
         panels = part.subplots(len(self.groups), 2, squeeze=False, width_ratios=(3, 2))
         for group, (axes, margin) in zip(self.groups, panels, strict=True):
-            handles, labels = self._draw_group(axes, group)
-            axes.set_title(group.title, loc="left")
             margin.set_axis_off()
             place: dict[str, Any] = {"loc": "center left", "borderaxespad": 0, "handlelength": 2.5}
-            margin.legend(handles, labels, title=self._title, **place)
+            self._draw_group(axes, margin, group, **place)
+            axes.set_title(group.title, loc="left")
         return [axes for axes, _ in panels]
 
-    @property
-    def _title(self) -> str:
-        return "intensities" if self.turned else f"slope of {VOID} on {CONTACT}, axial"
-
-    def _draw_group(self, axes: Axes, group: Group) -> tuple[list[Any], list[str]]:
-        """The points and lines of one panel; handles and labels of its legend."""
+    def _draw_group(self, axes: Axes, margin: Axes, group: Group, **place: Any) -> None:
+        """The points and lines of one panel, and its legend in the margin."""
         entries = [self._draw_curve(axes, one) for one in group.drawn]
-        if not self.turned:
-            entries += [*self._draw_paper(axes, group), *_errors_entry(group)]
-        contact, void = CONTACT_AXIAL, VOID_AXIAL
+        title, part = f"slope of {VOID} on {CONTACT}, axial", "_axial"
         if self.turned:
-            contact, void = CONTACT_INTENSITY, VOID_INTENSITY
-        axes.set(xlabel=CONTACT_UNIT + contact, ylabel=VOID_UNIT + void)
+            title, part = "intensities", ""
+        else:
+            entries += [*self._draw_paper(axes, group), *_errors_entry(group)]
+        axes.set(xlabel=LABELS[f"alpha_c{part}"], ylabel=LABELS[f"alpha_vs{part}"])
         axes.axhline(0, color="0.6", lw=0.6, zorder=0)
         widen(axes, 1.0)
-        return [handle for handle, _ in entries], [label for _, label in entries]
+        handles, labels = zip(*entries, strict=True)
+        margin.legend(handles, labels, title=title, **place)
 
     def _draw_curve(self, axes: Axes, one: Drawn) -> tuple[Any, str]:
         """The frames of a curve, with their total errors, and its line."""
@@ -193,8 +171,6 @@ def _bars(error: FloatArray) -> FloatArray | None:
 
 def _errors_entry(group: Group) -> list[tuple[Any, str]]:
     """What the bars are: drawn as a cross, as a line alone would look like the axis."""
-    from matplotlib.lines import Line2D
-
     curves = [one.curve for one in group.drawn]
     void, contact = (
         any(np.isfinite(curve.total_errors(name)).any() for curve in curves)

@@ -1,33 +1,113 @@
-"""Curves over the strain: what the figures evolution, normalised and columns share."""
+"""Curves over the strain, in groups that share a panel: the base of several figures."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import FigureBase
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
+from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray
-from scanfab.table.curves import Curve, abscissa_label
+from scanfab.table.curves import Curve, abscissa_label, curves_of
 from scanfab.table.table import Table
 from scanfab.viz.figures.figure import Figure
-from scanfab.viz.figures.groups import Drawn, group_of, groups_of
-from scanfab.viz.figures.style import band, widen
+from scanfab.viz.figures.style import COLOURS, LOOKS, band, plain, widen
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Page
-    from matplotlib.figure import SubFigure
+Look = dict[str, Any]
 
-
+# of curves that are told apart by their sources, or by the sizes of their RVs
+MANY_LOOKS: tuple[Look, ...] = tuple(
+    {"color": COLOURS[colour], "marker": marker, "ls": line}
+    for colour, marker, line in zip(
+        ("blue", "vermilion", "green", "purple", "orange", "sky", "black"),
+        "o^DsvPX",
+        ("-", "--", "-.", ":", "-", "--", "-."),
+        strict=True,
+    )
+)
+# of as many more, likewise but open
+MANY_LOOKS += tuple(
+    {**look, "ls": line, "mfc": "white", "ms": 5.5}
+    for look, line in zip(MANY_LOOKS, ("--", "-.", ":", "-", "--", "-.", ":"), strict=True)
+)
+OTHER: Look = {"color": "0.3", "marker": "v", "ls": "-"}
+MEANINGS = {"a": "whole", "b": "whole, rattlers void", "c": "RV", "d": "RV, rattlers void"}
 # height of each further row of panels, inches
 ROW = 2.1
 MOST_MARKERS = 25
 
 
-@dataclass(frozen=True)
-class Quantity:
+class Drawn(NamedTuple):
+    """A curve, its place among all of the table, its look and its name in the legend."""
+
+    curve: Curve
+    place: int
+    look: Look
+    name: str
+
+
+class Group(NamedTuple):
+    """The curves of one panel; the title is empty if there is one group alone."""
+
+    title: str
+    drawn: list[Drawn]
+
+
+def groups_of(rows: Sequence[Mapping[str, Any]]) -> list[Group]:
+    """
+    The curves of a table by source, or by variant: whichever makes fewer panels.
+
+    Several curves of several sources in one panel could not be told apart.
+
+    Raises
+    ------
+    SettingsError
+        If the table has nothing to draw.
+    """
+    curves = curves_of(rows)
+    if not any(np.isfinite(curve.values("alpha_vs_axial")).any() for curve in curves):
+        raise SettingsError("there is nothing to draw: no row of the table has a void fabric")
+    sources = list(dict.fromkeys(curve.source for curve in curves))
+    variants = sorted({curve.variant for curve in curves})
+    by_source = len(sources) == 1 or 1 < len(variants) >= len(sources)
+    # several RVs of a variant cannot all have the one look of the variant
+    several_rvs = len({variant[0] for variant in variants}) < len(variants)
+    panels: dict[str, list[Drawn]] = {one: [] for one in (sources if by_source else variants)}
+    for place, curve in enumerate(curves):
+        source, variant = curve.source, curve.variant
+        number = variants.index(variant) if by_source else sources.index(source)
+        look = MANY_LOOKS[number % len(MANY_LOOKS)]
+        if by_source:
+            name = _spelt(variant) if len(sources) == 1 else f"variant {variant}"
+            look = look if several_rvs else LOOKS.get(variant, OTHER)
+        else:
+            name = f"variant {variant}, " * (len(variants) == 1) + plain(source)
+        panels[source if by_source else variant].append(Drawn(curve, place, look, name))
+    titles = {one: plain(one) if by_source else _spelt(one) for one in panels}
+    return [Group(titles[one] * (len(panels) > 1), drawn) for one, drawn in panels.items()]
+
+
+def group_of(groups: Sequence[Group]) -> Group:
+    """The only group; SettingsError if there are several, which one Axes cannot hold."""
+    if len(groups) > 1:
+        raise SettingsError(
+            "several variants of several sources are too many for one Axes: choose some, "
+            'for instance by table.select(variant="c")'
+        )
+    return groups[0]
+
+
+def _spelt(variant: str) -> str:
+    meaning = MEANINGS.get(variant)
+    return f"variant {variant}" if meaning is None else f"variant {variant}: {meaning}"
+
+
+class Quantity(NamedTuple):
     """What a panel shows: a column of the table, and how its axis is made."""
 
     column: str
@@ -52,7 +132,7 @@ class Curves(Figure):
     """
     Quantities of a table over the strain, or over the frames.
 
-    Each group of curves (:func:`scanfab.viz.figures.groups.grouped`) has a panel for each
+    Each group of curves (:func:`groups_of`) has a panel for each
     quantity. One Axes holds one group and its first quantity.
     """
 
@@ -93,7 +173,7 @@ class Curves(Figure):
             ax.plot([], [], label=name, **look)
         ax.legend()
 
-    def panels(self, part: Page | SubFigure) -> list[Axes]:
+    def panels(self, part: FigureBase) -> list[Axes]:
         """Some rows of panels for each group, and the legend above, so that it covers no data."""
         across = min(self.across, len(self.quantities))
         shape, one_row = (self.rows * len(self.groups), across), self.rows == 1
@@ -110,7 +190,10 @@ class Curves(Figure):
         for axes in found[-across:]:
             self._set_abscissa(axes)
             axes.xaxis.set_tick_params(labelbottom=True)
-        self._legend_above(part)
+        handles = [Line2D([], [], **look) for look in self.looks.values()]
+        columns = 2 if max(map(len, self.looks)) > 12 else 4
+        above: dict[str, Any] = {"loc": "outside upper center", "title": self.note or None}
+        part.legend(handles, list(self.looks), ncols=min(len(handles), columns), **above)
         return found
 
     def _draw_panel(self, axes: Axes, drawn: Sequence[Drawn], quantity: Quantity) -> None:
@@ -134,8 +217,6 @@ class Curves(Figure):
 
     def _set_abscissa(self, axes: Axes) -> None:
         """Label and scale of what the curves are drawn over."""
-        from matplotlib.ticker import MaxNLocator
-
         label = abscissa_label(self.data)
         axes.set_xlabel(label)
         places = np.concatenate([curve.x for curve in self.curves])
@@ -145,13 +226,3 @@ class Curves(Figure):
             axes.set_xlim(known[0] - 1, known[0] + 1)
         if label == "frame":
             axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-
-    def _legend_above(self, part: Page | SubFigure) -> None:
-        from matplotlib.lines import Line2D
-
-        handles: list[Any] = [Line2D([], [], **look) for look in self.looks.values()]
-        columns = 2 if max(map(len, self.looks)) > 12 else 4
-        part.legend(
-            handles, list(self.looks), loc="outside upper center",
-            ncols=min(len(handles), columns), title=self.note or None,
-        )  # fmt: skip

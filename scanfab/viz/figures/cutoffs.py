@@ -2,36 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from scanfab.base.typing import FloatArray
 from scanfab.table.row import column_of, total_error
 from scanfab.viz.figures.figure import OnePanel
-from scanfab.viz.figures.style import (
-    COLUMN,
-    FRAME_LOOKS,
-    VOID_AXIAL,
-    VOID_UNIT,
-    band,
-    widen,
-)
+from scanfab.viz.figures.style import COLUMN, FRAME_LOOKS, LABELS, band, widen
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from scanfab.viz.scanned_frames import ScannedFrame
-
 
 # in smallest radii
 CUTOFFS = (0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0)
 
 
-@dataclass(frozen=True, eq=False)
-class CutoffCurve:
+class CutoffCurve(NamedTuple):
     """One frame: anisotropy over the cut-off, which is in units of the smallest radius."""
 
     title: str
@@ -68,16 +57,12 @@ class Cutoffs(OnePanel):
 
     order = 7
     slow = True
+    size = (COLUMN, 3.4)
 
     @cached_property
     def curves(self) -> list[CutoffCurve]:
         """What is drawn of each frame."""
         return [_curve_of(one) for one in self.chosen(self.data.with_lines_of_table)]
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """Of one panel, with the legend above it."""
-        return COLUMN, 3.4
 
     @property
     def caption(self) -> str:
@@ -105,7 +90,7 @@ class Cutoffs(OnePanel):
             ax.plot([], [], color="0.3", lw=1.2, ls="-.", label="predicted from near contacts")
         ax.axvline(self.curves[-1].chosen, color="k", lw=0.9, ls=":", label="cut-off of the table")
         ax.axhline(0, color="0.6", lw=0.6, zorder=0)
-        ax.set(xlabel=r"cut-off / $r_{min}$", ylabel=VOID_UNIT + VOID_AXIAL)
+        ax.set(xlabel=r"cut-off / $r_{min}$", ylabel=LABELS["alpha_vs_axial"])
         widen(ax, 1.0)
 
 
@@ -117,18 +102,15 @@ def _curve_of(frame: ScannedFrame) -> CutoffCurve:
 
     smallest, chosen = frame.smallest, frame.measurement.plan.cutoff
     lengths = {*(cutoff * smallest for cutoff in CUTOFFS), chosen}
-    measured = frame.measurement.at_cutoffs(lengths)
-    each = [
-        VariantColumns(measured, VARIANTS[frame.variant], place) for place in range(len(lengths))
-    ]
+    measured, variant = frame.measurement.at_cutoffs(lengths), VARIANTS[frame.variant]
+    each = [VariantColumns(measured, variant, place) for place in range(len(lengths))]
     rows = [{**one.columns(), "predicted": one.predicted_alpha} for one in each]
-    totals = [{"total": total_error(row, "alpha_vs_axial")} for row in rows]
     return CutoffCurve(
         frame.title,
         cutoff=column_of(rows, "cutoff") / smallest,
         alpha=column_of(rows, "alpha_vs_axial"),
         error=column_of(rows, "alpha_vs_axial_se"),
-        total=column_of(totals, "total"),
+        total=np.array([total_error(row, "alpha_vs_axial") for row in rows], np.float64),
         chosen=chosen / smallest,
         predicted=column_of(rows, "predicted"),
     )

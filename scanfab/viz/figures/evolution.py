@@ -10,36 +10,9 @@ from scanfab.table.curves import abscissa_words, is_turned
 from scanfab.table.table import Table
 from scanfab.viz.figures.curves import ROW, Curves, Quantity
 from scanfab.viz.figures.figure import one_of
-from scanfab.viz.figures.style import (
-    CONTACT,
-    CONTACT_AXIAL,
-    CONTACT_INTENSITY,
-    CONTACT_UNIT,
-    VOID,
-    VOID_AXIAL,
-    VOID_INTENSITY,
-    VOID_UNIT,
-    WIDTH,
-)
+from scanfab.viz.figures.style import CONTACT, LABELS, NAMES, VOID, WIDTH
 
-AXIAL = {
-    "voids": Quantity("alpha_vs_axial", VOID_UNIT + VOID_AXIAL, 1e3, "total", bars=True),
-    "contacts": Quantity("alpha_c_axial", CONTACT_UNIT + CONTACT_AXIAL, 1e2, "total"),
-}
-# where the principal axes are not the loading axis
-TURNED = {
-    "voids": Quantity("alpha_vs", VOID_UNIT + VOID_INTENSITY, 1e3),
-    "contacts": Quantity("alpha_c", CONTACT_UNIT + CONTACT_INTENSITY, 1e2),
-}
 ANGLE = Quantity("coaxiality_deg", "coaxiality, degrees")
-NORMALISED = {
-    "voids": Quantity("alpha_vs_axial", f"{VOID_AXIAL} / largest", errors="total"),
-    "contacts": Quantity("alpha_c_axial", f"{CONTACT_AXIAL} / largest", errors="total"),
-}
-NORMALISED_TURNED = {
-    "voids": Quantity("alpha_vs", f"{VOID_INTENSITY} / largest"),
-    "contacts": Quantity("alpha_c", f"{CONTACT_INTENSITY} / largest"),
-}
 
 
 class Evolution(Curves):
@@ -83,10 +56,19 @@ class Evolution(Curves):
     def __init__(self, data: Table, of: str | None = None) -> None:
         self.turned = is_turned(data)
         self.of = one_of(of, ("voids", "contacts"))
-        every = (AXIAL, TURNED, NORMALISED, NORMALISED_TURNED)[2 * self.share + self.turned]
-        chosen = [every[one] for one in self.of]
+        chosen = [self._quantity(name) for name in self.of]
         self.has_angle = self.turned and not self.share and of is None
         super().__init__(data, [*chosen, ANGLE] if self.has_angle else chosen)
+
+    def _quantity(self, name: str) -> Quantity:
+        """Along the loading axis; where the principal axes are turned, the intensity."""
+        voids = name == "voids"
+        column = ("alpha_vs" if voids else "alpha_c") + ("" if self.turned else "_axial")
+        label, factor = LABELS[column], 1e3 if voids else 1e2
+        if self.share:
+            label, factor = f"{NAMES[column]} / largest", 1.0
+        bars = voids and not self.turned and not self.share
+        return Quantity(column, label, factor, "" if self.turned else "total", bars)
 
     @property
     def size(self) -> tuple[float, float]:

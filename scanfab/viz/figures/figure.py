@@ -9,8 +9,7 @@ from scanfab.viz.figures.style import COLUMN, STYLE, letter
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Page
-    from matplotlib.figure import SubFigure
+    from matplotlib.figure import FigureBase
 
     from scanfab.viz.scanned_frames import ScannedFrame, ScannedFrames
 
@@ -86,7 +85,7 @@ class Figure:
         """Draw on one Axes; of several panels the one that says most, or that is chosen."""
         raise NotImplementedError
 
-    def panels(self, part: Page | SubFigure) -> list[Axes]:
+    def panels(self, part: FigureBase) -> list[Axes]:
         """Draw on an empty Figure or SubFigure; the panels, to be lettered before their titles."""
         axes = part.subplots(subplot_kw={"projection": self.projection})
         self.draw(axes)
@@ -172,7 +171,7 @@ class OnePanel(FrameFigure):
         self.paint(ax)
         ax.legend(title=self.note or None)
 
-    def panels(self, part: Page | SubFigure) -> list[Axes]:
+    def panels(self, part: FigureBase) -> list[Axes]:
         """One panel, with the legend above it."""
         axes = part.subplots()
         self.paint(axes)

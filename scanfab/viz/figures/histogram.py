@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.distribution import direction_points
@@ -14,16 +14,12 @@ from scanfab.viz.figures.figure import OnePanel
 from scanfab.viz.figures.style import COLUMN, FRAME_LOOKS
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from scanfab.viz.scanned_frames import ScannedFrame
-
 
 LINES = 6_000
 
 
-@dataclass(frozen=True, eq=False)
-class LengthSample:
+class LengthSample(NamedTuple):
     """One frame: void segments, in units of the smallest radius."""
 
     title: str
@@ -49,16 +45,12 @@ class Histogram(OnePanel):
     """
 
     order = 6
+    size = (COLUMN, 3.2)
 
     @cached_property
     def samples(self) -> list[LengthSample]:
         """What is drawn of each frame."""
         return [_lengths_of(one) for one in self.chosen(self.data.frames)]
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """Of one panel, with the legend above it."""
-        return COLUMN, 3.2
 
     @property
     def caption(self) -> str:
@@ -90,10 +82,10 @@ def _lengths_of(frame: ScannedFrame) -> LengthSample:
     from scanfab.scan.lines import line_triads
     from scanfab.scan.segments import sample_segments
 
-    position, radius, window = frame.spheres
     points, _ = direction_points(frame.space)
     some = points[: len(points) // 2 : 5 if frame.space.is_plane else 20]
     triads = line_triads(some, frame.space)
+    position, radius, window = frame.spheres
     found = sample_segments(position, radius, triads, LINES, window, frame.space)
     length, cutoff = found.length[found.void], frame.measurement.plan.cutoff
     return LengthSample(frame.title, length / frame.smallest, cutoff / frame.smallest)

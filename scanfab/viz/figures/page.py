@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.files import whole_file
 from scanfab.table.plots import figures_of
 from scanfab.table.table import Table
 from scanfab.viz.figures.figure import Figure
-from scanfab.viz.figures.style import DPI, check_plot_file, letter, new_figure, save_figure
+from scanfab.viz.figures.style import DPI, check_plot_file, figure_bytes, letter, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Page
@@ -117,8 +118,11 @@ def save_figures(path: Path, figures: Sequence[Figure], dpi: int = DPI) -> None:
         If the file's name ends otherwise.
     """
     check_plot_file(path)
+    # in memory first: where the disk is full, the writer of PDF fails with an error of another kind
     with drawn_page(figures) as page:
-        save_figure(page, path, dpi)
+        drawn = figure_bytes(page, path.suffix.lower().lstrip("."), dpi)
+    with whole_file(path) as part:
+        part.write_bytes(drawn)
 
 
 @contextmanager

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import FigureBase
+from matplotlib.lines import Line2D
 
 from scanfab.base.errors import SettingsError
-from scanfab.base.space import Space
+from scanfab.base.space import SPACE, Space
+from scanfab.base.typing import FloatArray
+from scanfab.fabric.contact import contact_fabric
+from scanfab.fabric.invariants import fabric_deviator
 from scanfab.viz.figures.figure import FrameFigure, one_of
-from scanfab.viz.figures.rings import Ring, Rings, rings_of
 from scanfab.viz.figures.style import COLOURS, DIRECTIONAL, WIDTH, rounded_down
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Page
-    from matplotlib.figure import SubFigure
+    from scanfab.viz.scanned_frames import ScannedFrame, ScannedFrames
 
-    from scanfab.viz.scanned_frames import ScannedFrames
-
-
+REPLICATES = 16
+# segments for each direction: mean lengths to about half a per cent
+SEGMENTS = 20_000
+# between azimuths of void lengths, and of the sectors that contacts are counted in, degrees
+THETA_STEP = 15.0
+CONTACT_STEP = 30.0
 POLAR_ANGLES = (90.0, 60.0, 30.0)
 EQUATOR = (90.0,)
 LOOKS: tuple[dict[str, Any], ...] = (
@@ -37,6 +43,28 @@ MOST_COLUMNS = 3
 AROUND = np.linspace(0, 360, 181)
 # whose errors the bars of a panel are
 BARS = {"voids": "of the scan", "contacts": "of a count of contacts"}
+
+
+@dataclass(frozen=True, eq=False)
+class Ring:
+    """Values around one polar angle, relative to the mean over all directions."""
+
+    phi: float
+    """Polar angle, degrees."""
+    theta: FloatArray
+    """Azimuths, degrees."""
+    value: FloatArray
+    error: FloatArray
+    """Standard error."""
+    curve: Callable[[FloatArray], FloatArray] | None = None
+    """A smooth curve beside them: value at azimuths in degrees."""
+
+    @property
+    def reach(self) -> float:
+        """How far the values, with their errors, and the curve are from 1; at least 0.02."""
+        far = np.abs(self.value - 1.0) + np.nan_to_num(self.error)
+        curve = np.ones(1) if self.curve is None else self.curve(AROUND)
+        return max(0.02, float(np.nanmax(far, initial=0.0)), float(np.abs(curve - 1.0).max()))
 
 
 class Rose(FrameFigure):
@@ -93,30 +121,41 @@ class Rose(FrameFigure):
     @classmethod
     def parse(cls, argument: str) -> dict[str, Any]:
         """Polar angles such as ``30,60,90``."""
-        words = argument.split(",")
-        are_numbers = all(re.fullmatch(r"\d+(\.\d+)?", word) for word in words)
-        angles = [float(word) for word in words] if are_numbers else []
+        try:
+            angles = [float(word) for word in argument.split(",")]
+        except ValueError:
+            angles = []
         example = f"rose:30,60,90, found {f'rose:{argument}'!r}"
         return {"angles": _checked_angles(angles, "figure", example)}
 
     @cached_property
-    def rings(self) -> list[Rings]:
-        """What is drawn of each frame."""
-        found = []
-        for frame in self.chosen(self.data.frames):
-            if frame.space.is_plane and self.angles not in (POLAR_ANGLES, EQUATOR):
-                angles = ",".join(f"{one:g}" for one in self.angles)
+    def frames(self) -> list[ScannedFrame]:
+        """The frames that are drawn."""
+        return self.chosen(self.data.frames)
+
+    @cached_property
+    def rings(self) -> dict[str, list[list[Ring]]]:
+        """The rings of each frame: of ``voids``, and of ``contacts``."""
+        angles, found = self.angles, self.frames
+        if self.space.is_plane:
+            if angles not in (POLAR_ANGLES, EQUATOR):
                 raise SettingsError(
-                    f"figure: discs in {frame.space} have no polar angles, found {angles}: choose "
-                    f"`figure=rose`"
+                    f"figure: discs in {self.space} have no polar angles, found "
+                    f"{','.join(f'{one:g}' for one in angles)}: choose `figure=rose`"
                 )
-            found.append(rings_of(frame, EQUATOR if frame.space.is_plane else self.angles))
-        return found
+            angles = EQUATOR
+        return {
+            "voids": [void_rings(one, angles) for one in found],
+            "contacts": [
+                [contact_ring(one.normals, phi, one.space) for phi in angles if len(one.normals)]
+                for one in found
+            ],
+        }
 
     @property
     def space(self) -> Space:
         """The plane of the frames, if their grains are discs."""
-        return self.rings[0].space
+        return self.frames[0].space
 
     @property
     def looks(self) -> dict[float, dict[str, Any]]:
@@ -130,7 +169,7 @@ class Rose(FrameFigure):
     def size(self) -> tuple[float, float]:
         """A row for each frame, and the legend."""
         entries = -(-len(self.looks) // MOST_COLUMNS)
-        return WIDTH, 3.0 * len(self.rings) + 0.7 + 0.2 * entries
+        return WIDTH, 3.0 * len(self.frames) + 0.7 + 0.2 * entries
 
     @property
     def caption(self) -> str:
@@ -142,39 +181,36 @@ class Rose(FrameFigure):
 
     def draw(self, ax: Axes) -> None:
         """Of the last frame, unless another one is asked for."""
-        reach = self._draw_column([ax], self.rings[-1:], self.of[0], "center")
+        reach = self._draw_column([ax], self.of[0], "center")
         handles, labels = self._entries()
         below: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.08)}
         ax.legend(handles, labels, title=self._note({self.of[0]: reach}), **below)
 
-    def panels(self, part: Page | SubFigure) -> list[Axes]:
+    def panels(self, part: FigureBase) -> list[Axes]:
         """A row for each frame, a column for each of both, and the legend below."""
-        shape, polar = (len(self.rings), len(self.of)), {"projection": "polar"}
+        shape, polar = (len(self.frames), len(self.of)), {"projection": "polar"}
         panels = part.subplots(*shape, squeeze=False, subplot_kw=polar)
         reaches = {
-            kind: self._draw_column(column, self.rings, kind, "left")
+            kind: self._draw_column(column, kind, "left")
             for kind, column in zip(self.of, panels.T, strict=True)
         }
         handles, labels = self._entries()
         columns, note = min(len(labels), MOST_COLUMNS), self._note(reaches)
         part.legend(handles, labels, ncols=columns, title=note, loc="outside lower center")
-        found: list[Axes] = panels.ravel().tolist()
-        return found
+        return list(panels.ravel())
 
-    def _draw_column(
-        self, column: Sequence[Axes], frames: Sequence[Rings], kind: str, loc: Any
-    ) -> float:
-        """Panels with one scale; how far it reaches from 1."""
-        reach = max((_reach(ring) for one in frames for ring in getattr(one, kind)), default=0.02)
-        for axes, one in zip(column, frames, strict=True):
-            _draw_rings(axes, getattr(one, kind), reach, self.looks)
-            axes.set_title(f"{DIRECTIONAL[kind]}\n{one.title}", loc=loc)
+    def _draw_column(self, column: Sequence[Axes], kind: str, loc: Any) -> float:
+        """Panels of the last frames with one scale; how far it reaches from 1."""
+        frames = self.frames[-len(column) :]
+        every = self.rings[kind][-len(column) :]
+        reach = max((ring.reach for rings in every for ring in rings), default=0.02)
+        for axes, frame, rings in zip(column, frames, every, strict=True):
+            _draw_rings(axes, rings, reach, self.looks)
+            axes.set_title(f"{DIRECTIONAL[kind]}\n{frame.title}", loc=loc)
         return reach
 
     def _entries(self) -> tuple[list[Any], list[str]]:
         """Handles and labels of the legend."""
-        from matplotlib.lines import Line2D
-
         handles = [Line2D([], [], **look) for look in self.looks.values()]
         if self.space.is_plane:
             return handles, [f"in {self.space}"]
@@ -210,13 +246,6 @@ def _checked_angles(angles: Sequence[float], where: str, example: str) -> tuple[
     return tuple(angles)
 
 
-def _reach(ring: Ring) -> float:
-    """How far the values, with their errors, and the curve are from 1; at least 0.02."""
-    far = np.abs(ring.value - 1.0) + np.nan_to_num(ring.error)
-    curve = np.ones(1) if ring.curve is None else ring.curve(AROUND)
-    return max(0.02, float(np.nanmax(far, initial=0.0)), float(np.abs(curve - 1.0).max()))
-
-
 def _draw_rings(
     axes: Axes, rings: Sequence[Ring], reach: float, looks: Mapping[float, dict[str, Any]]
 ) -> None:
@@ -245,3 +274,94 @@ def _scale(reach: float) -> tuple[float, list[float]]:
     """The value in the middle of a rose, and those of its circles."""
     middle, step = max(0.0, 1.0 - 2.0 * reach), rounded_down(reach)
     return middle, [one for one in (1.0 - step, 1.0, 1.0 + step) if one > middle]
+
+
+def void_rings(frame: ScannedFrame, angles: Sequence[float]) -> list[Ring]:
+    """Mean void lengths of a frame, at some polar angles in degrees."""
+    # at the equator θ and θ + 180° are one line
+    rings = {phi: np.arange(0.0, 180.0 if phi == 90 else 360.0, THETA_STEP) for phi in angles}
+    axes = np.concatenate([_vectors(theta, phi, frame.space) for phi, theta in rings.items()])
+    value, error = _mean_lengths(frame, axes)
+    ends, found = np.cumsum([len(theta) for theta in rings.values()])[:-1], []
+    parts = zip(rings.items(), np.split(value, ends), np.split(error, ends), strict=True)
+    for (phi, theta), own, own_error in parts:
+        if phi == 90:
+            theta = np.concatenate([theta, theta + 180.0])
+            own, own_error = np.tile(own, 2), np.tile(own_error, 2)
+        found.append(Ring(phi, theta, own, own_error))
+    return found
+
+
+def _vectors(theta: FloatArray, phi: float, space: Space) -> FloatArray:
+    azimuth, polar = np.radians(theta), np.radians(phi)
+    if space.is_plane:
+        return np.column_stack([np.cos(azimuth), np.sin(azimuth)]) @ np.eye(3)[sorted(space.along)]
+    flat = np.sin(polar)
+    return np.column_stack(
+        [flat * np.cos(azimuth), flat * np.sin(azimuth), np.full(len(theta), np.cos(polar))]
+    )
+
+
+def _mean_lengths(frame: ScannedFrame, axes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """ℓ of each axis over the mean of all directions, and its standard error, shape (D,)."""
+    # compiled kernels, which those who draw something else do without
+    from scanfab.scan.directions import DirectionRule
+    from scanfab.scan.gaps import scan_gaps
+
+    measured, variant, plan = frame.measurement, frame.variant, frame.measurement.plan
+    # as many lines as give the wanted number of segments
+    found = measured.sums.kept(variant)[1].mean()
+    spacing = plan.spacing * plan.space.apart(found * REPLICATES / SEGMENTS)
+    weights = np.full(len(axes), 1 / len(axes))
+    rose = scan_gaps(
+        measured.solids,
+        DirectionRule("rose", axes, weights, None, turned=False, space=plan.space),
+        spacing=float(spacing),
+        cutoffs=[plan.cutoff],
+        blocks=measured.blocks,
+        variants=variant,
+        replicates=range(REPLICATES),
+        seed=plan.seed,
+        workers=plan.workers,
+        most_steps=plan.max_chords,
+    )
+    sums_of, numbers = rose.kept(variant, 0, plan.moment)
+    length, segments = measured.kept(variant)
+    mean = length.sum() / segments.sum()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        value = sums_of.sum(axis=0) / numbers.sum(axis=0) / mean
+        scatter = np.nanstd(sums_of / numbers, axis=0, ddof=1) / mean
+    return value, scatter / np.sqrt(REPLICATES)
+
+
+def contact_ring(normals: FloatArray, phi: float, space: Space = SPACE) -> Ring:
+    """
+    Contact normals near a polar angle by azimuth, over what isotropy would give.
+
+    The curve beside them is the second-order density of the contact fabric, after Kanatani (1984).
+    """
+    both = np.concatenate([normals, -normals])
+    # the share of all directions that is counted
+    share = 1.0
+    # angles of a plane are counted from the first of its coordinates
+    first, second = sorted(space.along)[:2]
+    if not space.is_plane:
+        polar = np.degrees(np.arccos(np.clip(both[:, 2], -1, 1)))
+        low, high = max(phi - 15.0, 0.0), phi + 15.0
+        both = both[(polar >= low) & (polar < high)]
+        share = 0.5 * (np.cos(np.radians(low)) - np.cos(np.radians(high)))
+    azimuth = np.degrees(np.arctan2(both[:, second], both[:, first])) % 360.0
+    edges = np.arange(0.0, 361.0, CONTACT_STEP)
+    count, _ = np.histogram(azimuth, edges)
+    expected = 2 * len(normals) * share * CONTACT_STEP / 360.0
+    tensor = contact_fabric(normals, space)
+    assert tensor is not None
+    deviator = fabric_deviator(tensor.matrix, space)
+
+    def density(theta: FloatArray) -> FloatArray:
+        directions = _vectors(theta, phi, space)
+        values: FloatArray = 1 + np.einsum("ni,ij,nj->n", directions, deviator, directions)
+        return values
+
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    return Ring(phi, middle, count / expected, np.sqrt(count) / expected, density)
