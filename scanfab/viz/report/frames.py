@@ -2,38 +2,42 @@
 
 from __future__ import annotations
 
-import base64
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, NamedTuple
 
 from scanfab.base.errors import SettingsError
 from scanfab.io.series import Series
+from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox
 from scanfab.pipeline.repeat import reopen, restored_settings
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.values import Length, Vector
-from scanfab.table.row import number_of
-from scanfab.viz.figures.figure import Figure
-from scanfab.viz.figures.page import drawn_page, make_figures
-from scanfab.viz.figures.style import figure_bytes
-from scanfab.viz.report.inputs import Input
-from scanfab.viz.report.page import Picture, view_data
+from scanfab.pipeline.values import Length
+from scanfab.table.curves import spelt_strain, strain_column
+from scanfab.table.row import numbers_of
+from scanfab.viz.figures.page import make_figures
+from scanfab.viz.report.page import Picture, picture_of, view_data
 from scanfab.viz.scanned_frames import ScannedFrames
 from scanfab.viz.scene import Look, look_at
 
-# CSS pixels an inch, and those of pictures that are pixels
-PIXELS, DPI = 96, 130
-KINDS = {"svg": "image/svg+xml", "png": "image/png"}
 # segments of a scan that takes about half a minute: pictures that would need more are rougher
 MOST_SEGMENTS = 3e8
 
 
+class Input(NamedTuple):
+    """One table, its rows, and the manifest beside it."""
+
+    path: Path
+    rows: list[dict[str, Any]]
+    manifest: dict[str, Any] | None
+    cutoff: float | None
+    """The cut-off whose rows were chosen from several."""
+
+
 def show_frames(one: Input) -> dict[str, Any]:
     """
-    Read the source of a table again: its view, the sample in numbers, and pictures.
+    Read the first source of a table again: its view, the sample in numbers, and pictures.
 
     Raises
     ------
@@ -41,79 +45,64 @@ def show_frames(one: Input) -> dict[str, Any]:
         If it has changed, or cannot be read again.
     """
     manifest = one.manifest or {}
-    _check_inputs(manifest)
+    for file in manifest.get("inputs") or []:
+        path = Path(str(file.get("path")))
+        if path.exists() and path.stat().st_size != file.get("size"):
+            raise SettingsError(f"{path} has changed since the table was computed")
     asked = manifest["settings"]
     series, settings = reopen(asked), restored_settings(asked)
     if settings.cutoffs:
         # the one whose rows are reported
         cutoff = settings.cutoff if one.cutoff is None else Length(one.cutoff)
         settings = replace(settings, cutoffs=(), cutoff=cutoff)
-    look = look_at(series, replace(settings, variants="c"), one.last_frame)
+    source = str(one.rows[0]["source"])
+    rows = [row for row in one.rows if row["source"] == one.rows[0]["source"]]
+    filled = [row for row in rows if row["alpha_vs_axial"] is not None]
+    number = int(max(numbers_of(filled or rows, "frame"), default=0))
+    look = look_at(series, replace(settings, variants="c"), number)
+    of_frame = [row for row in rows if row["frame"] == look.number]
+    strain = spelt_strain(of_frame[0], strain_column(rows)) if of_frame else ""
     return {
         "view": view_data(look.scene, look.axis),
-        "view_title": _title(one, look.number),
-        "facts": _facts(look, settings),
-        "pictures": _pictures(one, series, settings),
+        "view_title": ", ".join(filter(None, [source, f"frame {look.number}", strain])),
+        "facts": _facts(look),
+        "pictures": _pictures(rows, series, settings) if filled else [],
     }
 
 
-def picture_of(figure: Figure, kind: Literal["svg", "png"]) -> Picture:
-    """A figure with its caption, as lines or as pixels."""
-    with drawn_page([figure]) as page:
-        data = figure_bytes(page, kind, DPI)
-    url = f"data:{KINDS[kind]};base64,{base64.b64encode(data).decode('ascii')}"
-    return Picture(url, figure.caption, round(PIXELS * figure.size[0]))
-
-
-def _check_inputs(manifest: Mapping[str, Any]) -> None:
-    """An error if a file has another size than when it was computed."""
-    for one in manifest.get("inputs") or []:
-        path = Path(str(one.get("path")))
-        if path.exists() and path.stat().st_size != one.get("size"):
-            raise SettingsError(f"{path} has changed since the table was computed")
-
-
-def _title(one: Input, frame: int) -> str:
-    source = str(one.rows[0]["source"])
-    return ", ".join(filter(None, [source, f"frame {frame}", one.strain_of(frame)]))
-
-
-def _facts(look: Look, settings: Settings) -> list[tuple[str, str]]:
+def _facts(look: Look) -> list[tuple[str, str]]:
     """The sample in numbers."""
     first, plan = look.first, look.plan
     if first is None:
         return []
     radii, boundary = first.packing.radius[first.grains], first.number(first.boundary)
     smallest = float(radii.min())
+    axis = [name for name, part in zip("xyz", look.axis, strict=True) if part == 1.0]
     facts = [
         ("grains", f"{first.number(first.grains)} in the first frame that has grains"),
         ("radii", f"smallest {smallest:.4g}, mean {radii.mean():.4g}, largest {radii.max():.4g}"),
         ("boundary", f"{boundary} particles" if boundary else "none"),
-        ("cell", _cell(look)),
-        ("loading axis", _axis(look.axis)),
+        ("cell", _cell(look.sample.packing.cell)),
+        ("loading axis", axis[0] if axis else _numbers(look.axis)),
     ]
     if plan is None:
         return facts
     facts.append(("cut-off", f"{plan.cutoff:.4g}, {plan.cutoff / smallest:.3g} smallest radii"))
     if plan.window is not None:
-        facts.append(("centre of the RV", ", ".join(f"{one:.4g}" for one in plan.window.center)))
+        facts.append(("centre of the RV", _numbers(plan.window.center)))
     for window in plan.windows:
         radius = window.radius
         if not window.shape.is_sphere:
             facts.append(("shape of the RV", str(window.shape)))
             continue
-        size = f"{radius:.4g}, {_part_of_sample(first, look, radius)}"
+        part, now = _fraction(first, radius), ""
+        # beside the sample that the RV was chosen for, and beside what became of that since
+        if look.sample.gathered.any() and _fraction(look.sample, radius) != part:
+            now = f" in the first frame that has grains, {_fraction(look.sample, radius)} in frame "
+            now += str(look.number)
+        size = f"{radius:.4g}, {part} of half the sample's smallest extent{now}"
         facts.append(("radius of the RV", f"{size}, {radius / radii.mean():.3g} mean radii"))
     return facts
-
-
-def _part_of_sample(first: Sample, look: Look, radius: float) -> str:
-    """The RV beside the sample that it was chosen for, and beside what became of that since."""
-    then = f"{_fraction(first, radius)} of half the sample's smallest extent"
-    if not look.sample.gathered.any() or _fraction(look.sample, radius) == _fraction(first, radius):
-        return then
-    now = f"{_fraction(look.sample, radius)} in frame {look.number}"
-    return f"{then} in the first frame that has grains, {now}"
 
 
 def _fraction(sample: Sample, radius: float) -> str:
@@ -121,40 +110,30 @@ def _fraction(sample: Sample, radius: float) -> str:
     return f"{2 * radius / extent:.3g}"
 
 
-def _cell(look: Look) -> str:
-    cell = look.sample.packing.cell
-    if cell is None or not look.sample.packing.is_periodic:
+def _cell(cell: Cell | None) -> str:
+    if cell is None or not any(cell.periodic):
         return "not periodic"
     along = "".join(name for name, repeats in zip("xyz", cell.periodic, strict=True) if repeats)
-    vectors = "; ".join(", ".join(f"{part:.4g}" for part in row) for row in cell.vectors)
-    return f"periodic along {along}, vectors ({vectors})"
+    return f"periodic along {along}, vectors ({'; '.join(map(_numbers, cell.vectors))})"
 
 
-def _axis(axis: Vector) -> str:
-    named = [name for name, part in zip("xyz", axis, strict=True) if part == 1.0]
-    return named[0] if named else ", ".join(f"{part:.4g}" for part in axis)
+def _numbers(vector: Any) -> str:
+    return ", ".join(f"{part:.4g}" for part in vector)
 
 
-def _pictures(one: Input, series: Series, settings: Settings) -> list[Picture]:
+def _pictures(rows: list[dict[str, Any]], series: Series, settings: Settings) -> list[Picture]:
     """Of the first and the last frame, all from one scan."""
-    rows = one.first_series
-    if all(row["alpha_vs_axial"] is None for row in rows):
-        return []
-    drawn = replace(settings, tolerance=_affordable_tolerance(rows, settings))
-    rougher = ""
-    if drawn.tolerance > settings.tolerance:
+    rougher, tolerance = "", settings.tolerance
+    if settings.spacing is None or settings.directions is None:
+        # as much rougher as makes the scan short enough to wait for
+        most = max(numbers_of(rows, "segments"), default=0.0)
+        tolerance *= max(1.0, most / MOST_SEGMENTS) ** 0.5
+    if tolerance > settings.tolerance:
         rougher = (
-            f"Scanned to a standard error of {drawn.tolerance:.2g} instead of the table's "
+            f"Scanned to a standard error of {tolerance:.2g} instead of the table's "
             f"{settings.tolerance:.2g}, which would take too long for a picture."
         )
-    frames = ScannedFrames(series, drawn, rows, rougher)
+    frames = ScannedFrames(series, replace(settings, tolerance=tolerance), rows, rougher)
     # pixels, as the disks are pixels anyway, and few of them
     figures = [figure for figure in make_figures(frames, "frames") if not figure.slow]
     return [picture_of(figure, "png") for figure in figures]
-
-
-def _affordable_tolerance(rows: list[dict[str, Any]], settings: Settings) -> float:
-    """The table's, or as much more as makes the scan short enough to wait for."""
-    most = max((number_of(row, "segments") or 0.0 for row in rows), default=0.0)
-    is_fixed = settings.spacing is not None and settings.directions is not None
-    return settings.tolerance * (1.0 if is_fixed else max(1.0, most / MOST_SEGMENTS) ** 0.5)

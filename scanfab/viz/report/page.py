@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import base64
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +15,9 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder, whole_file
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
-from scanfab.viz.figures.style import COLOURS
+from scanfab.viz.figures.figure import Figure
+from scanfab.viz.figures.page import drawn_page
+from scanfab.viz.figures.style import COLOURS, figure_bytes
 from scanfab.viz.scene import SHADES, Scene, towards_viewer
 
 # spheres that a browser turns without effort
@@ -29,8 +30,12 @@ KIND_COLOURS = (
 )
 
 
-@dataclass(frozen=True)
-class Picture:
+# CSS pixels an inch, and those of pictures that are pixels
+PIXELS, DPI = 96, 130
+KINDS = {"svg": "image/svg+xml", "png": "image/png"}
+
+
+class Picture(NamedTuple):
     """A figure inside the page."""
 
     url: str
@@ -40,14 +45,12 @@ class Picture:
     """At which its letters are as large as those of the page, CSS pixels."""
 
 
-@dataclass(frozen=True)
-class Part:
-    """A table to be shown."""
-
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    note: str = ""
-    title: str = ""
+def picture_of(figure: Figure, kind: Literal["svg", "png"]) -> Picture:
+    """A figure with its caption, as lines or as pixels."""
+    with drawn_page([figure]) as page:
+        data = base64.b64encode(figure_bytes(page, kind, DPI)).decode("ascii")
+    url = f"data:{KINDS[kind]};base64,{data}"
+    return Picture(url, figure.caption, round(PIXELS * figure.size[0]))
 
 
 def check_page_file(path: Path) -> None:

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.io.families import PathLike
 from scanfab.pipeline.options import as_options
+from scanfab.pipeline.record import read_manifest
 from scanfab.pipeline.repeat import repeat_command
 from scanfab.table.compare import Comparison, compare_tables
+from scanfab.table.formats import read_rows
+from scanfab.table.selection import choose_rows
 from scanfab.viz.figures.page import make_figures
 from scanfab.viz.report.caveats import caveats_of
-from scanfab.viz.report.frames import picture_of, show_frames
-from scanfab.viz.report.inputs import Input, read_inputs
-from scanfab.viz.report.page import Picture, check_page_file, render_page, save_page
+from scanfab.viz.report.frames import Input, show_frames
+from scanfab.viz.report.page import Picture, check_page_file, picture_of, render_page, save_page
 from scanfab.viz.report.tables import (
     frame_table,
     input_table,
@@ -28,6 +30,9 @@ from scanfab.viz.report.tables import (
     results_tables,
     settings_table,
 )
+
+Told = dict[type[Warning], list[str]]
+"""What was told, warnings and notes apart."""
 
 
 @dataclass(frozen=True)
@@ -128,30 +133,74 @@ def make_report(
             "expected files of tables, beside which manifests say what made them: save a table, or "
             "compute it by scanfab.compute_file, and name its file"
         )
-    with _Listening() as heard:
+    told: Told = {ScanfabWarning: [], ScanfabNote: []}
+    with _listening(told) as caught:
         inputs = read_inputs([Path(one) for one in named], cutoff, labels)
         rows = [row for one in inputs for row in one.rows]
         comparison = compare_tables(rows)
         pictures = _table_pictures(rows, comparison)
-    for one in heard.caught:
+    for one in caught:
         warnings.warn(one.message, one.category, stacklevel=2)
-    sections = [_section(one, heard) for one in inputs]
-    shown = [one["shown"]["pictures"] for one in sections if one["shown"]]
+    sections = [_section(one, told) for one in inputs]
+    for section in sections:
+        pictures += section["shown"]["pictures"] if section["shown"] else []
     asked = [one.manifest["settings"] for one in inputs if one.manifest is not None]
-    doubts = [*heard.warnings, *map(as_options, caveats_of(rows, asked))]
+    doubts = [*told[ScanfabWarning], *map(as_options, caveats_of(rows, asked))]
     page = render_page(
         title=title or _usual_title(rows),
         author=author,
         date=(today or datetime.now(UTC).astimezone().date()).isoformat(),
         summary=[overview(one.path, one.rows) for one in inputs],
         results=results_tables(comparison.summary, rows),
-        pictures=[*pictures, *chain.from_iterable(shown)],
+        pictures=pictures,
         warnings=list(dict.fromkeys(doubts)),
-        notes=list(dict.fromkeys(heard.notes)),
+        notes=list(dict.fromkeys(told[ScanfabNote])),
         sections=sections,
         frames=frame_table(rows),
     )
     return Report(page, any(row["alpha_vs_axial"] is not None for row in rows))
+
+
+@contextmanager
+def _listening(told: Told) -> Iterator[list[Any]]:
+    """Collect what is told in the block; it gives back the warnings themselves."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            yield caught
+        finally:
+            for one in caught:
+                for kind in told:
+                    if issubclass(one.category, kind):
+                        told[kind].append(as_options(str(one.message)))
+
+
+def read_inputs(
+    tables: Sequence[Path], cutoff: float | None = None, labels: Sequence[str] | None = None
+) -> list[Input]:
+    """
+    Read tables and manifests.
+
+    Raises
+    ------
+    ScanfabError
+        If one cannot be read or is no fabric table, or if no table has a row.
+    """
+    # a report can do without the names of the source and the strain
+    read = [
+        (path, [{"source": path.stem, "strain": None, **row} for row in read_rows(path)])
+        for path in tables
+    ]
+    chosen = choose_rows(read, cutoff, labels)
+    inputs = [
+        Input(path, rows, read_manifest(path), cutoff)
+        for path, rows in zip(tables, chosen, strict=True)
+    ]
+    if not any(one.rows for one in inputs):
+        raise SettingsError(
+            f"{', '.join(map(str, tables))}: there is nothing to report: no row in the table"
+        )
+    return inputs
 
 
 def _usual_title(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -169,8 +218,8 @@ def _table_pictures(rows: Sequence[Mapping[str, Any]], comparison: Comparison) -
     return [picture_of(one, "svg") for one in figures]
 
 
-def _section(one: Input, heard: _Listening) -> dict[str, Any]:
-    """What the manifest says, and what the source shows; ``heard`` gets the warnings."""
+def _section(one: Input, told: Told) -> dict[str, Any]:
+    """What the manifest says, and what the source shows; ``told`` gets the warnings."""
     section: dict[str, Any] = {"title": str(one.path), "missing": "", "shown": None, "no_view": ""}
     if one.manifest is None:
         missing = (
@@ -179,11 +228,11 @@ def _section(one: Input, heard: _Listening) -> dict[str, Any]:
         )
         return {**section, "missing": missing}
     asked, found = one.manifest["settings"], one.manifest.get("settings_file")
-    heard.warnings += map(str, one.manifest.get("warnings") or [])
-    heard.notes += map(str, one.manifest.get("notes") or [])
+    told[ScanfabWarning] += map(str, one.manifest.get("warnings") or [])
+    told[ScanfabNote] += map(str, one.manifest.get("notes") or [])
     if one.rows:
         try:
-            with heard:
+            with _listening(told):
                 section["shown"] = show_frames(one)
         except (ScanfabError, OSError) as error:
             section["no_view"] = f"The view is left out: {as_options(error)}."
@@ -196,25 +245,3 @@ def _section(one: Input, heard: _Listening) -> dict[str, Any]:
         "versions": [(str(k), str(v)) for k, v in (one.manifest.get("versions") or {}).items()],
         "inputs": input_table(one.manifest),
     }
-
-
-class _Listening:
-    """Collects what is told in its blocks, as warnings and as notes."""
-
-    def __init__(self) -> None:
-        self.warnings: list[str] = []
-        self.notes: list[str] = []
-
-    def __enter__(self) -> _Listening:
-        self._block = warnings.catch_warnings(record=True)
-        self.caught: list[Any] = self._block.__enter__()
-        warnings.simplefilter("always")
-        return self
-
-    def __exit__(self, *details: Any) -> None:
-        self._block.__exit__(*details)
-        for one in self.caught:
-            if issubclass(one.category, ScanfabWarning):
-                self.warnings.append(as_options(str(one.message)))
-            elif issubclass(one.category, ScanfabNote):
-                self.notes.append(as_options(str(one.message)))
