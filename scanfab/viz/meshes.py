@@ -81,10 +81,7 @@ def window_mesh(center: FloatArray, window: Convex, nsub: int = 4) -> Any:
 
 
 def distribution_mesh(
-    directions: FloatArray,
-    mean_length: FloatArray,
-    weight: FloatArray,
-    space: Space = SPACE,
+    directions: FloatArray, mean_length: FloatArray, weight: FloatArray, space: Space = SPACE
 ) -> Any:
     """
     ℓ(n) as a closed surface about the origin, at ℓ in each direction n; of discs as a closed line.

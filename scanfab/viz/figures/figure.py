@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
+import numpy as np
+
 from scanfab.base.errors import SettingsError
-from scanfab.viz.figures.style import COLUMN, STYLE, letter
+from scanfab.viz.figures.style import COLUMN, DIRECTIONAL, STYLE, letter
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -177,6 +180,61 @@ class OnePanel(FrameFigure):
         self.paint(axes)
         part.legend(loc="outside upper left", title=self.note or None)
         return [axes]
+
+
+class DirectionalFigure(FrameFigure):
+    """
+    Void lengths and contact normals of frames over all directions; needs ``draw_column``.
+
+    Parameters
+    ----------
+    data : ScannedFrames
+        Of :func:`scanfab.scan_frames`.
+    frame : int, optional
+        The number of a frame, to draw that one alone; on one Axes the last by default.
+    of : str, optional
+        ``"voids"`` or ``"contacts"``, to draw these alone; on one Axes voids by default.
+    """
+
+    lettered = True
+
+    def __init__(
+        self, data: ScannedFrames, frame: int | None = None, of: str | None = None
+    ) -> None:
+        super().__init__(data, frame)
+        self.of = one_of(of, tuple(DIRECTIONAL))
+
+    @cached_property
+    def frames(self) -> list[ScannedFrame]:
+        """The frames that are drawn."""
+        return self.chosen(self.data.frames)
+
+    def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> Any:
+        """Draw voids or contacts of frames on panels with one scale; gives back that scale."""
+        raise NotImplementedError
+
+    def add_legend(self, place: Any, scales: dict[str, Any]) -> None:
+        """Add what all panels of the Axes or the Figure share; ``scales`` are those of columns."""
+
+    def draw(self, ax: Axes) -> None:
+        """Of the last frame, unless another one is asked for."""
+        self.add_legend(ax, self._draw_grid(np.array([[ax]]), "center"))
+
+    def panels(self, part: FigureBase) -> list[Axes]:
+        """A row for each frame, a column for each of both."""
+        polar = {"projection": self.projection}
+        shape = len(self.frames), len(self.of)
+        panels = part.subplots(*shape, squeeze=False, subplot_kw=polar)
+        self.add_legend(part, self._draw_grid(panels, "left"))
+        return list(panels.ravel())
+
+    def _draw_grid(self, panels: Any, loc: Any) -> dict[str, Any]:
+        frames, scales = self.frames[-len(panels) :], {}
+        for kind, column in zip(self.of, panels.T, strict=False):
+            scales[kind] = self.draw_column(list(column), frames, kind)
+            for axes, one in zip(column, frames, strict=True):
+                axes.set_title(f"{DIRECTIONAL[kind]}\n{one.title}", loc=loc)
+        return scales
 
 
 def one_of(which: str | None, known: tuple[str, ...]) -> tuple[str, ...]:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import FigureBase
 
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
@@ -20,13 +19,12 @@ from scanfab.fabric.distribution import (
     mean_length_function,
 )
 from scanfab.table.row import number_of, total_error
-from scanfab.viz.figures.figure import FrameFigure, one_of
-from scanfab.viz.figures.style import COLOURS, DIRECTIONAL, WIDTH
+from scanfab.viz.figures.figure import DirectionalFigure
+from scanfab.viz.figures.style import COLOURS, WIDTH
 
 if TYPE_CHECKING:
-    from scanfab.viz.scanned_frames import ScannedFrame, ScannedFrames
+    from scanfab.viz.scanned_frames import ScannedFrame
 
-DEVIATION = "deviation from the mean in %"
 # rings and rays of the disk that a hemisphere is projected on
 DISK = (41, 121)
 # of the kernel exp(k (n·m)²) that smooths contact normals: half its height at 19 degrees
@@ -35,14 +33,7 @@ CONCENTRATION = 6.5
 CHANCE = 3.0
 
 
-class Hemisphere(NamedTuple):
-    """Deviation from the mean over all directions, per cent: at :func:`places_of` a frame."""
-
-    voids: FloatArray
-    contacts: FloatArray | None
-
-
-class Projection(FrameFigure):
+class Projection(DirectionalFigure):
     """
     Mean void length and contact normals over all directions, on an equal-area disk.
 
@@ -64,68 +55,48 @@ class Projection(FrameFigure):
     """
 
     order = 5
-    lettered = True
-
-    def __init__(
-        self, data: ScannedFrames, frame: int | None = None, of: str | None = None
-    ) -> None:
-        super().__init__(data, frame)
-        self.of = one_of(of, tuple(DIRECTIONAL))
 
     @cached_property
-    def hemispheres(self) -> list[tuple[ScannedFrame, Hemisphere]]:
-        """The frames that are drawn, and what is drawn of each."""
-        return [(one, hemisphere_of(one)) for one in self.chosen(self.data.frames)]
+    def deviations(self) -> list[dict[str, FloatArray | None]]:
+        """What is drawn of each frame."""
+        return [deviations_of(one) for one in self.frames]
 
     @property
     def size(self) -> tuple[float, float]:
         """A row for each frame."""
-        return WIDTH, 2.5 * len(self.hemispheres) + 0.2
+        return WIDTH, 2.5 * len(self.frames) + 0.2
 
     @property
     def caption(self) -> str:
         """With how large the lobes are by chance alone."""
         drawn = f"Mean void length and contact normals over all directions, {self.data.name}."
-        noise = [noise_note(*one) for one in self.hemispheres]
+        noise = map(noise_note, self.frames, self.deviations)
         return " ".join(filter(None, [drawn, *noise, self.data.note]))
 
-    def draw(self, ax: Axes) -> None:
-        """Of the last frame, unless another one is asked for."""
-        drawn = self._draw_column([ax], self.of[0], "center")
-        if drawn is not None:
-            ax.figure.colorbar(drawn, ax=ax, shrink=0.8).set_label(DEVIATION)
-
-    def panels(self, part: FigureBase) -> list[Axes]:
-        """A row for each frame, a column with its scale for each of both."""
-        panels = part.subplots(len(self.hemispheres), len(self.of), squeeze=False)
-        for column, kind in zip(panels.T, self.of, strict=True):
-            drawn = self._draw_column(column, kind, "left")
-            if drawn is not None:
-                bar = part.colorbar(drawn, ax=column, shrink=0.8, pad=0.03, aspect=30)
-                bar.set_label(DEVIATION)
-        return list(panels.ravel())
-
-    def _draw_column(self, column: Sequence[Axes], kind: str, loc: Any) -> Any:
-        """Panels of the last frames with one scale, of which the last disk is given back."""
-        frames = self.hemispheres[-len(column) :]
-        values = [getattr(shown, kind) for _, shown in frames]
+    def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> None:
+        """Disks with one scale of colours, which stands beside them; of discs curves."""
+        values = [one[kind] for one in self.deviations[-len(frames) :]]
         known = [float(np.abs(value).max()) for value in values if value is not None]
         # the scale ends at the largest deviation, and at least at a tenth of a per cent
         largest = max(max(known, default=1.0), 0.1)
         drawn = None
-        for axes, (frame, _), value in zip(column, frames, values, strict=True):
+        for axes, frame, value in zip(column, frames, values, strict=True):
             if frame.space.is_plane:
                 _draw_curve(axes, value, frame.space, largest)
             else:
                 drawn = _draw_disk(axes, value, largest) or drawn
-            axes.set_title(f"{DIRECTIONAL[kind]}\n{frame.title}", loc=loc)
-        return drawn
+        if drawn is not None:
+            page = column[0].figure
+            bar = page.colorbar(drawn, ax=column, shrink=0.8, pad=0.03, aspect=30)
+            bar.set_label("deviation from the mean in %")
 
 
 def _draw_curve(axes: Axes, value: FloatArray | None, plane: Space, largest: float) -> None:
     """Over the directions of a plane."""
     first, second = ("xyz"[k] for k in sorted(plane.along))
-    axes.set(xlim=(0, 180), ylim=(-1.1 * largest, 1.1 * largest), ylabel=DEVIATION)
+    axes.set(
+        xlim=(0, 180), ylim=(-1.1 * largest, 1.1 * largest), ylabel="deviation from the mean in %"
+    )
     axes.set(xlabel=f"direction, degrees from {first} to {second}", xticks=range(0, 181, 45))
     axes.axhline(0, color="0.6", lw=0.6, zorder=0)
     if value is None:
@@ -190,8 +161,8 @@ def places_of(space: Space) -> tuple[FloatArray, FloatArray]:
     return rho[..., None] * along, directions
 
 
-def hemisphere_of(frame: ScannedFrame) -> Hemisphere:
-    """The directional distributions of a frame."""
+def deviations_of(frame: ScannedFrame) -> dict[str, FloatArray | None]:
+    """Deviations from the mean over all directions at :func:`places_of` a frame, per cent."""
     measured, space, normals = frame.measurement, frame.space, frame.normals
     _, directions = places_of(space)
     mean_length = mean_length_function(measured.sums.axes, *measured.kept(frame.variant), space)
@@ -201,7 +172,7 @@ def hemisphere_of(frame: ScannedFrame) -> Hemisphere:
     contacts = None
     if len(normals):
         contacts = 100 * (smoothed_density(normals, directions, space) - 1)
-    return Hemisphere(100 * (mean_length(directions) / mean - 1), contacts)
+    return {"voids": 100 * (mean_length(directions) / mean - 1), "contacts": contacts}
 
 
 def smoothed_density(
@@ -217,7 +188,7 @@ def smoothed_density(
     return density.reshape(directions.shape[:-1]) / isotropic
 
 
-def noise_note(frame: ScannedFrame, shown: Hemisphere) -> str:
+def noise_note(frame: ScannedFrame, deviations: Mapping[str, FloatArray | None]) -> str:
     """
     What chance alone makes of the lobes of a frame, in words.
 
@@ -225,8 +196,8 @@ def noise_note(frame: ScannedFrame, shown: Hemisphere) -> str:
     """
     known = []
     for what, error, deviation in (
-        ("void lengths", void_noise(frame.row, frame.space), shown.voids),
-        ("contact normals", contact_noise(frame.row, frame.space), shown.contacts),
+        ("void lengths", void_noise(frame.row, frame.space), deviations["voids"]),
+        ("contact normals", contact_noise(frame.row, frame.space), deviations["contacts"]),
     ):
         if error is not None and deviation is not None:
             largest = float(np.abs(deviation).max())

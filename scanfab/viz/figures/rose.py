@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,8 +16,8 @@ from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.contact import contact_fabric
 from scanfab.fabric.invariants import fabric_deviator
-from scanfab.viz.figures.figure import FrameFigure, one_of
-from scanfab.viz.figures.style import COLOURS, DIRECTIONAL, WIDTH, rounded_down
+from scanfab.viz.figures.figure import DirectionalFigure
+from scanfab.viz.figures.style import COLOURS, WIDTH, rounded_down
 
 if TYPE_CHECKING:
     from scanfab.viz.scanned_frames import ScannedFrame, ScannedFrames
@@ -67,7 +66,7 @@ class Ring:
         return max(0.02, float(np.nanmax(far, initial=0.0)), float(np.abs(curve - 1.0).max()))
 
 
-class Rose(FrameFigure):
+class Rose(DirectionalFigure):
     """
     Mean void length and contact normals over the azimuth, at a few polar angles from z.
 
@@ -103,7 +102,6 @@ class Rose(FrameFigure):
     """
 
     order = 4
-    lettered = True
     slow = True
     projection = "polar"
 
@@ -114,9 +112,8 @@ class Rose(FrameFigure):
         frame: int | None = None,
         of: str | None = None,
     ) -> None:
-        super().__init__(data, frame)
-        self.angles = _checked_angles(angles, "angles", f"{POLAR_ANGLES}, found {angles!r}")
-        self.of = one_of(of, tuple(DIRECTIONAL))
+        super().__init__(data, frame, of)
+        self.angles = _checked_angles(angles, angles)
 
     @classmethod
     def parse(cls, argument: str) -> dict[str, Any]:
@@ -125,37 +122,19 @@ class Rose(FrameFigure):
             angles = [float(word) for word in argument.split(",")]
         except ValueError:
             angles = []
-        example = f"rose:30,60,90, found {f'rose:{argument}'!r}"
-        return {"angles": _checked_angles(angles, "figure", example)}
-
-    @cached_property
-    def frames(self) -> list[ScannedFrame]:
-        """The frames that are drawn."""
-        return self.chosen(self.data.frames)
-
-    @cached_property
-    def rings(self) -> dict[str, list[list[Ring]]]:
-        """The rings of each frame: of ``voids``, and of ``contacts``."""
-        angles, found = self.angles, self.frames
-        if self.space.is_plane:
-            if angles not in (POLAR_ANGLES, EQUATOR):
-                raise SettingsError(
-                    f"figure: discs in {self.space} have no polar angles, found "
-                    f"{','.join(f'{one:g}' for one in angles)}: choose `figure=rose`"
-                )
-            angles = EQUATOR
-        return {
-            "voids": [void_rings(one, angles) for one in found],
-            "contacts": [
-                [contact_ring(one.normals, phi, one.space) for phi in angles if len(one.normals)]
-                for one in found
-            ],
-        }
+        return {"angles": _checked_angles(angles, f"rose:{argument}")}
 
     @property
     def space(self) -> Space:
-        """The plane of the frames, if their grains are discs."""
-        return self.frames[0].space
+        """The plane of the frames, if their grains are discs; it has no polar angles."""
+        space = self.frames[0].space
+        if space.is_plane and self.angles not in (POLAR_ANGLES, EQUATOR):
+            angles = ",".join(f"{one:g}" for one in self.angles)
+            raise SettingsError(
+                f"figure: discs in {space} have no polar angles, found {angles}: choose "
+                f"`figure=rose`"
+            )
+        return space
 
     @property
     def looks(self) -> dict[float, dict[str, Any]]:
@@ -179,69 +158,47 @@ class Rose(FrameFigure):
             f"{self.data.name}."
         )
 
-    def draw(self, ax: Axes) -> None:
-        """Of the last frame, unless another one is asked for."""
-        reach = self._draw_column([ax], self.of[0], "center")
-        handles, labels = self._entries()
-        below: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.08)}
-        ax.legend(handles, labels, title=self._note({self.of[0]: reach}), **below)
-
-    def panels(self, part: FigureBase) -> list[Axes]:
-        """A row for each frame, a column for each of both, and the legend below."""
-        shape, polar = (len(self.frames), len(self.of)), {"projection": "polar"}
-        panels = part.subplots(*shape, squeeze=False, subplot_kw=polar)
-        reaches = {
-            kind: self._draw_column(column, kind, "left")
-            for kind, column in zip(self.of, panels.T, strict=True)
-        }
-        handles, labels = self._entries()
-        columns, note = min(len(labels), MOST_COLUMNS), self._note(reaches)
-        part.legend(handles, labels, ncols=columns, title=note, loc="outside lower center")
-        return list(panels.ravel())
-
-    def _draw_column(self, column: Sequence[Axes], kind: str, loc: Any) -> float:
-        """Panels of the last frames with one scale; how far it reaches from 1."""
-        frames = self.frames[-len(column) :]
-        every = self.rings[kind][-len(column) :]
+    def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> float:
+        """Rings about 1 at the polar angles; how far the scale reaches from 1."""
+        looks = self.looks
+        rings_of = void_rings if kind == "voids" else contact_rings
+        every = [rings_of(one, list(looks)) for one in frames]
         reach = max((ring.reach for rings in every for ring in rings), default=0.02)
-        for axes, frame, rings in zip(column, frames, every, strict=True):
-            _draw_rings(axes, rings, reach, self.looks)
-            axes.set_title(f"{DIRECTIONAL[kind]}\n{frame.title}", loc=loc)
+        for axes, rings in zip(column, every, strict=True):
+            _draw_rings(axes, rings, reach, looks)
         return reach
 
-    def _entries(self) -> tuple[list[Any], list[str]]:
-        """Handles and labels of the legend."""
+    def add_legend(self, place: Any, scales: dict[str, Any]) -> None:
+        """The legend below, with what the angle of the panels is, and what circles and bars are."""
         handles = [Line2D([], [], **look) for look in self.looks.values()]
-        if self.space.is_plane:
-            return handles, [f"in {self.space}"]
-        return handles, [rf"polar angle $\varphi={phi:g}^\circ$" for phi in self.looks]
-
-    def _note(self, reaches: Mapping[str, float]) -> str:
-        """What the angle of the panels is, and what circles and bars are."""
+        labels = [rf"polar angle $\varphi={phi:g}^\circ$" for phi in self.looks]
         over = "over the azimuth $\\theta$ from x"
         if self.space.is_plane:
             first, second = ("xyz"[k] for k in sorted(self.space.along))
             over = f"over the angle from {first} towards {second}"
-        sides = dict(zip(reaches, (" (left)", " (right)"), strict=False))
-        if len(reaches) == 1:
-            sides = dict.fromkeys(reaches, "")
-        circles = []
-        for kind, reach in reaches.items():
+            labels = [f"in {self.space}"]
+        circles, bars = [], []
+        sides = (" (left)", " (right)") if len(scales) > 1 else ("",)
+        for side, (kind, reach) in zip(sides, scales.items(), strict=True):
             middle, values = _scale(reach)
             named = ", ".join(f"{one:g}" for one in values)
-            circles.append(f"{named} about {middle:.3g}{sides[kind]}")
-        errors = ", ".join(f"{BARS[kind]}{sides[kind]}" for kind in reaches)
-        return (
+            circles.append(f"{named} about {middle:.3g}{side}")
+            bars.append(f"{BARS[kind]}{side}")
+        note = (
             f"{over}, relative to isotropy\ncircles: {', '.join(circles)}\n"
-            f"bars: one standard error, {errors}"
+            f"bars: one standard error, {', '.join(bars)}"
         )
+        where: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.08)}
+        if isinstance(place, FigureBase):
+            where = {"loc": "outside lower center", "ncols": min(len(labels), MOST_COLUMNS)}
+        place.legend(handles, labels, title=note, **where)
 
 
-def _checked_angles(angles: Sequence[float], where: str, example: str) -> tuple[float, ...]:
+def _checked_angles(angles: Sequence[float], found: object) -> tuple[float, ...]:
     if not 0 < len(angles) <= len(LOOKS) or not all(0 < angle <= 90 for angle in angles):
         raise SettingsError(
-            f"{where}: expected one to four polar angles above 0 and up to 90 degrees, such as "
-            f"{example}"
+            f"figure: expected one to four polar angles above 0 and up to 90 degrees, such as "
+            f"rose:30,60,90, found {found!r}"
         )
     return tuple(angles)
 
@@ -278,40 +235,18 @@ def _scale(reach: float) -> tuple[float, list[float]]:
 
 def void_rings(frame: ScannedFrame, angles: Sequence[float]) -> list[Ring]:
     """Mean void lengths of a frame, at some polar angles in degrees."""
-    # at the equator θ and θ + 180° are one line
-    rings = {phi: np.arange(0.0, 180.0 if phi == 90 else 360.0, THETA_STEP) for phi in angles}
-    axes = np.concatenate([_vectors(theta, phi, frame.space) for phi, theta in rings.items()])
-    value, error = _mean_lengths(frame, axes)
-    ends, found = np.cumsum([len(theta) for theta in rings.values()])[:-1], []
-    parts = zip(rings.items(), np.split(value, ends), np.split(error, ends), strict=True)
-    for (phi, theta), own, own_error in parts:
-        if phi == 90:
-            theta = np.concatenate([theta, theta + 180.0])
-            own, own_error = np.tile(own, 2), np.tile(own_error, 2)
-        found.append(Ring(phi, theta, own, own_error))
-    return found
-
-
-def _vectors(theta: FloatArray, phi: float, space: Space) -> FloatArray:
-    azimuth, polar = np.radians(theta), np.radians(phi)
-    if space.is_plane:
-        return np.column_stack([np.cos(azimuth), np.sin(azimuth)]) @ np.eye(3)[sorted(space.along)]
-    flat = np.sin(polar)
-    return np.column_stack(
-        [flat * np.cos(azimuth), flat * np.sin(azimuth), np.full(len(theta), np.cos(polar))]
-    )
-
-
-def _mean_lengths(frame: ScannedFrame, axes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """ℓ of each axis over the mean of all directions, and its standard error, shape (D,)."""
     # compiled kernels, which those who draw something else do without
     from scanfab.scan.directions import DirectionRule
     from scanfab.scan.gaps import scan_gaps
 
     measured, variant, plan = frame.measurement, frame.variant, frame.measurement.plan
+    # at the equator θ and θ + 180° are one line
+    thetas = [np.arange(0.0, 180.0 if phi == 90 else 360.0, THETA_STEP) for phi in angles]
+    each = zip(thetas, angles, strict=True)
+    axes = np.concatenate([_vectors(theta, phi, frame.space) for theta, phi in each])
     # as many lines as give the wanted number of segments
-    found = measured.sums.kept(variant)[1].mean()
-    spacing = plan.spacing * plan.space.apart(found * REPLICATES / SEGMENTS)
+    segments = measured.sums.kept(variant)[1].mean()
+    spacing = plan.spacing * plan.space.apart(segments * REPLICATES / SEGMENTS)
     weights = np.full(len(axes), 1 / len(axes))
     rose = scan_gaps(
         measured.solids,
@@ -326,12 +261,33 @@ def _mean_lengths(frame: ScannedFrame, axes: FloatArray) -> tuple[FloatArray, Fl
         most_steps=plan.max_chords,
     )
     sums_of, numbers = rose.kept(variant, 0, plan.moment)
-    length, segments = measured.kept(variant)
-    mean = length.sum() / segments.sum()
+    every, counts = measured.kept(variant)
+    mean = every.sum() / counts.sum()
     with np.errstate(invalid="ignore", divide="ignore"):
         value = sums_of.sum(axis=0) / numbers.sum(axis=0) / mean
-        scatter = np.nanstd(sums_of / numbers, axis=0, ddof=1) / mean
-    return value, scatter / np.sqrt(REPLICATES)
+        scatter = np.nanstd(sums_of / numbers, axis=0, ddof=1) / mean / np.sqrt(REPLICATES)
+    found, end = [], 0
+    for phi, theta in zip(angles, thetas, strict=True):
+        start, end = end, end + len(theta)
+        turns = 2 if phi == 90 else 1
+        around = np.concatenate([theta + 180.0 * turn for turn in range(turns)])
+        own, error = np.tile(value[start:end], turns), np.tile(scatter[start:end], turns)
+        found.append(Ring(phi, around, own, error))
+    return found
+
+
+def _vectors(theta: FloatArray, phi: float, space: Space) -> FloatArray:
+    """Unit vectors; in a plane angles are counted from the first of its coordinates."""
+    azimuth, polar = np.radians(theta), np.radians(phi)
+    flat, basis = np.sin(polar), np.eye(3)[sorted(space.along)]
+    parts = [flat * np.cos(azimuth), flat * np.sin(azimuth), np.full(len(theta), np.cos(polar))]
+    return np.column_stack(parts[: len(basis)]) @ basis
+
+
+def contact_rings(frame: ScannedFrame, angles: Sequence[float]) -> list[Ring]:
+    """Contact normals of a frame at some polar angles; none without contacts."""
+    normals = frame.normals
+    return [contact_ring(normals, phi, frame.space) for phi in angles if len(normals)]
 
 
 def contact_ring(normals: FloatArray, phi: float, space: Space = SPACE) -> Ring:
@@ -343,7 +299,6 @@ def contact_ring(normals: FloatArray, phi: float, space: Space = SPACE) -> Ring:
     both = np.concatenate([normals, -normals])
     # the share of all directions that is counted
     share = 1.0
-    # angles of a plane are counted from the first of its coordinates
     first, second = sorted(space.along)[:2]
     if not space.is_plane:
         polar = np.degrees(np.arccos(np.clip(both[:, 2], -1, 1)))

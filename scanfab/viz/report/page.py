@@ -23,11 +23,7 @@ from scanfab.viz.scene import SHADES, Scene, towards_viewer
 # spheres that a browser turns without effort
 MOST_GRAINS = 4_000
 # of balls in the RV, outside, and of rattlers, and paler where a plane cuts them
-KIND_COLOURS = (
-    (COLOURS["sky"], "#B4DDF5"),
-    ("#C9CED3", "#E8EAEC"),
-    (COLOURS["orange"], "#F5DB9F"),
-)
+KIND_COLOURS = ((COLOURS["sky"], "#B4DDF5"), ("#C9CED3", "#E8EAEC"), (COLOURS["orange"], "#F5DB9F"))
 
 
 # CSS pixels an inch, and those of pictures that are pixels
