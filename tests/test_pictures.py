@@ -63,7 +63,7 @@ def test_other_numbers_words_and_colours_are_told(monkeypatch):
     monkeypatch.setattr(Evolution, "height", 3.5)
     assert pictures.differences(before, content(rows))
     monkeypatch.undo()
-    monkeypatch.setattr("scanfab.viz.figures.groups.MEANINGS", {"c": "another word"})
+    monkeypatch.setattr("scanfab.viz.figures.curves.MEANINGS", {"c": "another word"})
     assert pictures.differences(before, content(rows))
 
 
