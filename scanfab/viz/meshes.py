@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pyvista
+from scipy.spatial import ConvexHull
 
 from scanfab.base.convex import Convex
 from scanfab.base.space import SPACE, Space
@@ -24,8 +26,6 @@ AZIMUTHS, POLAR = 36, 18
 
 def grain_mesh(grains: Grains) -> Any:
     """Points with what is known of each particle."""
-    import pyvista
-
     mesh = pyvista.PolyData(grains.position) if len(grains.position) else pyvista.PolyData()
     names = ["radius", "id", "contacts", "rattler", "boundary", "in_window"]
     names += ["body"] * (grains.body is not None)
@@ -73,8 +73,6 @@ def line_mesh(segments: Segments, cutoff: float) -> Any:
 
 def window_mesh(center: FloatArray, window: Convex, nsub: int = 4) -> Any:
     """The surface of the RV, of discs its outline; ``nsub`` says how fine that of a sphere is."""
-    import pyvista
-
     if window.is_sphere and not window.is_flat:
         return pyvista.Icosphere(radius=window.reach, center=tuple(center), nsub=nsub)
     return _surface(center + window.outline, window.outline, window.is_flat)
@@ -117,8 +115,6 @@ def ellipsoid_mesh(
     The half axes are 3 size times the principal values, of discs 2 size times those of an ellipse;
     ``kind`` numbers the tensors.
     """
-    import pyvista
-
     parts = []
     for kind, matrix in enumerate(tensors.values()):
         ball = pyvista.Icosphere(radius=1.0, nsub=3)
@@ -132,16 +128,12 @@ def ellipsoid_mesh(
 
 def tensor_points(tensors: Mapping[str, FloatArray], center: FloatArray) -> Any:
     """One point in the middle of the sample, 9-component arrays: for the Tensor Glyph filter."""
-    import pyvista
-
     mesh = pyvista.PolyData(center[None])
     return _with(mesh, mesh.point_data, **{k: one.reshape(1, 9) for k, one in tensors.items()})
 
 
 def block_mesh(blocks: Blocks, values: Mapping[str, npt.ArrayLike]) -> Any:
     """The blocks of a map as hexahedra; a shell is many, each with the shell's values."""
-    import pyvista
-
     if not blocks.radius:
         steps = [np.linspace(0.0, 1.0, count + 1) for count in blocks.parts]
         at = blocks.corner + np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1) @ blocks.edges
@@ -170,8 +162,6 @@ def _with(mesh: Any, data: Any, **arrays: npt.ArrayLike) -> Any:
 
 def _lines(ends: FloatArray) -> Any:
     """A line for each pair of ends, shape (K, 2, 3)."""
-    import pyvista
-
     if len(ends) == 0:
         return pyvista.PolyData()
     return pyvista.line_segments_from_points(ends.reshape(-1, 3))
@@ -184,9 +174,6 @@ def _surface(points: FloatArray, directions: FloatArray, is_flat: bool) -> Any:
     Its triangles are those of the hull of the directions, all counter-clockwise from outside. In a
     plane it is a closed line, from each point to the next.
     """
-    import pyvista
-    from scipy.spatial import ConvexHull
-
     if is_flat:
         return pyvista.PolyData(points, lines=[len(points) + 1, *range(len(points)), 0])
     corners = ConvexHull(directions).simplices.astype(np.int64)

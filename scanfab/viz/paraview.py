@@ -23,7 +23,6 @@ from scanfab.scan.lines import line_triads
 from scanfab.scan.segments import Segments, sample_segments
 from scanfab.table.row import Row, number_of
 from scanfab.table.table import Table
-from scanfab.viz import meshes
 from scanfab.viz.scene import grains_of
 
 LINES = 120
@@ -143,6 +142,8 @@ def save_mesh(mesh: Any, path: Path, fields: Fields) -> None:
 
 def frame_meshes(result: FrameResult) -> Meshes:
     """The grains, contacts and RVs of a frame, and what each variant's scan says."""
+    from scanfab.viz import meshes
+
     # only where there are several RVs does the name of a file tell which it is of
     windows = {
         _name("window", rv.fraction): rv.window
@@ -168,6 +169,8 @@ def frame_meshes(result: FrameResult) -> Meshes:
 
 
 def _variant_meshes(result: FrameResult, row: Row, size: float) -> Meshes:
+    from scanfab.viz import meshes
+
     rv, fields = number_of(row, "rv"), _fields([row])
     measured, name = result.measured(row.variant, rv), _name(row.variant, rv)
     center, space = measured.solids.origin, measured.plan.space
@@ -199,6 +202,8 @@ def scan_line_sample(measured: Measurement, variant: str) -> Segments:
 
 def map_meshes(result: FrameResult) -> Meshes:
     """The blocks of each variant of a map as cells with all columns."""
+    from scanfab.viz import meshes
+
     if result.blocks is None:
         return
     for variant in dict.fromkeys(row.variant for row in result.rows):

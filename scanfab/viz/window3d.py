@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pyvista
+from vtkmodules.vtkRenderingCore import vtkActor2D, vtkCoordinate, vtkPolyDataMapper2D
 
 from scanfab.base.convex import Convex
 from scanfab.base.errors import ScanfabError
@@ -100,8 +102,6 @@ def show_scene(
     """
     if screenshot is not None:
         check_drawing()
-    import pyvista
-
     # VTK would write to standard error; errors tell what is wrong
     with pyvista.vtk_verbosity("off"):
         plotter: Any = pyvista.Plotter(
@@ -151,8 +151,6 @@ def _add_grains(plotter: Any, scene: Scene, shown: BoolArray, toward: FloatArray
 
     Gives back the names of the legend with their colours.
     """
-    import pyvista
-
     grains = scene.grains
     grain, rattler = ~grains.boundary & ~grains.rattler, ~grains.boundary & grains.rattler
     kinds = {
@@ -190,15 +188,13 @@ def _add_grains(plotter: Any, scene: Scene, shown: BoolArray, toward: FloatArray
 
 def _mixed(colour: str, share: float, white: float = 0.0) -> str:
     """A colour times a share, with so much white."""
-    from pyvista import Color
-
-    return str(Color([share * part + white for part in Color(colour).float_rgb]).hex_rgb)
+    return str(
+        pyvista.Color([share * part + white for part in pyvista.Color(colour).float_rgb]).hex_rgb
+    )
 
 
 def _glyphs(places: FloatArray, radius: FloatArray, shape: Any) -> Any:
     """A shape of diameter 1, as large as each radius says, at each place."""
-    import pyvista
-
     cloud = pyvista.PolyData(places)
     cloud.point_data["diameter"] = 2.0 * radius
     return cloud.glyph(geom=shape, scale="diameter", orient=False)
@@ -206,8 +202,6 @@ def _glyphs(places: FloatArray, radius: FloatArray, shape: Any) -> Any:
 
 def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) -> None:
     """An RV's surface; in a section its outline."""
-    import pyvista
-
     center = tuple(scene.center)
     if scene.lines is None and not window.is_flat:
         surface = window_mesh(scene.center, window, nsub=5)
@@ -228,8 +222,6 @@ def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) 
 
 def _add_lines(plotter: Any, scene: Scene) -> dict[str, str]:
     """Void segments as tubes, kept and dropped; names of the legend with their colours."""
-    import pyvista
-
     lines = scene.lines
     assert lines is not None
     kept = lines.void & (lines.length >= scene.cutoff)
@@ -324,9 +316,6 @@ def _write(plotter: Any, text: str, x: float, y: float, size: int) -> Any:
 
 def _fill(plotter: Any, corners: FloatArray, colour: str) -> Any:
     """A polygon, in the same shares; returned, so that it can be moved."""
-    import pyvista
-    from vtkmodules.vtkRenderingCore import vtkActor2D, vtkCoordinate, vtkPolyDataMapper2D
-
     shape = pyvista.PolyData(
         np.column_stack([corners, np.zeros(len(corners))]),
         faces=[len(corners), *range(len(corners))],

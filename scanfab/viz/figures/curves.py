@@ -20,20 +20,13 @@ from scanfab.viz.figures.style import COLOURS, LOOKS, band, plain, widen
 
 Look = dict[str, Any]
 
-# of curves that are told apart by their sources, or by the sizes of their RVs
+COLOURS_OF_MANY = ("blue", "vermilion", "green", "purple", "orange", "sky", "black")
+LINES = ("-", "--", "-.", ":")
+# of curves that are told apart by their sources, or by the sizes of their RVs, and of as many more
 MANY_LOOKS: tuple[Look, ...] = tuple(
-    {"color": COLOURS[colour], "marker": marker, "ls": line}
-    for colour, marker, line in zip(
-        ("blue", "vermilion", "green", "purple", "orange", "sky", "black"),
-        "o^DsvPX",
-        ("-", "--", "-.", ":", "-", "--", "-."),
-        strict=True,
-    )
-)
-# of as many more, likewise but open
-MANY_LOOKS += tuple(
-    {**look, "ls": line, "mfc": "white", "ms": 5.5}
-    for look, line in zip(MANY_LOOKS, ("--", "-.", ":", "-", "--", "-.", ":"), strict=True)
+    {"color": COLOURS[colour], "marker": marker, "ls": LINES[(place + turn) % 4], **more}
+    for turn, more in enumerate(({}, {"mfc": "white", "ms": 5.5}))
+    for place, (colour, marker) in enumerate(zip(COLOURS_OF_MANY, "o^DsvPX", strict=True))
 )
 OTHER: Look = {"color": "0.3", "marker": "v", "ls": "-"}
 MEANINGS = {"a": "whole", "b": "whole, rattlers void", "c": "RV", "d": "RV, rattlers void"}

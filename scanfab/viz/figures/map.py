@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -14,23 +14,14 @@ from matplotlib.figure import FigureBase
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.table.row import column_of, number_of, numbers_of, total_error
+from scanfab.viz.figures.curves import Quantity
 from scanfab.viz.figures.figure import Figure
 from scanfab.viz.figures.style import FRAME_LOOKS, LABELS, WIDTH, band
 
-
-class Quantity(NamedTuple):
-    """What is drawn of each block."""
-
-    column: str
-    label: str
-    scale: float = 1.0
-    signed: bool = False
-    """Whether it is an anisotropy: with its total error, and zero in the middle of its colours."""
-
-
+# anisotropies have total errors, and zero in the middle of their colours
 QUANTITIES = (
-    Quantity("alpha_vs_axial", LABELS["alpha_vs_axial"], 1e3, True),
-    Quantity("alpha_c_axial", LABELS["alpha_c_axial"], 1e2, True),
+    Quantity("alpha_vs_axial", LABELS["alpha_vs_axial"], 1e3, "total"),
+    Quantity("alpha_c_axial", LABELS["alpha_c_axial"], 1e2, "total"),
     Quantity("mean_length", "mean length\n(dump's unit)"),
     Quantity("solid_fraction", "solid fraction"),
     Quantity("coordination", "coordination"),
@@ -149,11 +140,11 @@ class Map(Figure):
         looks = FRAME_LOOKS[-len(self.frames) :]
         for rows, look in zip(self.frames, looks, strict=True):
             place, label = _places(rows)
-            value = one.scale * column_of(rows, one.column)
+            value = one.factor * column_of(rows, one.column)
             error = column_of(rows, f"{one.column}_se")
-            if one.signed:
+            if one.errors == "total":
                 error = np.array([total_error(row, one.column) for row in rows], np.float64)
-            band(axes, place, value, one.scale * error, look)
+            band(axes, place, value, one.factor * error, look)
             strain = number_of(rows[0], "strain")
             name = f"frame {rows[0].get('frame')}"
             name += "" if strain is None else f", strain {strain:.3g}"
@@ -163,7 +154,7 @@ class Map(Figure):
             hollow = {"ls": "", "marker": look["marker"], "mfc": "white", "mec": look["color"]}
             axes.plot(place[outer], value[outer], **hollow)
             axes.set(xlabel=label, ylabel=one.label)
-        if one.signed:
+        if one.errors == "total":
             axes.axhline(0, color="0.6", lw=0.6, zorder=0)
 
     def _planes(self, part: FigureBase) -> list[Axes]:
@@ -177,7 +168,7 @@ class Map(Figure):
     def _draw_plane(self, axes: Axes, one: Quantity, axis: int) -> Any:
         """The blocks next to the middle along an axis."""
         rows = self.frames[-1]
-        middles, values = _middles(rows), one.scale * column_of(rows, one.column)
+        middles, values = _middles(rows), one.factor * column_of(rows, one.column)
         number, steps = lattice_of(middles)
         # of two planes next to the middle the lower one
         chosen = np.flatnonzero(number[:, axis] == number[:, axis].max() // 2)
@@ -190,7 +181,7 @@ class Map(Figure):
         places = middles[chosen[0]] - columns[0] * steps[across] - lines[0] * steps[up]
         places = places + at_column[..., None] * steps[across] + at_line[..., None] * steps[up]
         x, y = places[..., across], places[..., up]
-        colours, low, high = _limits(values, one.signed)
+        colours, low, high = _limits(values, one.errors == "total")
         drawn = axes.pcolormesh(
             x,
             y,
