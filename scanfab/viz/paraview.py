@@ -54,92 +54,6 @@ def vtk_folders(
     return [VtkFolder(one, go_on, meshes_of) for one in chosen]
 
 
-class VtkFolder:
-    """
-    A folder of the ParaView files of one series, to be called with each of its computed frames.
-
-    Parameters
-    ----------
-    folder : Path
-        Is made if it does not exist.
-    go_on : bool, optional
-        Keep the frames of an earlier run in the collections.
-    meshes_of : callable, optional
-        The meshes of a frame: :func:`frame_meshes` or :func:`map_meshes`.
-
-    Raises
-    ------
-    SettingsError
-        If the folder cannot be made or written to.
-    """
-
-    def __init__(
-        self,
-        folder: Path,
-        go_on: bool = False,
-        meshes_of: Callable[[FrameResult], Meshes] | None = None,
-    ) -> None:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise SettingsError(f"vtk: {folder} cannot be made: {error.strerror}") from None
-        check_folder(folder / "grains.pvd")
-        self.folder, self.go_on = folder, go_on
-        self.meshes_of = meshes_of or frame_meshes
-        # of each kind the time of each of its files
-        self._times: dict[str, dict[str, float]] = {}
-        # frames come from several threads, and VTK is not made for that
-        self._lock = Lock()
-
-    def __call__(self, result: FrameResult) -> None:
-        """Write all files of a frame, and the collections with it."""
-        packing = result.sample.packing
-        known = [one for one in (packing.time, packing.step, result.number) if one is not None]
-        with self._lock:
-            for kind, mesh, fields in self.meshes_of(result):
-                suffix = "vtu" if type(mesh).__name__ == "UnstructuredGrid" else "vtp"
-                file = f"{kind}_{result.number:06d}.{suffix}"
-                save_mesh(mesh, self.folder / file, fields)
-                self._collect(kind, file, float(known[0]))
-
-    def _collect(self, kind: str, file: str, time: float) -> None:
-        """Add a file to the collection of its kind, which is whole after each frame."""
-        path = self.folder / f"{kind}.pvd"
-        if kind not in self._times:
-            before = path.read_text("utf-8") if self.go_on and path.exists() else ""
-            self._times[kind] = {name: float(at) for at, name in ENTRY.findall(before)}
-        self._times[kind][file] = time
-        entries = sorted((at, name) for name, at in self._times[kind].items())
-        lines = [f'    <DataSet timestep="{at!r}" file="{name}"/>\n' for at, name in entries]
-        text = (
-            '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
-            f"{''.join(lines)}  </Collection>\n</VTKFile>\n"
-        )
-        with whole_file(path) as part:
-            part.write_text(text, encoding="utf-8")
-
-
-def save_mesh(mesh: Any, path: Path, fields: Fields) -> None:
-    """
-    Write a mesh with field data; the file is complete or untouched.
-
-    A field with the name of an array of the mesh is called ``row_NAME``: viewers ask by name.
-    """
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
-
-    taken = {*mesh.point_data, *mesh.cell_data}
-    for name, values in fields.items():
-        mesh.field_data[f"row_{name}" if name in taken else name] = values
-    writer = vtkXMLUnstructuredGridWriter() if path.suffix == ".vtu" else vtkXMLPolyDataWriter()
-    writer.SetInputData(mesh)
-    writer.SetDataModeToBinary()
-    # into memory first, as VTK crashes when it writes to a full disk
-    writer.WriteToOutputStringOn()
-    writer.Write()
-    with whole_file(path) as part:
-        part.write_text(writer.GetOutputString(), encoding="utf-8", newline="\n")
-
-
 def frame_meshes(result: FrameResult) -> Meshes:
     """The grains, contacts and RVs of a frame, and what each variant's scan says."""
     from scanfab.viz import meshes
@@ -228,3 +142,83 @@ def _fields(rows: list[Row]) -> dict[str, Any]:
         else:
             columns[name] = np.array([np.nan if v is None else v for v in values], np.float64)
     return columns
+
+
+class VtkFolder:
+    """
+    A folder of the ParaView files of one series, to be called with each of its computed frames.
+
+    Parameters
+    ----------
+    folder : Path
+        Is made if it does not exist.
+    go_on : bool, optional
+        Keep the frames of an earlier run in the collections.
+    meshes_of : callable, optional
+        The meshes of a frame: :func:`frame_meshes` or :func:`map_meshes`.
+
+    Raises
+    ------
+    SettingsError
+        If the folder cannot be made or written to.
+    """
+
+    def __init__(self, folder: Path, go_on: bool = False, meshes_of: Any = frame_meshes) -> None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise SettingsError(f"vtk: {folder} cannot be made: {error.strerror}") from None
+        check_folder(folder / "grains.pvd")
+        self.folder, self.go_on, self.meshes_of = folder, go_on, meshes_of
+        # of each kind the time of each of its files
+        self._times: dict[str, dict[str, float]] = {}
+        # frames come from several threads, and VTK is not made for that
+        self._lock = Lock()
+
+    def __call__(self, result: FrameResult) -> None:
+        """Write all files of a frame, and the collections with it."""
+        packing = result.sample.packing
+        known = [one for one in (packing.time, packing.step, result.number) if one is not None]
+        with self._lock:
+            for kind, mesh, fields in self.meshes_of(result):
+                suffix = "vtu" if type(mesh).__name__ == "UnstructuredGrid" else "vtp"
+                file = f"{kind}_{result.number:06d}.{suffix}"
+                save_mesh(mesh, self.folder / file, fields)
+                self._collect(kind, file, float(known[0]))
+
+    def _collect(self, kind: str, file: str, time: float) -> None:
+        """Add a file to the collection of its kind, which is whole after each frame."""
+        path = self.folder / f"{kind}.pvd"
+        if kind not in self._times:
+            before = path.read_text("utf-8") if self.go_on and path.exists() else ""
+            self._times[kind] = {name: float(at) for at, name in ENTRY.findall(before)}
+        self._times[kind][file] = time
+        entries = sorted((at, name) for name, at in self._times[kind].items())
+        lines = [f'    <DataSet timestep="{at!r}" file="{name}"/>\n' for at, name in entries]
+        text = (
+            '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+            f"{''.join(lines)}  </Collection>\n</VTKFile>\n"
+        )
+        with whole_file(path) as part:
+            part.write_text(text, encoding="utf-8")
+
+
+def save_mesh(mesh: Any, path: Path, fields: Fields) -> None:
+    """
+    Write a mesh with field data; the file is complete or untouched.
+
+    A field with the name of an array of the mesh is called ``row_NAME``: viewers ask by name.
+    """
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
+
+    taken = {*mesh.point_data, *mesh.cell_data}
+    for name, values in fields.items():
+        mesh.field_data[f"row_{name}" if name in taken else name] = values
+    writer = vtkXMLUnstructuredGridWriter() if path.suffix == ".vtu" else vtkXMLPolyDataWriter()
+    writer.SetInputData(mesh)
+    writer.SetDataModeToBinary()
+    # into memory first, as VTK crashes when it writes to a full disk
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    with whole_file(path) as part:
+        part.write_text(writer.GetOutputString(), encoding="utf-8", newline="\n")

@@ -255,18 +255,15 @@ def aim(
     right = np.cross(up, toward)
     right /= np.linalg.norm(right)
     upright = np.cross(toward, right)
-    across, along = points @ right, points @ upright
-    left, far_right = (across - radius).min(), (across + radius).max()
-    low, high = (along - radius).min(), (along + radius).max()
+    frame = np.stack([right, upright, toward])
+    at = points @ frame.T
+    low, high = (at - radius[:, None]).min(axis=0), (at + radius[:, None]).max(axis=0)
+    width, height, _ = high - low
     # half the picture's height: the sample, with the words above and the scale below it
-    half = 0.5 * max(
-        (high - low) / (1.0 - TOP - BOTTOM), (far_right - left) * SIZE[1] / SIZE[0] / 0.96
-    )
-    middle = (
-        0.5 * (left + far_right) * right
-        + (0.5 * (low + high) + (TOP - BOTTOM) * half) * upright
-        + (points.mean(axis=0) @ toward) * toward
-    )
+    half = 0.5 * max(height / (1.0 - TOP - BOTTOM), width * SIZE[1] / SIZE[0] / 0.96)
+    middle = 0.5 * (low + high) + np.array([0.0, (TOP - BOTTOM) * half, 0.0])
+    middle[2] = at[:, 2].mean()
+    middle = middle @ frame
     plotter.enable_parallel_projection()
     plotter.camera_position = [middle + 10.0 * half * toward, middle, upright]
     plotter.camera.parallel_scale = half

@@ -58,19 +58,13 @@ class Cutoffs(OnePanel):
     order = 7
     slow = True
     size = (COLUMN, 3.4)
+    drawn = "Void anisotropy along the loading axis over the cut-off"
+    more = ", with total standard errors"
 
     @cached_property
     def curves(self) -> list[CutoffCurve]:
         """What is drawn of each frame."""
         return [_curve_of(one) for one in self.chosen(self.data.with_lines_of_table)]
-
-    @property
-    def caption(self) -> str:
-        """With the variant and the source."""
-        return (
-            f"Void anisotropy along the loading axis over the cut-off, {self.data.name}, with "
-            f"total standard errors."
-        )
 
     @property
     def note(self) -> str:

@@ -143,10 +143,18 @@ class FrameFigure(Figure):
 
     kind = "frames"
     columns = ("variant", "alpha_vs_axial")
+    drawn: ClassVar[str] = ""
+    """What is drawn: the caption goes on with the variant and the source, and ``more``."""
+    more: ClassVar[str] = ""
 
     def __init__(self, data: ScannedFrames, frame: int | None = None) -> None:
         super().__init__(data)
         self.frame = frame
+
+    @property
+    def caption(self) -> str:
+        """With the variant and the source; without ``drawn`` as in other figures."""
+        return f"{self.drawn}, {self.data.name}{self.more}." if self.drawn else super().caption
 
     def chosen(self, frames: list[ScannedFrame]) -> list[ScannedFrame]:
         """All of the frames, or the one that is asked for."""

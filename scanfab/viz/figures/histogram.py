@@ -46,18 +46,12 @@ class Histogram(OnePanel):
 
     order = 6
     size = (COLUMN, 3.2)
+    drawn, more = "Lengths of the void segments", "; those below the cut-off are dropped"
 
     @cached_property
     def samples(self) -> list[LengthSample]:
         """What is drawn of each frame."""
         return [_lengths_of(one) for one in self.chosen(self.data.frames)]
-
-    @property
-    def caption(self) -> str:
-        """With the variant and the source."""
-        return (
-            f"Lengths of the void segments, {self.data.name}; those below the cut-off are dropped."
-        )
 
     def paint(self, ax: Axes) -> None:
         """Density of the lengths; those below the cut-off are on grey."""

@@ -55,6 +55,7 @@ class Projection(DirectionalFigure):
     """
 
     order = 5
+    drawn = "Mean void length and contact normals over all directions"
 
     @cached_property
     def deviations(self) -> list[dict[str, FloatArray | None]]:
@@ -69,9 +70,8 @@ class Projection(DirectionalFigure):
     @property
     def caption(self) -> str:
         """With how large the lobes are by chance alone."""
-        drawn = f"Mean void length and contact normals over all directions, {self.data.name}."
         noise = map(noise_note, self.frames, self.deviations)
-        return " ".join(filter(None, [drawn, *noise, self.data.note]))
+        return " ".join(filter(None, [super().caption, *noise, self.data.note]))
 
     def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> None:
         """Disks with one scale of colours, which stands beside them; of discs curves."""

@@ -104,6 +104,7 @@ class Rose(DirectionalFigure):
     order = 4
     slow = True
     projection = "polar"
+    drawn = "Mean void length and contact normals over the azimuth, relative to isotropy"
 
     def __init__(
         self,
@@ -149,14 +150,6 @@ class Rose(DirectionalFigure):
         """A row for each frame, and the legend."""
         entries = -(-len(self.looks) // MOST_COLUMNS)
         return WIDTH, 3.0 * len(self.frames) + 0.7 + 0.2 * entries
-
-    @property
-    def caption(self) -> str:
-        """With the variant and the source."""
-        return (
-            f"Mean void length and contact normals over the azimuth, relative to isotropy, "
-            f"{self.data.name}."
-        )
 
     def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> float:
         """Rings about 1 at the polar angles; how far the scale reaches from 1."""

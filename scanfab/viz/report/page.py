@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
-from scanfab.base.files import check_folder, whole_file
+from scanfab.base.files import check_folder
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.viz.figures.figure import Figure
@@ -56,12 +56,6 @@ def check_page_file(path: Path) -> None:
     check_folder(path)
 
 
-def save_page(path: Path, page: str) -> None:
-    """Write a page; the file is complete or untouched."""
-    with whole_file(path) as part:
-        part.write_text(page, encoding="utf-8", errors="backslashreplace")
-
-
 def render_page(**content: Any) -> str:
     """
     The page, made of what the template ``page.html`` names.
@@ -86,11 +80,8 @@ def _symbols(text: str) -> Any:
     """A text, escaped, with the indices of α set low."""
     from markupsafe import Markup, escape
 
-    low = {"α_vs": "α<sub>vs</sub>", "α_c": "α<sub>c</sub>"}
-    marked = str(escape(text))
-    for plain, markup in low.items():
-        marked = marked.replace(plain, markup)
-    return Markup(marked)
+    marked = str(escape(text)).replace("α_vs", "α<sub>vs</sub>")
+    return Markup(marked.replace("α_c", "α<sub>c</sub>"))
 
 
 def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
@@ -153,14 +144,9 @@ def _window_data(window: Convex, turn: FloatArray, scale: float) -> dict[str, An
 
 def _upright(axis: FloatArray, space: Space) -> FloatArray:
     """The rotation (rows) after which the axis is z; keeps x, y and z where it can."""
-    if space.is_plane:
-        # y leads away from the viewer
-        away = -towards_viewer(axis, space)
-        return np.stack([np.cross(away, axis), away, axis])
-    across = np.eye(3)[np.argmin(np.abs(axis))]
-    first = across - (across @ axis) * axis
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(axis, first), axis])
+    # y leads away from the viewer
+    away = -towards_viewer(axis, space)
+    return np.stack([np.cross(away, axis), away, axis])
 
 
 def _axes(up: FloatArray, turn: FloatArray) -> list[list[Any]]:

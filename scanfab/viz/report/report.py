@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning, SettingsError
+from scanfab.base.files import whole_file
 from scanfab.io.families import PathLike
 from scanfab.pipeline.options import as_options
 from scanfab.pipeline.record import read_manifest
@@ -22,7 +23,7 @@ from scanfab.table.selection import choose_rows
 from scanfab.viz.figures.page import make_figures
 from scanfab.viz.report.caveats import caveats_of
 from scanfab.viz.report.frames import Input, show_frames
-from scanfab.viz.report.page import Picture, check_page_file, picture_of, render_page, save_page
+from scanfab.viz.report.page import Picture, check_page_file, picture_of, render_page
 from scanfab.viz.report.tables import (
     frame_table,
     input_table,
@@ -76,7 +77,8 @@ class Report:
             If it has another suffix, or the folder does not exist.
         """
         check_page_file(Path(path))
-        save_page(Path(path), self.page)
+        with whole_file(Path(path)) as part:
+            part.write_text(self.page, encoding="utf-8", errors="backslashreplace")
 
 
 def make_report(
