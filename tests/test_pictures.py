@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from scanfab.viz.figures.evolution import Evolution
+from scanfab.viz.figures.curves import Evolution
 from scanfab.viz.figures.page import drawn_page, make_figures
 from tests.conftest import ROOT
 from tests.helpers.tables import curve

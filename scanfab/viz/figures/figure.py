@@ -165,31 +165,6 @@ class FrameFigure(Figure):
         return found
 
 
-class OnePanel(FrameFigure):
-    """A figure of frames in one panel, which needs ``paint``; on a page its legend is above it."""
-
-    @property
-    def note(self) -> str:
-        """What stands above the legend."""
-        return ""
-
-    def paint(self, ax: Axes) -> None:
-        """Draw on one Axes, without the legend."""
-        raise NotImplementedError
-
-    def draw(self, ax: Axes) -> None:
-        """With the legend in the panel."""
-        self.paint(ax)
-        ax.legend(title=self.note or None)
-
-    def panels(self, part: FigureBase) -> list[Axes]:
-        """One panel, with the legend above it."""
-        axes = part.subplots()
-        self.paint(axes)
-        part.legend(loc="outside upper left", title=self.note or None)
-        return [axes]
-
-
 class DirectionalFigure(FrameFigure):
     """
     Void lengths and contact normals of frames over all directions; needs ``draw_column``.

@@ -17,7 +17,7 @@ from scanfab.fabric.distribution import direction_points, fit_even
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
 from scanfab.table.row import total_error
-from scanfab.viz.figures.cutoffs import CutoffCurve, Cutoffs
+from scanfab.viz.figures.lengths import CutoffCurve, Cutoffs
 from scanfab.viz.figures.page import drawn_page, find_figure, make_figures, save_figures
 from scanfab.viz.figures.projection import (
     contact_noise,

@@ -61,7 +61,7 @@ def page(computed):
 def quick(monkeypatch):
     """Without the figures that take another scan."""
     monkeypatch.setattr(
-        "scanfab.viz.report.frames._pictures", lambda *_: [Picture("data:,", "none", 1)]
+        "scanfab.viz.report.report._pictures", lambda *_: [Picture("data:,", "none", 1)]
     )
 
 
@@ -318,7 +318,7 @@ def test_an_rv_is_a_part_of_the_sample_without_grains_that_flew_away(tmp_path, q
 
 
 def test_a_scan_that_takes_too_long_for_a_picture_is_rougher_and_labelled(copied, monkeypatch):
-    monkeypatch.setattr("scanfab.viz.report.frames.MOST_SEGMENTS", 1e4)
+    monkeypatch.setattr("scanfab.viz.report.report.MOST_SEGMENTS", 1e4)
     assert re.search(
         r"Scanned to a standard error of 0\.\d+ instead of the table's 0\.0005",
         words_of(page_of([copied])),
