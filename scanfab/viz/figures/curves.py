@@ -139,8 +139,8 @@ class Curves(Figure):
     """
     Quantities of a table over the strain, or over the frames.
 
-    Each group of curves (:func:`groups_of`) has a panel for each
-    quantity. One Axes holds one group and its first quantity.
+    Each group of curves (:func:`groups_of`) has a panel for each quantity. One Axes holds one group
+    and its first quantity.
     """
 
     lettered = True
