@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from scanfab.viz.figures.evolution import Evolution
+from scanfab.viz.figures.curves import Evolution
 from scanfab.viz.figures.page import drawn_page, make_figures
 from tests.conftest import ROOT
 from tests.helpers.tables import curve
@@ -60,6 +60,9 @@ def test_other_numbers_words_and_sizes_are_told_and_last_digits_are_not(monkeypa
     for changed in (other, errors, rows[:-1]):
         assert pictures.differences(before, content(changed))
     monkeypatch.setattr(Evolution, "height", 3.5)
+    assert pictures.differences(before, content(rows))
+    monkeypatch.undo()
+    monkeypatch.setattr("scanfab.viz.figures.curves.MEANINGS", {"c": "another word"})
     assert pictures.differences(before, content(rows))
     assert pictures.differences([1.0, "a", 0.0], [1.0 + 1e-5, "a", 1e-9]) == []
     assert pictures.differences([1.0, "a"], [1.01, "a"]) == ["1.0, now 1.01"]

@@ -33,8 +33,7 @@ def view(
     """
     from scanfab.base.files import check_folder
     from scanfab.table.curves import middle_out, spelt_strain
-    from scanfab.viz.frame_view import look_at
-    from scanfab.viz.scene import section_lines
+    from scanfab.viz.scene import look_at, section_lines
     from scanfab.viz.window3d import check_screen, show_scene
 
     reading, settings = checked({**chosen, "variants": "c"}, scanfab.Settings)

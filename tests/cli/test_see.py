@@ -17,7 +17,6 @@ from scanfab.io.sources import read_series
 from scanfab.pipeline.strain import shear_strain
 from scanfab.table.compare import compare_tables
 from scanfab.table.formats import read_rows
-from scanfab.viz.figures.correlation import fits_of
 from scanfab.viz.window3d import check_drawing
 from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import cubic_rows, dump_text, write
@@ -76,8 +75,7 @@ def test_compare_draws_the_fit_that_it_prints(table, tmp_path, ask):
         words = ["--plot", plot, "--figure", name, "--strain-max", "0.03"]
         row = ask("compare", table, "--summary", *words).rows[0]
         assert plot.read_bytes().startswith(b"%PDF")
-    fit = fits_of(compare_tables(read_rows(table), strain_max=0.03))[0]
-    assert fit is not None
+    fit = compare_tables(read_rows(table), strain_max=0.03).summary[0]
     assert float(row["slope"]) == fit.slope
 
 

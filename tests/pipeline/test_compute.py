@@ -11,7 +11,7 @@ from scanfab.packing.packing import Packing
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.settings import Settings
-from scanfab.viz.frame_view import look_at
+from scanfab.viz.scene import look_at
 from tests.helpers.dumps import dump_text, pairs_text, write
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin"}

@@ -9,7 +9,7 @@ import scanfab
 from scanfab import Settings, SettingsError
 from scanfab.packing import rattlers
 from scanfab.pipeline.inspection import inspect_series
-from scanfab.viz.frame_view import look_at
+from scanfab.viz.scene import look_at
 from tests.helpers.dumps import dump_text, write
 from tests.helpers.lattices import simple_cubic
 from tests.helpers.plugins import offer
