@@ -32,6 +32,7 @@ from scanfab.pipeline.record import (
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.told import Told
 from scanfab.pipeline.values import as_written
+from scanfab.table.formats import read_rows
 from scanfab.table.row import Row
 from scanfab.table.writing import ALL, Excerpt, check_output, manifest_of, write_rows
 
@@ -163,7 +164,8 @@ class Job:
             If the file cannot be written to.
         """
         assert self.output is not None
-        if not self.resume and manifest_of(self.output).is_file() and self.output.is_file():
+        is_table = self.output.is_file() and manifest_of(self.output).is_file()
+        if is_table and not self.resume:
             what = "the table that is there will be replaced at the end of this run"
             note(f"{self.output}: {what}; `resume` would go on with it")
         if not (self.resume and self._part.frames):
@@ -174,6 +176,11 @@ class Job:
             new = [file for file in dict.fromkeys(files) if file not in known]
             self._part.add([input_entry(file) for file in new], rows)
             known.update(new)
+        if is_table and not self.finished and read_rows(self.output):
+            raise SettingsError(
+                f"{self.output}: this run has no rows, so the table that is there stays as it is: "
+                f"choose other `frames`, or another `output=FILE`"
+            )
         columns = self.settings.columns
         write_rows(self.output, self.every_row, columns, self.excerpt, self.save_manifests)
         self._part.remove()

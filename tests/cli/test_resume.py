@@ -460,3 +460,16 @@ def test_what_is_read_beside_the_grains_is_an_input(compute):
     assert compute("t.csv", *words, **source) == (0, 0)
     cells[0].write_bytes(gzip.compress(b"something else"))
     assert compute("t.csv", *words, **source) == (2, 0)
+
+
+def test_a_run_without_rows_leaves_the_table_that_is_there(compute, capsys):
+    """In an array of more jobs than frames, a job without frames still writes its own table."""
+    assert compute("table.csv")[0] == 0
+    before = Path("table.csv").read_bytes()
+    capsys.readouterr()
+    assert compute("table.csv", "--frames", "9:")[0] == 1
+    assert (
+        "this run has no rows, so the table that is there stays as it is" in capsys.readouterr().err
+    )
+    assert Path("table.csv").read_bytes() == before
+    assert [compute("other.csv", "--frames", "9:")[0] for _ in range(2)] == [0, 0]
