@@ -138,7 +138,7 @@ def test_the_first_signal_ends_it_in_order(process, folder, finished, sent):
     process.send_signal(sent)
     said = process.stderr.read()
     assert process.wait(60) == 0, said
-    assert "frames under way are finished" in said
+    assert "finishing frames under way" in said
     assert not Path("t.csv.part").exists()
     (folder / files[2].name).unlink()
     assert Path("t.csv").read_bytes() == finished_run()
@@ -188,7 +188,7 @@ def test_a_last_file_that_is_never_whole_is_left_out(folder, finished, capsys):
     (folder / files[1].name).write_bytes(files[1].read_bytes()[:300])
     assert follow(seconds=1.5) == 0
     said = capsys.readouterr().err
-    assert f"warning: dumps/{files[1].name}: is left out, as it was not whole" in said
+    assert f"warning: dumps/{files[1].name}: left out, because it was incomplete" in said
     (folder / files[1].name).unlink()
     assert Path("t.csv").read_bytes() == finished_run()
 
@@ -217,7 +217,7 @@ def test_what_belongs_before_is_an_error(folder, finished):
     assert next(frames).number == 0
     assert next(frames).number == 1
     shutil.copy(files[0], folder)
-    with pytest.raises(ReadError, match=f"{files[1].name}: was taken as frame 0, but since then"):
+    with pytest.raises(ReadError, match=f"{files[1].name}: was read as frame 0, but since then"):
         next(frames)
 
 
@@ -229,7 +229,7 @@ def test_a_file_that_grows_after_it_was_taken_is_an_error(folder, finished):
     next(frames), next(frames)
     with open(folder / files[1].name, "a") as stream:
         stream.write("\n")
-    with pytest.raises(ReadError, match=f"{files[1].name}: was taken as frame 1, but since then"):
+    with pytest.raises(ReadError, match=f"{files[1].name}: was read as frame 1, but since then"):
         next(frames)
 
 
