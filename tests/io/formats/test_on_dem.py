@@ -76,8 +76,8 @@ def virtual_data(group):
 
 
 SPOILT = {
-    "z stands in another file": lambda one: one.update({"z": h5py.ExternalLink("b.h5", "/x")}),
-    "data of .*z stand in another file": lambda one: one.create_dataset(
+    "z is in another file": lambda one: one.update({"z": h5py.ExternalLink("b.h5", "/x")}),
+    "data of .*z are in another file": lambda one: one.create_dataset(
         "z", (3,), "f8", external=[("z.bin", 0, 24)]
     ),
     "of VTKHDF/PointData/z stand in another": virtual_data,
