@@ -206,9 +206,10 @@ def test_that_columns_of_contacts_have_no_place_is_told_once(tmp_path):
             warnings.simplefilter("always")
             scanfab.convert(source, tmp_path / "out", to="csv")
         found = [str(one.message) for one in caught if "of contacts" in str(one.message)]
-        assert [one.endswith("only pairs, images and forces are written") for one in found] == [
-            True
-        ] * bool(told)
+        assert [
+            one.endswith("only pairs, images and forces of the contacts are written")
+            for one in found
+        ] == [True] * bool(told)
         assert all(told in one for one in found)
 
 
