@@ -72,14 +72,10 @@ def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
     series = open_one(sources, reading, "calibrated")
     announce([series], settings.workers)
     with working():
-        calibration = scanfab.calibrate(series, frame=frame, **vars(settings))
-    rows = [replace(row, note=as_options(row.note)) for row in calibration.rows]
+        result = scanfab.calibrate(series, frame=frame, **vars(settings))
+    rows = [replace(row, note=as_options(row.note)) for row in result.rows]
     usual = scanfab.Settings()
-    best: Any = {
-        "max_chords": usual.max_chords,
-        "tolerance": usual.tolerance,
-        **calibration.options,
-    }
+    best: Any = {"max_chords": usual.max_chords, "tolerance": usual.tolerance, **result.options}
     command = repeat_command(asked_for(sources, reading, replace(settings, **best)))
     if outputs.output is not None:
         write_rows(outputs.output, rows, columns, excerpt)
@@ -90,7 +86,7 @@ def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
     elif outputs.output is None:
         _print(rows)
     # if CSV goes to standard output, the findings must not mix with it
-    for sentence in (*calibration.findings, command):
+    for sentence in (*result.findings, command):
         click.echo(sentence, err=not tells_all)
     return 0
 

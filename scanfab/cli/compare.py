@@ -103,11 +103,9 @@ def print_comparison(comparison: Comparison) -> None:
 
     summary, frames = shown(comparison.summary), shown(comparison.frames)
     for row in summary:
-        own_frames = [
-            frame for frame in frames if all(frame[k] == row[k] for k in ("source", "variant"))
-        ]
-        row["alpha_vs"] = _bars([frame["alpha_vs_axial_norm"] for frame in own_frames])
-        row["alpha_c"] = _bars([frame["alpha_c_axial_norm"] for frame in own_frames])
+        own = [frame for frame in frames if all(frame[k] == row[k] for k in ("source", "variant"))]
+        row["alpha_vs"] = _bars([frame["alpha_vs_axial_norm"] for frame in own])
+        row["alpha_c"] = _bars([frame["alpha_c_axial_norm"] for frame in own])
     for rows, columns in ((summary, SUMMARY), (frames, FRAMES)):
         kept = [name for name in columns if name not in left_out]
         print_rows(rows, kept, 1)

@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 
 @click.command(cls=SourceCommand)
 @options("READING", "frames", "SAMPLE", "WINDOW")
-@click.option(
-    "--json", "as_json", is_flag=True, help="Print one JSON object per frame, each on a line."
-)
+@click.option("--json", "as_json", is_flag=True, help="Print each frame as a line of JSON.")
 def inspect(sources: tuple[str, ...], as_json: bool, **chosen: Any) -> int:
     """
     Show what the reader finds in each frame: grains, radii, contacts, rattlers, cell, columns,
@@ -39,9 +37,7 @@ def inspect(sources: tuple[str, ...], as_json: bool, **chosen: Any) -> int:
         return sum(len(range(series.frames_expected())[settings.frames]) for series in all_series)
 
     with working(frames, prints=True) as advance:
-        for found in (
-            report for series in all_series for report in inspect_series(series, settings)
-        ):
+        for found in (frame for series in all_series for frame in inspect_series(series, settings)):
             report = replace(found, warnings=[as_options(text) for text in found.warnings])
             if as_json:
                 click.echo(json.dumps(asdict(report), ensure_ascii=False))

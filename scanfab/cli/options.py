@@ -121,7 +121,7 @@ def in_order(declared: Mapping[str, Option]) -> list[str]:
 
 
 def _click_option(option: Option, changes: Mapping[str, Any]) -> Callable[[Function], Function]:
-    """The click option of a declared one; ``changes`` replaces attributes of click's option."""
+    """The click option for a declared option; ``changes`` replaces its attributes."""
     is_folder = option.metavar == "DIR"
     a_path = click.Path(dir_okay=is_folder, file_okay=not is_folder, path_type=Path)
     attributes = {
@@ -204,7 +204,7 @@ def check_labels(labels: tuple[str, ...], tables: tuple[Any, ...]) -> None:
     """Raise a usage error unless there is one label for each table, or none at all."""
     if labels and len(labels) != len(tables):
         raise click.UsageError(
-            f"--label: expected one per table ({len(tables)}), found {len(labels)}"
+            f"--label: expected one per table: {len(tables)}, found {len(labels)}"
         )
 
 

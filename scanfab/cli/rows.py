@@ -40,10 +40,7 @@ def write_table(sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Set
         (outputs.plot and chosen.get("cutoffs"), "--plot draws one cut-off: leave out --cutoffs"),
         (outputs.resume and not outputs.output, "--resume needs -o FILE"),
         ((outputs.follow_for or 0) < 0, "--follow-for: expected 0 or more"),
-        (
-            outputs.vtk and cluster,
-            "--vtk cannot be used with --scheduler: frames are computed on other machines",
-        ),
+        (outputs.vtk and cluster, "--vtk cannot be used with --scheduler: leave out one of them"),
     ):
         if is_wrong:
             raise click.UsageError(words)
@@ -65,9 +62,8 @@ def write_table(sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Set
         with usage_errors():
             executor = None
             if cluster:
-                dask = scanfab.dask_executor(
-                    outputs.scheduler, scheduler_file=outputs.scheduler_file
-                )
+                file = outputs.scheduler_file
+                dask = scanfab.dask_executor(outputs.scheduler, scheduler_file=file)
                 executor = stack.enter_context(dask)
             vtk, resume = outputs.vtk, outputs.resume
             job = Job(

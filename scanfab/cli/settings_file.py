@@ -43,9 +43,7 @@ def take_settings_file(ctx: click.Context, sources: Iterable[str]) -> None:
     for path in files:
         given = _read(path)
         try:
-            ctx.default_map = {
-                KEYS[key].name: _as_typed(key, value) for key, value in given.items()
-            }
+            ctx.default_map = {KEYS[key].name: _as_typed(key, given[key]) for key in given}
         except SettingsError as error:
             raise click.UsageError(f"{path}: {error}") from None
         ctx.meta[META] = path, list(given)
@@ -84,11 +82,7 @@ def _read(path: Path) -> dict[str, Any]:
     options: dict[str, Any] = content.get(SECTION, {})
     for key in (key for key in options if key not in KEYS):
         near = get_close_matches(key, KEYS, n=1)
-        hint = (
-            f"did you mean {near[0]!r}?"
-            if near
-            else "only options that say how samples are computed can be set"
-        )
+        hint = f"did you mean {near[0]!r}?" if near else "it may say how samples are computed"
         raise click.UsageError(f"{path}: {key!r} cannot be set in a settings file: {hint}")
     return options
 

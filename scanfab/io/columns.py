@@ -95,10 +95,8 @@ def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | Non
     """The cell of a frame: the user's options ``cell`` and ``periodic`` override the dump."""
     if options.beside is not None:
         cell = None if options.beside == "none" else options.beside
-    directions = options.periodic
-    periodic = (
-        None if directions is None else ("x" in directions, "y" in directions, "z" in directions)
-    )
+    along = options.periodic
+    periodic = None if along is None else ("x" in along, "y" in along, "z" in along)
     if options.cell is not None:
         lx, ly, lz, xy, xz, yz = (*options.cell, 0.0, 0.0, 0.0)[:6]
         vectors = [[lx, 0, 0], [xy, ly, 0], [xz, yz, lz]]
@@ -107,7 +105,7 @@ def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | Non
     if periodic is None:
         return cell
     if cell is None:
-        lacks = f'`periodic="{directions}"` needs a cell, and the dump has none'
+        lacks = f'`periodic="{along}"` needs a cell, and the dump has none'
         raise ReadError(f"{path}: {lacks}: give it with `cell=(LX, LY, LZ)`")
     return Cell(cell.vectors, periodic, cell.origin)
 
@@ -171,11 +169,8 @@ def _position(
         # Packing refuses infinite results
         with np.errstate(over="ignore", invalid="ignore"):
             return np.asarray(cell.origin + position @ cell.vectors)
-    listed, advice = (
-        ", ".join(rest) or "none",
-        '`columns={"x": ..., "y": ..., "z": ...}` names them',
-    )
-    raise ReadError(f"{where}: no coordinates (x y z, xu yu zu, xs ys zs) in {listed}; {advice}")
+    names, advice = ", ".join(rest) or "none", '`columns={"x": ..., "y": ..., "z": ...}` names them'
+    raise ReadError(f"{where}: no coordinates (x y z, xu yu zu, xs ys zs) in {names}; {advice}")
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -252,9 +247,7 @@ def _refuse_superquadrics(where: str, rest: Columns, radius: FloatArray) -> None
         count = np.count_nonzero(np.abs(rest[name] - value) > SIX_DIGITS * np.abs(value))
         if count:
             problem = f"{count} of {len(radius)} particles are superquadrics (by the column {name})"
-            raise ReadError(
-                f"{where}: {problem}: fill each with spheres, and join these by `bodies`"
-            )
+            raise ReadError(f"{where}: {problem}: fill them with spheres, joined by `bodies`")
 
 
 def first_of(known: Sequence[str], names: Iterable[str]) -> str | None:

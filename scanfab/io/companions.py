@@ -144,9 +144,7 @@ def _check_count(path: Path, count: int, what: str, frame: FrameData | None) -> 
     """ReadError if a file does not have as many rows as the frame file says."""
     if frame is not None and getattr(frame, what) not in (None, count):
         expected = f"but {frame.file.name} counts {getattr(frame, what)}"
-        raise ReadError(
-            f"{path}: holds {count} {what}, {expected}: the file is incomplete, or of another frame"
-        )
+        raise ReadError(f"{path}: holds {count} {what}, {expected}: it is cut or of another frame")
 
 
 class FrameData(NamedTuple):
@@ -216,9 +214,7 @@ def check_contacts_are_there(path: Path, frame: FrameData | None) -> None:
     is_empty = file.is_file() and not file.stat().st_size
     count = "" if frame is None or frame.contacts is None else f"{frame.contacts} "
     if count or is_empty:
-        found = (
-            "an empty file" if is_empty else "something else" if file.is_file() else "no such file"
-        )
+        found = "an empty file" if is_empty else "other words" if file.is_file() else "no such file"
         advice = 'copy it again, or choose `contacts="geometric"`'
         expected = f"expected the {count}contacts of {path.name}"
         raise ReadError(f"{file}: {expected}, found {found}: {advice}")

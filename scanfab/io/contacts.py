@@ -172,12 +172,8 @@ def _refuse_images(path: Path, grains: GrainTable, rows: IntArray, ends: FloatAr
         is_contact = (length > 0.5 * reach) & (length < 1.05 * reach)
         is_image |= np.any(is_same & is_contact & (other != partner[:, None]), axis=1)
     if is_image.sum() > 0.5 * len(partial):
-        problem = (
-            f"{is_image.sum()} contacts end at periodic images of grains, but there is no cell"
-        )
-        raise ReadError(
-            f"{path}: {problem}: name the cell with `cell=(LX, LY, LZ)` (and `periodic`)"
-        )
+        problem = f"{is_image.sum()} contacts end at periodic images, but there is no cell"
+        raise ReadError(f"{path}: {problem}: name it with `cell=(LX, LY, LZ)` (and `periodic`)")
 
 
 def count_walls(rows: IntArray, count: int) -> IntArray:

@@ -123,9 +123,7 @@ def _packings(source: Any, chosen: slice, reading: dict[str, Any]) -> Iterator[t
     if isinstance(source, str | os.PathLike):
         source = read_series(source, **reading)
     elif reading:
-        raise SettingsError(
-            f"`{next(iter(reading))}` applies to files, but the source is read already"
-        )
+        raise SettingsError(f"`{next(iter(reading))}` is for files that are not read yet")
     if isinstance(source, Series):
         for family in source.contacts:
             if companion_kind(family.largest) is None:

@@ -139,9 +139,7 @@ def sort_into_families(
     """
     files = set(files)
     groups = group_by_name(files) if groups is None else groups
-    chosen = [
-        ([member for member in group if member[1] in files], len(group) > 1) for group in groups
-    ]
+    chosen = [([pair for pair in group if pair[1] in files], len(group) > 1) for group in groups]
     return [_family_of(members, files, options, several) for members, several in chosen if members]
 
 

@@ -65,10 +65,7 @@ def fenced(function: Callable[..., Answer], path: Path, *more: Any) -> Answer:
             is_sound, answer = pickle.load(worker.stdout)
             idle.append(worker)
         except (OSError, EOFError, pickle.UnpicklingError):
-            is_sound, answer = (
-                False,
-                "the library that reads it crashed, or took too much time or memory",
-            )
+            is_sound, answer = False, "its library crashed, or took too much time or memory"
         finally:
             # the worker ended; or we were interrupted, and its answer to this call would come later
             if not idle:

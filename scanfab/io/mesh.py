@@ -223,13 +223,10 @@ def _read_by_vtk(path: str) -> Any:
     vtkOutputWindow.SetInstance(window)
     reader.Update()
     data = reader.GetOutputDataObject(0)
-    errors = [
-        text for text in window.GetOutput().split("\n\n\n") if text and not HARMLESS.search(text)
-    ]
-    if errors or data is None:
-        reason = re.sub(
-            r"^.*(\n.*\((0x[0-9a-f]+|nullptr)\):)?", "", errors[0] if errors else "no data"
-        )
+    texts = window.GetOutput().split("\n\n\n")
+    said = [text for text in texts if text and not HARMLESS.search(text)]
+    if said or data is None:
+        reason = re.sub(r"^.*(\n.*\((0x[0-9a-f]+|nullptr)\):)?", "", said[0] if said else "no data")
         raise damaged(" ".join(reason.split()))
     if content.startswith(b"# vtk"):
         places = (data.GetFieldData(), data.GetPointData(), data.GetCellData())
@@ -338,9 +335,8 @@ def _arrays(attributes: Any, rows: int | None) -> Columns:
         array = attributes.GetAbstractArray(place)
         name = array.GetName()
         if array.IsA("vtkStringArray"):
-            values = np.array(
-                [array.GetValue(k) for k in range(array.GetNumberOfValues())], dtype=str
-            )
+            count = array.GetNumberOfValues()
+            values = np.array([array.GetValue(k) for k in range(count)], dtype=str)
         else:
             values = _numpy(array)
         if rows is not None and len(values) != rows:

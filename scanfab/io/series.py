@@ -129,10 +129,8 @@ class Series:
         if isinstance(key, slice):
             numbers = self.numbers_of(key)
             if numbers.step < 0:
-                problem = (
-                    "frames stay in the order of their steps: list(series)[::-1] goes backwards"
-                )
-                raise SettingsError(problem)
+                order = "frames stay in the order of their steps: list(series)[::-1] goes backwards"
+                raise SettingsError(order)
             return self._with(numbers)
         place = index(key)
         frames = list(islice(self, place, place + 1) if place >= 0 else deque(self, -place))
@@ -357,22 +355,14 @@ def _of_moment(snapshots: Sequence[Snapshot], grains: Snapshot, sure: bool) -> S
 
     A single snapshot needs neither if the names make it ``sure`` that the files belong together.
     """
-    timed = [
-        (snapshot.time, snapshot)
-        for snapshot in snapshots
-        if snapshot.step is None and snapshot.time is not None
-    ]
+    timed = [(s.time, s) for s in snapshots if s.step is None and s.time is not None]
     if grains.step is None and grains.time is not None and timed:
         wanted = grains.time
         time, nearest = min(timed, key=lambda pair: abs(pair[0] - wanted))
         return nearest if abs(time - wanted) <= ROUNDING * abs(wanted) else None
     if len(snapshots) == 1 and None in (snapshots[0].step, grains.step):
         return snapshots[0] if sure else None
-    same = [
-        snapshot
-        for snapshot in snapshots
-        if snapshot.step is not None and snapshot.step == grains.step
-    ]
+    same = [s for s in snapshots if s.step is not None and s.step == grains.step]
     return same[0] if same else None
 
 

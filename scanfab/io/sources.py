@@ -190,9 +190,7 @@ def _series(given: Sequence[PathLike], contacts: PathLike, options: ReadOptions)
     if options.format is None:
         families = sorting.without_tables(families, paths)
     grains = _choose_grains(paths, families, options)
-    _tell_skipped(
-        [family for family in families if family is not grains and family.kind != "contacts"]
-    )
+    _tell_skipped([one for one in families if one is not grains and one.kind != "contacts"])
     chosen, origin = _choose_contacts(grains, families, groups if around else [], contacts, options)
     for family in (grains, *chosen):
         if family.clash is not None:
@@ -232,14 +230,10 @@ def _no_grains(
         return ReadError(problem)
     readable = [family for family in families if family.reader is not None]
     if readable:
-        held = ", ".join(
-            f"{HOLDS[family.kind]} ({Path(family.pattern).name})" for family in readable[:5]
-        )
+        held = ", ".join(f"{HOLDS[f.kind]} ({Path(f.pattern).name})" for f in readable[:5])
         return ReadError(f"{where}: no grains: expected points with a radius, found {held}")
     folders = [path for path in paths if path.is_dir()]
-    below = [
-        f"{entry}" for path in folders for entry in sorted(path.glob("[!.]*")) if entry.is_dir()
-    ]
+    below = [f"{sub}" for path in folders for sub in sorted(path.glob("[!.]*")) if sub.is_dir()]
     if below:
         return ReadError(f"{where}: the folder holds no dumps, only folders: name {some(below)}")
     if not families:
@@ -266,7 +260,7 @@ def _tell_skipped(families: Sequence[Family]) -> None:
         if family.problem is not None:
             damaged[family.problem.removeprefix(f"{family.largest}").lstrip(":, ")].append(name)
         elif family.kind != "cell":
-            held = "a table, perhaps of results" if family.is_table else HOLDS[family.kind]
+            held = "results or other tables" if family.is_table else HOLDS[family.kind]
             skipped[held].append(name)
     parts = []
     for held, names in skipped.items():

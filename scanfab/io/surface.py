@@ -29,9 +29,7 @@ def read_surface(path: Path) -> tuple[FloatArray, IntArray]:
     points, faces = fenced(faces_in_worker if is_vtp else faces_by_meshio, path)
     if points.shape != (len(points), 3) or not np.all(np.isfinite(points)):
         raise ReadError(f"{path}: expected points of three finite numbers")
-    if any(
-        corners.size and not 0 <= corners.min() <= corners.max() < len(points) for corners in faces
-    ):
+    if any(rows.size and not 0 <= rows.min() <= rows.max() < len(points) for rows in faces):
         raise ReadError(f"{path}: its faces name points that do not exist")
     fans = [corners[:, [0, k, k + 1]] for corners in faces for k in range(1, corners.shape[1] - 1)]
     return points, np.concatenate([np.zeros((0, 3), np.int64), *fans])
@@ -46,9 +44,6 @@ def faces_by_meshio(path: str) -> tuple[FloatArray, list[IntArray]]:
     except SystemExit:
         # meshio prints the reason, and exits
         raise ValueError(f"it is not a valid surface file ({Path(path).suffix})") from None
-    faces = [
-        np.asarray(block.data, np.int64)
-        for block in mesh.cells
-        if block.dim == 2 and len(block.data)
-    ]
+    blocks = [block for block in mesh.cells if block.dim == 2 and len(block.data)]
+    faces = [np.asarray(block.data, np.int64) for block in blocks]
     return np.asarray(mesh.points, np.float64), faces

@@ -85,15 +85,11 @@ def check_reader(
     )
     assert len(reader.description.splitlines()) == 1, "the description must be one line"
     assert isinstance(reader.extensions, tuple), "the extensions must be a tuple"
-    assert all(ending.startswith(".") for ending in reader.extensions), (
-        "extensions must begin with a dot"
-    )
+    assert all(end.startswith(".") for end in reader.extensions), "extensions begin with a dot"
     for name, data in FOREIGN.items():
         path = _put(folder, f"{name}.bin", data)
         is_known = _asked("recognises", reader.recognises, path)
-        assert not is_known, (
-            f"{path.name}: recognises() must be False: it is a file of another format"
-        )
+        assert not is_known, f"{path.name}: recognises() must be False for other formats"
         _try_all(reader, path, options)
     assert files, "expected at least one file to try the reader on"
     for file in files:
@@ -117,9 +113,7 @@ def _check_sound(reader: Reader, file: Path, folder: Path, options: ReadOptions)
         assert not changed, f"{file.name}: reading it twice gives different grains: {changed}"
         # the compressed copy lacks companion files, which may hold the cell
         other = [text for text in differences(one, three) if not text.startswith("cell")]
-        assert not other, (
-            f"{packed.name}: compressed, it gives different grains (use scanfab.io.plain): {other}"
-        )
+        assert not other, f"{packed.name}: its grains differ (use scanfab.io.plain): {other}"
     assert file.read_bytes() == before, f"{file.name}: reading must not change the file"
     return sum(map(len, first))
 
@@ -128,12 +122,8 @@ def _packings(reader: Reader, path: Path, options: ReadOptions) -> list[Packing]
     """The packings of all frames in a file."""
     packings = []
     for snapshot in reader.snapshots(path):
-        assert isinstance(snapshot, Snapshot), (
-            f"{path.name}: snapshots() must return Snapshot objects"
-        )
-        assert snapshot.step is None or isinstance(snapshot.step, int), (
-            "a step must be an int or None"
-        )
+        assert isinstance(snapshot, Snapshot), f"{path.name}: snapshots() gives Snapshot objects"
+        assert snapshot.step is None or isinstance(snapshot.step, int), "a step is an int or None"
         table = reader.read_grains(snapshot, options)
         assert isinstance(table, GrainTable), f"{path.name}: read_grains() must return a GrainTable"
         names = ("id", "columns", "contacts", "wall_contacts", "wall_forces", "cell")
@@ -218,9 +208,7 @@ def _quiet(path: Path) -> Iterator[None]:
     ):
         warnings.simplefilter("always")
         yield
-    assert not out.getvalue(), (
-        f"{path.name}: the reader must not print, but prints {out.getvalue()[:100]!r}"
-    )
+    assert not out.getvalue(), f"{path.name}: the reader prints {out.getvalue()[:100]!r}"
     for warning in caught:
         assert issubclass(warning.category, (ScanfabWarning, ScanfabNote)), (
             f"{path.name}: gives a {warning.category.__name__}: {warning.message}"

@@ -63,9 +63,9 @@ LONG = packed(zeros=600)
             100,
             SOME_POINTS,
             [array("a", LONG, 600 * BLOCK // 800)],
-            "the library that reads it crashed",
+            "its library crashed",
         ),
-        (600 * BLOCK, LONG, [], "Points has 78643200 of|the library that reads it crashed"),
+        (600 * BLOCK, LONG, [], "Points has 78643200 of|its library crashed"),
     ],
 )
 def test_arrays_that_are_far_too_long_are_refused(tmp_path, count, points, more, told):

@@ -51,8 +51,8 @@ def path(tmp_path):
     ("function", "told"),
     [
         (leave, "cannot read it"),
-        (crash, "the library that reads it crashed, or took"),
-        (hang, "the library"),
+        (crash, "its library crashed, or took"),
+        (hang, "its library"),
     ],
 )
 def test_a_file_that_ends_the_worker_is_an_error_and_the_next_is_read(

@@ -33,7 +33,7 @@ def xml(path, piece, content, more=""):
     )
 
 
-def refuses(path, match="damaged or incomplete|the library that reads it crashed"):
+def refuses(path, match="damaged or incomplete|its library crashed"):
     """ReadError with the name of the file, and no warning of a library."""
     with only_scanfabs_warnings(), pytest.raises(ReadError, match=rf"{path.name}: .*({match})"):
         read_mesh(path)

@@ -207,9 +207,7 @@ def read_in_worker(path: str, frame: int | None) -> tuple[Any, Any]:
                 group = atoms if dimensions[1:2] == ("atom",) else others
                 group[name] = values.astype(values.dtype.newbyteorder("="))
     # rows without any value: atoms that were lost or left their group
-    gaps = [
-        np.ma.getmaskarray(values).reshape(len(values), -1).any(axis=1) for values in atoms.values()
-    ]
+    gaps = [np.ma.getmaskarray(a).reshape(len(a), -1).any(axis=1) for a in atoms.values()]
     lost = np.logical_and.reduce(gaps)
     for name, gap in zip(atoms, gaps, strict=True):
         if np.any(gap & ~lost):

@@ -24,7 +24,7 @@ IDS, FORCE, TANGENTIAL = ("id1", "id2"), ("fx", "fy", "fz"), ("tx", "ty", "tz")
 ROUNDING = 1e-3
 # a column has a meaning if the rule for it holds in more than this share of the rows
 MOST_ROWS = 0.5
-# NEARLY_ALL pairs that LAMMPS lists are closer than this distance, in units of r1 + r2
+# of the pairs that LAMMPS lists, this share is closer than NEIGHBOURS, in units of r1 + r2
 NEIGHBOURS, NEARLY_ALL = 2.0, 0.98
 
 

@@ -29,9 +29,7 @@ BASIC = "x y z radius id tag mass x0 y0 z0 xo yo zo vx vy vz fx fy fz sx sy sz"
 TURNS = "q0 q1 q2 q3 wx wy wz"
 # snapshots and checkpoints, without and with rotation; they differ in the number of columns
 TITLES = (BASIC, f"{BASIC} {TURNS}", f"{BASIC} is_dynamic", f"{BASIC} is_dynamic i {TURNS} is_rot")
-LAYOUTS = {
-    len(title.split()): Layout(tuple(title.split()), line=2, whole=["id"]) for title in TITLES
-}
+LAYOUTS = {len(row.split()): Layout(tuple(row.split()), line=2, whole=["id"]) for row in TITLES}
 # the name of a worker's file, and its first line, the number of particles
 PART = re.compile(r"(.*_t=\d+_)[1-9]\d*(\.\w+)")
 COUNT = re.compile(rb"[ \t]*(\d{1,15})[ \t]*\r?\n")
@@ -75,10 +73,7 @@ class EsysReader(GrainsOnly):
         # the last name has no line end, so a header that was cut off after any name looks complete
         lost = {file.name for file in self.beside(path)} - {file.name for file in files}
         if lost or not files or len(set(files)) < len(files):
-            problem = (
-                f"found {names}, and {len(lost)} more files in its folder: it is incomplete, or of "
-                "another run"
-            )
+            problem = f"found {names}, and {len(lost)} other files: it is cut or of another run"
             raise ReadError(f"{path}: expected the name of each worker's file once, {problem}")
         columns = joined_arrays([_particles(file) for file in files])
         low, high = np.reshape(numbers(f"{path}: BoundingBox", head[3], 6), (2, 3))

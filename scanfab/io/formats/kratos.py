@@ -91,7 +91,7 @@ class KratosReader(GrainsOnly):
         lost |= {*ids} - place.keys()
         if lost:
             raise ReadError(
-                f"{path}: no position or RADIUS for {len(lost)} nodes, such as {min(lost)}"
+                f"{path}: no place or RADIUS for {len(lost)} nodes, such as {min(lost)}"
             )
         rows = np.array([place[id] for id in ids], dtype=int)
         places = {axis: nodes[axis][rows] for axis in "xyz"}

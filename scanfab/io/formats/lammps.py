@@ -44,9 +44,7 @@ class DumpReader(FormsReader):
         """The reader for the form of a file, VTK's if no other fits; ReadError for a restart."""
         if RESTART.match(first_bytes(path)):
             advice = "let its program read it, and dump custom ... id type x y z radius"
-            raise ReadError(
-                f"{path}: a binary restart can be read only by the program that wrote it: {advice}"
-            )
+            raise ReadError(f"{path}: only its own program can read a binary restart: {advice}")
         return super().form(path)
 
     def read_contacts(

@@ -64,9 +64,7 @@ class OnDemReader(GrainsOnly):
         """The bodies with a radius as grains, and their interactions as contacts."""
         path, file = snapshot.path, read_hdf_file(snapshot.path)
         scene = file.attributes.get(SCENE, {})
-        arrays = {
-            name: scene[attribute] for name, attribute in SCENE_NAMES.items() if attribute in scene
-        }
+        arrays = {name: scene[key] for name, key in SCENE_NAMES.items() if key in scene}
         grains = grain_table(path, _spheres(path, file), cell_of(path, arrays), options)
         return grains if INTERACTIONS not in file.attributes else _joined(path, file, grains)
 

@@ -97,17 +97,13 @@ def find_columns(
     names, plain = table.own, [plain_name(name) for name in table.own]
     roles: dict[str, str] = {}
     for standard in (*named, *(what for what in known if what not in named)):
-        column = f"{named.get(standard, '')}"
+        key = f"{named.get(standard, '')}"
         if standard in named:
-            places = [place for place, name in enumerate(names) if name == column]
-            if (
-                not places
-                and re.fullmatch(r"[0-9]{1,6}", column)
-                and 1 <= int(column) <= len(names)
-            ):
-                places = [int(column) - 1]
+            places = [place for place, name in enumerate(names) if name == key]
+            if not places and re.fullmatch(r"[0-9]{1,6}", key) and 1 <= int(key) <= len(names):
+                places = [int(key) - 1]
             if not places:
-                problem = f"there is no column {column!r} to serve as {standard}"
+                problem = f"there is no column {key!r} to serve as {standard}"
                 raise ReadError(f"{path}: {problem}; the columns are {', '.join(names)}")
         else:
             word = next((name for name in known[standard] if name in plain), None)

@@ -185,9 +185,7 @@ class VtkReader:
         names = {kind: name for (name, _, _), kind in kinds.items()}
         if {"grains", "points"} <= names.keys():
             points = f"points without a radius ({names['points']}) beside {names['grains']}"
-            raise ReadError(
-                f"{index}: lists {points}: take them out of the list, or name the files"
-            )
+            raise ReadError(f"{index}: lists {points}: take them out, or name the files")
         return [_frame(index, time, *parts.values()) for time, parts in frames.items()]
 
 

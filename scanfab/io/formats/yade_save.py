@@ -196,10 +196,8 @@ def cell_beside(path: Path, position: FloatArray) -> Cell | None:
     if file is None:
         exported = EXPORTED.fullmatch(bare_name(path))
         if exported and _numbered(path.parent, f"{exported[1]}-periCell-", stamp_of(path.parent)):
-            problem = (
-                'skipped, as not each file of spheres has one: name cells by `cell="FILE.csv"`'
-            )
-            warn(f"{path.parent / exported[1]}-periCell-*: {problem}")
+            lack = 'skipped, as not each file of spheres has one: name cells by `cell="FILE.csv"`'
+            warn(f"{path.parent / exported[1]}-periCell-*: {lack}")
         return None
     if is_cell_file(file):
         corners = read_mesh(file).points
@@ -231,9 +229,7 @@ def cell_file(path: Path) -> Path | None:
         cells = _numbered(folder, f"{exported[1]}-periCell-", stamp)
         # a cell exported after the interactions of its frame has a number that is higher by 1
         pairs = dict(zip(sorted(spheres), sorted(cells), strict=False))
-        if len(spheres) != len(cells) or any(
-            pairs[number] - number not in (0, 1) for number in pairs
-        ):
+        if len(spheres) != len(cells) or any(pairs[k] - k not in (0, 1) for k in pairs):
             return None
         return cells.get(pairs.get(int(exported[2]), -1))
     recorded = RECORDED.fullmatch(name)

@@ -48,9 +48,7 @@ class LammpsDataWriter:
     """``read_data`` of ``atom_style sphere``."""
 
     name = "lammps-data"
-    description = (
-        "LAMMPS data file of atom_style sphere; contacts, cell, columns in companion files"
-    )
+    description = "LAMMPS data file of atom_style sphere; companion files for the rest"
     extensions = (".data", ".lmp")
 
     def write(self, packing: Packing, path: Path) -> Left:

@@ -29,9 +29,7 @@ class CsvWriter:
         """Write one frame; a column that numbers frames (`time`) goes into a companion file."""
         known, own, notes = table_columns(packing)
         numbers = {name: values for name, values in own.items() if values.dtype.kind in "iuf"}
-        left = {
-            name for name in numbers if is_frame_name(name) and len(np.unique(numbers[name])) > 1
-        }
+        left = {k for k in numbers if is_frame_name(k) and len(np.unique(numbers[k])) > 1}
         held = {name: own[name] for name in own if name not in left}
         path.write_bytes(self.table({**known, **held}))
         columns = tuple(name for name in own if name in left)

@@ -83,12 +83,10 @@ class VtpWriter:
         # VTK writes into memory and Python to the disk, so that a full disk raises OSError
         writer.WriteToOutputStringOn()
         writer.Write()
-        moment = " ".join(
-            f"{FIELDS[name]}={frame[name]!r}" for name in ("step", "time") if name in frame
-        )
+        said = " ".join(f"{FIELDS[k]}={frame[k]!r}" for k in ("step", "time") if k in frame)
         text: Any = writer.GetOutputString()
         content = text if isinstance(text, bytes) else text.encode()
-        path.write_bytes(f"<!-- {moment} -->\n".encode() + content)
+        path.write_bytes(f"<!-- {said} -->\n".encode() + content)
         return Left(no_step=False, notes=tuple(arrays.notes))
 
 

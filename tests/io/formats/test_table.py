@@ -327,7 +327,9 @@ def test_tables_beside_dumps_are_skipped_unless_they_are_named(tmp_path):
     dump = write(tmp_path / "dump_5.txt", dump_text(step=5))
     table = write(tmp_path / "table_5.csv", "id,x,y,z,radius\n1,0,0,0,1\n")
     pairs = write(tmp_path / "pairs_5.csv", "id1,id2\n1,2\n")
-    with pytest.warns(ScanfabNote, match=r"skipped pairs_5\.csv, table_5\.csv: they hold results"):
+    with pytest.warns(
+        ScanfabNote, match=r"skipped pairs_5\.csv, table_5\.csv: they hold results or other tables"
+    ):
         series = scanfab.read_series(tmp_path)
     assert (len(series[0].read()), series.contacts) == (3, ())
     assert len(read(table)) == 1
@@ -406,7 +408,7 @@ def test_xyzd(tmp_path):
     np.testing.assert_array_equal(packing.cell.vectors, np.diag([4, 4.5, 5]))
     assert packing.cell.periodic == (True, True, True)
     write(tmp_path / "packing.nfo", info.replace("0.3345", "none"))
-    with pytest.raises(ReadError, match="expected a theoretical and a final porosity"):
+    with pytest.raises(ReadError, match="expected theoretical and final porosities"):
         read(path)
 
 
