@@ -155,7 +155,7 @@ def _own_columns(packing: Packing) -> tuple[Columns, list[str]]:
             free = f"{name}_of_dump"
             while free in columns or free in packing.columns:
                 free += "_"
-            notes.append(f"the column {name} is renamed to {free}: {name} has a meaning")
+            notes.append(f"the column {name} is renamed to {free}: {name} has another meaning")
         columns[free] = values
     return columns, notes
 

@@ -90,7 +90,7 @@ def test_a_fabric_table_is_known(tmp_path, ending, capsys):
     path = tmp_path / f"fabric.{ending}"
     scanfab.compute(scanfab.Packing(grid, 0.4), **lines).save(path)
     assert run(["compute", str(path)]) == 1
-    assert "fabric table, not a dump: scanfab compare or scanfab report" in capsys.readouterr().err
+    assert "fabric table, not a dump: scanfab compare and scanfab report" in capsys.readouterr().err
 
 
 def test_folders_below_are_named_where_there_is_no_dump(folder):
