@@ -1,1 +1,1 @@
-"""The command line: every command parses, calls one library function, and writes."""
+"""The command line: each command parses options, calls one library function, writes the result."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from scanfab.pipeline.calibration import StepRow
 
 
-# what is changed in each ladder
+# the quantity that each ladder changes, as the title of its first column
 CHANGED = {
     "spacing": "spacing / rmin",
     "directions": "directions",
@@ -25,7 +25,7 @@ CHANGED = {
     "rv": "RV / half extent",
     "recommended": "recommended",
 }
-# further columns on a terminal, of which the first ones always stay
+# further columns on a terminal; a narrow terminal drops the last ones, but never the first STAY
 SHOWN = (
     "variant", "alpha_vs_axial", "alpha_vs_axial_se", "alpha_vs_axial_sample_se", "is_steady",
     "time", "rule", "segments", "rule_bias",
@@ -38,25 +38,26 @@ STAY = 6
 @options("frame", default=-1, help="Which frame, as in the fabric table (default: last).")
 @options("variants", default="cd")
 @options("WINDOW", "edge", "cutoff")
-@options("spacing", help="Of the ladder of directions (default: 0.25rmin).")
-@options("directions", help="Of the ladder of spacings (default: icosahedral:9).")
+@options("spacing", help="Spacing of the lines in the ladder of directions (default: 0.25rmin).")
+@options("directions", help="Directions in the ladder of spacings (default: icosahedral:9).")
 @options(
     "tolerance",
-    help="Standard error of the scan for the ladders of cut-offs and RVs, and the least to ask of "
-    "the recommended settings.",
+    help="Standard error of the scan in the ladders of cut-offs and RVs; the recommended settings "
+    "never ask for a smaller one.",
 )
-@options("max_chords", help="Steps that would cut more chords from grains than this are left out.")
+@options("max_chords", help="Leave out steps that would cut more chords from grains than this.")
 @options("axis", "strain", "seed", "workers", "output", "EXCERPT", "plot")
 def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
     """
     Show how the void fabric of one frame changes with spacing, directions, cut-off and RV.
 
-    Each step stands with its error from the scan, the sample's own error, and the time; then from
-    where on nothing changes any more, and the settings that follow, as a command line. The spacings
-    go down to r_min/10, which the 2017 paper takes. --cutoff and --rv are those of the other
-    ladders.
+    Each step is a row with the error of the scan, the error of the sample, and the time it took.
+    Then follow the steps from which on the result no longer changes, and the recommended settings
+    as a command line. The spacings go down to r_min/10, the value of the 2017 paper. --cutoff and
+    --rv set the cut-off and the RV of the ladders that do not change them.
 
-    On a terminal a readable table; else the steps as CSV, and what they show on standard error.
+    On a terminal the steps are a readable table. Otherwise they are CSV on standard output, and
+    the findings go to standard error.
     """
     from scanfab.base.column import columns_of_fields
     from scanfab.pipeline.calibration import StepRow
@@ -64,34 +65,34 @@ def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
     from scanfab.pipeline.repeat import repeat_command
     from scanfab.table.writing import write_rows
 
-    asked = take_output(chosen)
+    outputs = take_output(chosen)
     columns = columns_of_fields(StepRow)
     reading, settings = checked(chosen, scanfab.Settings)
-    excerpt = excerpt_of(asked, columns)
+    excerpt = excerpt_of(outputs, columns)
     series = open_one(sources, reading, "calibrated")
     announce([series], settings.workers)
     with working():
-        found = scanfab.calibrate(series, frame=frame, **vars(settings))
-    rows = [replace(row, note=as_options(row.note)) for row in found.rows]
+        result = scanfab.calibrate(series, frame=frame, **vars(settings))
+    rows = [replace(row, note=as_options(row.note)) for row in result.rows]
     usual = scanfab.Settings()
-    best: Any = {"max_chords": usual.max_chords, "tolerance": usual.tolerance, **found.options}
+    best: Any = {"max_chords": usual.max_chords, "tolerance": usual.tolerance, **result.options}
     command = repeat_command(asked_for(sources, reading, replace(settings, **best)))
-    if asked.output is not None:
-        write_rows(asked.output, rows, columns, excerpt)
-    draw(asked, rows, "calibration")
-    tells_all = asked.output is not None or is_readable()
+    if outputs.output is not None:
+        write_rows(outputs.output, rows, columns, excerpt)
+    draw(outputs, rows, "calibration")
+    tells_all = outputs.output is not None or is_readable()
     if not tells_all:
         print_csv(rows, excerpt, columns)
-    elif asked.output is None:
+    elif outputs.output is None:
         _print(rows)
-    # behind rows on standard output, what they show goes beside them
-    for sentence in (*found.findings, command):
+    # if CSV goes to standard output, the findings must not mix with it
+    for sentence in (*result.findings, command):
         click.echo(sentence, err=not tells_all)
     return 0
 
 
 def _print(rows: list[StepRow]) -> None:
-    """One table for each ladder."""
+    """Print a table for each ladder."""
     steady = {None: "", 0: "no", 1: "yes"}
     for ladder, steps in groupby(rows, key=lambda row: row.ladder):
         shown = [

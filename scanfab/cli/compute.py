@@ -24,8 +24,8 @@ def compute(sources: tuple[str, ...], **chosen: Any) -> int:
     Several files:  scanfab compute dumps/*.vtk --variants cd --tolerance 1e-3
     A pipe:         zcat dump.gz | scanfab compute - --format liggghts
 
-    Variants: a whole sample; b whole sample, rattlers removed; c representative volume (RV); d RV,
-    rattlers removed. Lengths are in the dump's own units.
+    Variants: a whole sample; b whole sample without rattlers; c representative volume (RV); d RV
+    without rattlers. Lengths are in the dump's own units.
     """
     from scanfab.cli.rows import write_table
     from scanfab.pipeline.settings import Settings

@@ -1,7 +1,7 @@
 """
-What goes to people: warnings, notes and progress on standard error, tables on a terminal.
+Output for people: warnings, notes and progress on standard error, tables on a terminal.
 
-How much a command says beside its result is chosen by --quiet and --verbose.
+--quiet and --verbose choose how much a command says beside its result.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ if TYPE_CHECKING:
     from scanfab.table.writing import Excerpt
 
 
-# seconds between lines of progress, where standard error is no terminal
+# seconds between lines of progress, if standard error is not a terminal
 EVERY = 60.0
-# of the context of a command: --quiet or --verbose, and whether -o - asks for CSV
+# keys of click's context: which of --quiet and --verbose was given; whether `-o -` asks for CSV
 TALK, AS_CSV = "scanfab.talk", "scanfab.as_csv"
 LEVELS = {
-    "quiet": "No progress and no notes; warnings and errors stay.",
-    "verbose": "Say which readers, files and versions are used, and how long steps take.",
+    "quiet": "Show no progress and no notes; warnings and errors stay.",
+    "verbose": "Show which readers, files and versions are used, and how long each step takes.",
 }
-# heads of columns, where their names say less
+# column titles that read better than the column names
 TITLES = {
     "total": "± total",
     "alpha_vs_axial_total_se": "± total",
@@ -52,7 +52,7 @@ TITLES = {
     "slope_se": "±",
     "r2": "R²",
 }
-# the columns of a fabric table on a terminal, of which the first ones always stay
+# columns of a fabric table on a terminal; a narrow terminal drops the last, never the first STAY
 SHOWN = (
     "frame", "strain", "block", "variant", "grains", "contacts", "alpha_vs_axial", "total",
     "alpha_c_axial", "at_surface", "alpha_vs_axial_se", "alpha_vs_axial_sample_se", "alpha_vs",
@@ -62,7 +62,7 @@ STAY = 9
 
 
 class Command(click.Command):
-    """A command that tells warnings and notes; the context has what was told as its ``obj``."""
+    """A command that prints warnings and notes; the context keeps them in ``obj``."""
 
     def __init__(self, *args: Any, **more: Any) -> None:
         super().__init__(*args, **more)
@@ -78,14 +78,14 @@ class Command(click.Command):
 
 def _choose_level(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
     if value and TALK in ctx.meta:
-        raise click.UsageError("--quiet and --verbose exclude one another")
+        raise click.UsageError("--quiet and --verbose contradict each other: choose one")
     if value:
         ctx.meta[TALK] = parameter.name
 
 
 @contextmanager
 def _reported_warnings() -> Iterator[Told]:
-    """Warnings and notes of scanfab as single lines on standard error, each text once."""
+    """Print scanfab's warnings and notes as single lines on standard error, each text once."""
     told, is_quiet = Told(), level() == "quiet"
 
     def show(message: Any, category: type[Warning], *rest: Any, **more: Any) -> None:
@@ -94,25 +94,25 @@ def _reported_warnings() -> Iterator[Told]:
             say(f"{'note' if is_note else 'warning'}: {as_options(str(message))}")
 
     with warnings.catch_warnings():
-        # those of other packages are heard and left out
+        # warnings of other packages arrive here as well; Told.add() refuses them
         warnings.simplefilter("always")
         warnings.showwarning = show
         yield told
 
 
 def level() -> str:
-    """Which of the two options the command that runs now was given; empty for neither."""
+    """``quiet`` or ``verbose``, as given to the running command; empty for neither."""
     context = click.get_current_context(silent=True)
     return "" if context is None else context.meta.get(TALK, "")
 
 
 def say(text: str) -> None:
-    """A line on standard error."""
+    """Print a line on standard error."""
     click.echo(f"scanfab: {without_temporary(text)}", err=True)
 
 
-def tell_inputs(every: Iterable[Series], workers: int) -> None:
-    """With --verbose: versions, and what is read by which reader."""
+def tell_inputs(all_series: Iterable[Series], workers: int) -> None:
+    """With --verbose, print the versions in use and which reader reads which files."""
     if level() != "verbose":
         return
     import platform
@@ -120,52 +120,52 @@ def tell_inputs(every: Iterable[Series], workers: int) -> None:
 
     used = ", ".join(f"{name} {version(name)}" for name in ("scanfab", "numpy", "numba"))
     say(f"{used}, Python {platform.python_version()}; {workers} workers")
-    for one in every:
-        for family in (one.grains, *one.contacts):
+    for series in all_series:
+        for family in (series.grains, *series.contacts):
             reader = "no reader" if family.reader is None else family.reader.name
             files = f"{len(family.files)} files"
-            say(f"{one.name}: {family.kind} from {family.pattern} by {reader}, {files}")
+            say(f"{series.name}: {family.kind} from {family.pattern} by {reader}, {files}")
 
 
-def announce(every: Iterable[Series] = (), workers: int = 1) -> None:
-    """The same; and unless --quiet, say so if something has to be compiled first."""
+def announce(all_series: Iterable[Series] = (), workers: int = 1) -> None:
+    """As `tell_inputs`; and unless --quiet, say if code must be compiled before the work starts."""
     from scanfab.base.jit import kernel_folder, when_compiling
 
-    tell_inputs(every, workers)
+    tell_inputs(all_series, workers)
     _, problem = kernel_folder()
-    kept = f"it cannot be kept: {problem}" if problem else "it is kept for later runs"
-    words = "compiling what no earlier run has needed: seconds, or minutes on a busy machine"
+    kept = f"it cannot be kept: {problem}" if problem else "later runs start at once"
+    words = "compiling for first use, which takes seconds, or minutes on a busy machine"
     if level() != "quiet":
         when_compiling(lambda: say(f"{words}; {kept}"))
 
 
 class _Work(logging.Handler):
-    """Counts frames, and hears what the library, which never prints by itself, logs meanwhile."""
+    """Counts frames and shows the library's log messages (the library itself never prints)."""
 
     def __init__(self, total: Callable[[], int | None], done: int, bar: Progress | None) -> None:
         super().__init__(logging.INFO)
         self.total, self.before, self.done = total, done, done
         self.begun = self.shown = time.monotonic()
         self.latest, self.bar = "", bar
-        # asked for now, as the threads that log have no command
+        # read here, because the threads that log have no click context
         self.prints = level() == "verbose"
         if bar is not None:
             bar.add_task(self.state(), completed=done, total=total())
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep a message of the library; --verbose prints it."""
+        """Keep a message of the library for the progress line; --verbose also prints it."""
         self.latest = record.getMessage()
         if self.prints:
             say(self.latest)
         self.show()
 
     def advance(self) -> None:
-        """A frame is done."""
+        """Count a frame as done."""
         self.done += 1
         self.show()
 
     def show(self) -> None:
-        """Say how far the work is: by the bar of a terminal, or by a line each minute."""
+        """Show the progress: on the bar of a terminal, or as a line each minute."""
         if self.bar is not None:
             (task,) = self.bar.task_ids
             self.bar.update(task, description=self.state(), completed=self.done, total=self.total())
@@ -174,7 +174,7 @@ class _Work(logging.Handler):
             say(self.state())
 
     def state(self) -> str:
-        """How many frames are done, how long the others will take, and the latest message."""
+        """The number of frames done, the time the others will take, and the latest message."""
         total, now = self.total(), self.done - self.before
         if not total:
             return self.latest
@@ -190,11 +190,11 @@ def working(
     total: Callable[[], int | None] = lambda: None, done: int = 0, prints: bool = False
 ) -> Iterator[Callable[[], None]]:
     """
-    Show progress while something works; what is yielded is to be called after each frame.
+    Show progress inside the block, which calls the yielded function after each frame.
 
-    On a terminal progress is a bar with the time that is left, in a log at most a line a minute,
-    with --quiet nothing; with --verbose each step is a line. A command that ``prints`` results as
-    they come needs no bar if they go to a terminal.
+    A terminal shows a bar with the time left, a log file a line a minute at most. With --verbose
+    each step is a line; with --quiet there is nothing. A command that ``prints`` its results as
+    they come shows no bar if they go to a terminal.
     """
     if level() == "quiet":
         yield lambda: None
@@ -214,7 +214,7 @@ def working(
 
 
 def _bar() -> Progress:
-    """A line on the terminal that is gone in the end."""
+    """A progress bar that disappears at the end."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
@@ -224,14 +224,14 @@ def _bar() -> Progress:
 
 
 def is_readable() -> bool:
-    """Whether results go to a terminal, as a table to be read, and not as CSV."""
+    """Whether results are printed as a table on a terminal, rather than as CSV."""
     return sys.stdout.isatty() and not click.get_current_context().meta.get(AS_CSV)
 
 
 def print_csv(
     rows: Iterable[Mapping[str, Any]], excerpt: Excerpt, columns: Sequence[Column]
 ) -> None:
-    """Rows as CSV on standard output, each as it comes."""
+    """Print rows as CSV on standard output, each as soon as it is computed."""
     from scanfab.table.formats import OWN_FORMATS
     from scanfab.table.writing import write_to
 
@@ -239,11 +239,11 @@ def print_csv(
 
 
 def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:
-    """A fabric table on standard output: the columns that were asked for, or those that fit."""
+    """Print a fabric table: the columns that the user chose, or those that fit the terminal."""
     from scanfab.table.row import total_error
 
     shown = [{**row, "total": total_error(row, "alpha_vs_axial")} for row in rows]
-    # three digits say enough on a terminal, unless others were asked for
+    # a terminal shows three digits, unless the user chose another number
     digits = 3 if excerpt.digits == DEFAULT_DIGITS else excerpt.digits
     if excerpt.fields:
         print_rows(shown, excerpt.fields, len(excerpt.fields), digits)
@@ -255,10 +255,10 @@ def print_rows(
     rows: Sequence[Mapping[str, Any]], columns: Sequence[str], stay: int, digits: int = 3
 ) -> None:
     """
-    Some columns of rows as a table on standard output; no cell is cut.
+    Print some columns of rows as a table on standard output; no cell is cut.
 
-    Columns that the rows do not have are left out. Where there is no room, those on the right are
-    left out too, but for the first ones, which ``stay``: they wrap on a narrow terminal.
+    Columns that the rows do not have are left out. A narrow terminal drops columns from the right;
+    the first ``stay`` columns always remain, and wrap if need be.
     """
     texts = {}
     for name in (name for name in columns if not rows or name in rows[0]):
@@ -266,28 +266,28 @@ def print_rows(
         cells = [head, *(spelt(row[name], digits) for row in rows)]
         width = max(map(len, cells))
         is_text = any(isinstance(row[name], str) for row in rows)
-        texts[name] = [one.ljust(width) if is_text else one.rjust(width) for one in cells]
+        texts[name] = [cell.ljust(width) if is_text else cell.rjust(width) for cell in cells]
     room = shutil.get_terminal_size().columns
     for name in columns[: stay - 1 : -1]:
         if len("  ".join(cells[0] for cells in texts.values())) > room:
             texts.pop(name, None)
     for line in zip(*texts.values(), strict=True):
-        # by this stream, which spells what a terminal has no letter for
+        # through sys.stdout, which escapes letters that the terminal lacks
         click.echo("  ".join(line).rstrip(), file=sys.stdout)
 
 
 def spelt(value: Any, digits: int = 3) -> str:
-    """A value in so many digits, several with commas, and a dash for none."""
+    """A value with so many significant digits; a list separated by commas; a dash for None."""
     if isinstance(value, list):
-        return ", ".join(spelt(one, digits) for one in value)
+        return ", ".join(spelt(item, digits) for item in value)
     if value is None:
         return "-"
     return f"{value:.{digits}g}" if isinstance(value, float) else str(value)
 
 
-def draw(asked: Output, data: Any, kind: str, **more: Any) -> None:
-    """Draw the figures that are asked for; ``more`` is what figures share."""
+def draw(outputs: Output, data: Any, kind: str, **more: Any) -> None:
+    """Draw the figures that the options name; ``more`` goes to every figure."""
     from scanfab.viz.figures.page import make_figures, save_figures
 
-    if asked.plot is not None:
-        save_figures(asked.plot, make_figures(data, kind, asked.figure, **more))
+    if outputs.plot is not None:
+        save_figures(outputs.plot, make_figures(data, kind, outputs.figure, **more))

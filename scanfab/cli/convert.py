@@ -18,8 +18,8 @@ def convert(sources: tuple[str, ...], out: str, to: str | None, **chosen: Any) -
     """
     Write SOURCE in another format: grains, contacts, forces, cell, step and time.
 
-    OUT is a file for one frame; a folder, or a name with {step}, for a file each. What a format
-    cannot hold lies beside each file, and is found there by whoever reads it.
+    OUT is a file for one frame; for several frames it is a folder, or a file name with {step}.
+    What a format cannot hold goes into companion files beside each file; scanfab reads them too.
     """
     reading, settings = checked(chosen, scanfab.Settings)
     series = open_one(sources, reading, "converted")

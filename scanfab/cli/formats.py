@@ -1,4 +1,4 @@
-"""scanfab formats: what can be read and written."""
+"""scanfab formats: the formats that can be read and written."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def formats() -> None:
             plugin, advice = offer.plugin, lacking(offer.plugin)
             about = plugin.description + (f" (not installed: {advice})" if advice else "")
             lines.append((kind, name, " ".join(plugin.extensions), offer.package, about))
-    for suffix, one in known_formats().items():
-        package = type(one).__module__.split(".")[0]
-        lines.append(("table", suffix.lstrip("."), suffix, package, one.description))
+    for suffix, form in known_formats().items():
+        package = type(form).__module__.split(".")[0]
+        lines.append(("table", suffix.lstrip("."), suffix, package, form.description))
     for suffix, description in PLOT_FORMATS.items():
         lines.append(("figure", suffix.lstrip("."), suffix, "scanfab", description))
     lines += [

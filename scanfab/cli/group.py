@@ -1,4 +1,4 @@
-"""The command and its subcommands, which are found when they are used."""
+"""The scanfab command; it imports a subcommand only when that subcommand runs."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ from importlib import import_module
 
 import click
 
-# one module a command, imported only when the command runs: --help stays fast
+# each command is a module of this name; it is imported when the command runs: --help stays fast
 COMMANDS = {
     "compute": "the fabric table: one row per frame and variant",
-    "merge": "the parts of job arrays as one table",
+    "merge": "join the parts of a job array into one table",
     "compare": "variants side by side, normalised curves, correlation with contact fabric",
-    "inspect": "what the reader sees, nothing computed",
-    "calibrate": "how many lines are enough: ladders of settings, and those it recommends",
-    "report": "one file to hand on: settings, tables, figures, a view that can be turned",
+    "inspect": "what the reader finds in each frame, without computing the fabric",
+    "calibrate": "how many lines are enough: ladders of settings, and recommended settings",
+    "report": "one HTML file to share: settings, tables, figures, a 3D view",
     "view": "a frame in 3D",
-    "map": "fabric by place: a grid, slices or shells of blocks",
+    "map": "fabric by place: blocks in a grid, slices or shells",
     "convert": "one frame or a series in another format, with contacts, cell and forces",
     "formats": "every reader and writer, its extensions, and the package it comes from",
 }
 
 
-# bytes of addresses: to compile the scan with four workers takes 1.4e9
+# bytes of address space: compiling the scan with four workers takes 1.4e9
 LEAST_SPACE = 1_500_000_000
 
 
 class LazyGroup(click.Group):
-    """A group that knows its commands by name."""
+    """A group that knows its commands by name, and imports each when it is used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
@@ -56,9 +56,9 @@ def cli() -> None:
     from scanfab.base.files import address_space
 
     space = address_space()
-    # with less, some libraries end the process, or wait for ever, where they are loaded
+    # with less, some libraries end the process or hang while they are loaded
     if space is not None and space < LEAST_SPACE:
         raise ScanfabError(
             f"not enough memory: the limit (ulimit -v) leaves {space / 1e6:.0f} MB, "
-            f"{LEAST_SPACE / 1e6:.0f} MB are needed at least"
+            f"but scanfab needs at least {LEAST_SPACE / 1e6:.0f} MB"
         )

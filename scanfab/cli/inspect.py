@@ -1,4 +1,4 @@
-"""scanfab inspect: what the reader sees, nothing computed."""
+"""scanfab inspect: what the reader finds in each frame, without computing the fabric."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ if TYPE_CHECKING:
 
 @click.command(cls=SourceCommand)
 @options("READING", "frames", "SAMPLE", "WINDOW")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object a line and frame.")
+@click.option("--json", "as_json", is_flag=True, help="Print each frame as a line of JSON.")
 def inspect(sources: tuple[str, ...], as_json: bool, **chosen: Any) -> int:
     """
-    Show what the reader sees in each frame: grains, radii, contacts, rattlers, cell, columns,
+    Show what the reader finds in each frame: grains, radii, contacts, rattlers, cell, columns,
     extents, and where the RV would be.
 
-    Nothing is computed; contacts are found by geometry where no file lists them.
+    No fabric is computed. Contacts are found by geometry if no file lists them.
     """
     from scanfab.pipeline.inspection import inspect_series
 
     reading, settings = checked(chosen, scanfab.Settings)
-    every = open_series(sources, reading)
-    announce(every, settings.workers)
+    all_series = open_series(sources, reading)
+    announce(all_series, settings.workers)
 
     def frames() -> int:
-        return sum(len(range(one.frames_expected())[settings.frames]) for one in every)
+        return sum(len(range(series.frames_expected())[settings.frames]) for series in all_series)
 
     with working(frames, prints=True) as advance:
-        for found in (one for series in every for one in inspect_series(series, settings)):
+        for found in (frame for series in all_series for frame in inspect_series(series, settings)):
             report = replace(found, warnings=[as_options(text) for text in found.warnings])
             if as_json:
                 click.echo(json.dumps(asdict(report), ensure_ascii=False))
@@ -48,10 +48,10 @@ def inspect(sources: tuple[str, ...], as_json: bool, **chosen: Any) -> int:
 
 
 def _print(report: FrameReport) -> None:
-    """A frame as lines of a name and its value."""
+    """Print a frame, one line for each name and value."""
     fields = asdict(report)
     title = f"{fields.pop('source')}, frame {fields.pop('frame')}"
-    told = fields.pop("warnings")
+    texts = fields.pop("warnings")
     click.echo(click.style(title, bold=True))
-    for name, value in [*fields.items(), *(("warning", text) for text in told)]:
+    for name, value in [*fields.items(), *(("warning", text) for text in texts)]:
         click.echo(f"  {name:<13} {spelt(value, 6)}")

@@ -1,7 +1,7 @@
 """
 The process of the scanfab command: turns errors into messages, and signals into exit codes.
 
-Next to nothing is imported before main() runs: until then, Ctrl-C shows a traceback.
+Imports stay inside the functions, because Ctrl-C shows a traceback until main() runs.
 """
 
 from __future__ import annotations
@@ -9,14 +9,14 @@ from __future__ import annotations
 import signal
 import sys
 
-# bytes of addresses: with fewer left, whatever fails does so for them
+# bytes of address space: if fewer are left, any unknown error is put down to lack of memory
 LITTLE = 200_000_000
 
 
 def main(args: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 failed, 2 wrong usage, 130 and 143 interrupted."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        # without a word until we can say one
+        # until our handler is in place, Ctrl-C ends the process silently
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     from scanfab.cli.signals import catch_signals, leave
 
@@ -26,28 +26,28 @@ def main(args: list[str] | None = None) -> None:
 
 
 def _prepare_streams() -> None:
-    """Replace streams that the shell closed; spell what a terminal has no letter for."""
+    """Replace streams that the shell closed; escape letters that a terminal lacks."""
     import os
 
     for name, mode in (("stdin", "r"), ("stdout", "r"), ("stderr", "w")):
         if getattr(sys, name) is None:
-            # open as long as the process: nothing to read, and an error to write to
+            # stays open; reading gives nothing, and writing to stdout (mode "r") raises an error
             setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            # of Greek, and of file names that are no text
+            # Greek letters, and file names that are not valid text
             stream.reconfigure(errors="backslashreplace")
 
 
 def run(args: list[str]) -> int:
-    """The command line's exit code; errors become one message on standard error."""
+    """Run a command and return its exit code; an error becomes one message on standard error."""
     import click
 
     from scanfab.base.errors import DimensionError
     from scanfab.cli.group import cli
     from scanfab.cli.signals import interrupted_words
 
-    # wherever it stands: the group knows it only for its help
+    # --debug may stand anywhere; click knows the option only to list it in the help
     debug = "--debug" in args
     args = [word for word in args if word != "--debug"]
     try:
@@ -67,7 +67,7 @@ def run(args: list[str]) -> int:
 
 
 def _message(error: Exception) -> str | None:
-    """What is said of an error; None for one that only a mistake in the program can raise."""
+    """The message for an error; None for an error that only a bug in scanfab can raise."""
     import os
     from io import UnsupportedOperation
 
@@ -78,14 +78,14 @@ def _message(error: Exception) -> str | None:
     if isinstance(error, UnsupportedOperation):
         return "standard output is closed: name a file with -o"
     if isinstance(error, OSError) and error.errno and error.strerror == os.strerror(error.errno):
-        # whatever writes to files names them
+        # an error without a file name comes from standard output: code that writes files names them
         return f"{error.filename or 'standard output'}: {error.strerror}"
     words = as_options(error) or type(error).__name__
     if isinstance(error, ScanfabError | OSError):
         return words
-    # without memory, libraries that cannot load their parts raise all kinds of errors
+    # short of memory, libraries fail to load their parts and raise errors of any type
     space, signs = address_space(), ("failed to map", "can't start new thread")
-    is_full = any(one in words for one in signs) or (space is not None and space < LITTLE)
+    is_full = any(sign in words for sign in signs) or (space is not None and space < LITTLE)
     advice = "fewer --workers need less, and ulimit -v shows the limit"
     is_full |= isinstance(error, MemoryError)
     return f"not enough memory ({words}): {advice}" if is_full else None

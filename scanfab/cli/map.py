@@ -1,4 +1,4 @@
-"""scanfab map: the fabric by place."""
+"""scanfab map: the fabric of each block of the sample."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from scanfab.pipeline.options import MAP_OPTIONS
 @options(*in_order(MAP_OPTIONS), declared=MAP_OPTIONS)
 def map(sources: tuple[str, ...], **chosen: Any) -> int:
     """
-    Fabric by place: a row for each frame, variant and block of the sample.
+    Compute the fabric by place: one row per frame, variant and block of the sample.
 
-    Blocks are a grid, slices along the axis, or shells about the centre. A void segment belongs to
-    the block in which its middle lies.
+    Blocks form a grid, slices along the axis, or shells about the centre. A void segment belongs to
+    the block that holds its midpoint.
 
     \b
     A profile:  scanfab map dumps/ --slices 8 --frames -1: --plot profile.png
     A grid:     scanfab map dumps/ --grid 5,5,5 --tolerance 1e-3 -o map.csv --vtk paraview/
 
-    SOURCE is as for compute. A warning says whether the sample is homogeneous, that is, whether its
-    blocks scatter more than their errors.
+    SOURCE is the same as for compute. A warning says if the sample is not homogeneous, that is, if
+    its blocks scatter more than their errors explain.
     """
     from scanfab.cli.rows import write_table
     from scanfab.pipeline.maps.settings import MapSettings

@@ -1,4 +1,4 @@
-"""scanfab merge: the parts of job arrays as one table."""
+"""scanfab merge: join the parts of a job array into one table."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from scanfab.io.options import parse_frames
     "parts", metavar="PART...", nargs=-1, required=True, type=click.Path(path_type=Path)
 )
 @options("output")
-@options("frames", help="Which frames the table is to have, as a Python slice (default: all).")
+@options("frames", help="Frames that the table must have, as a Python slice (default: all).")
 def merge(parts: tuple[Path, ...], output: Path | None, frames: str | None) -> int:
     """
-    Merge the parts of job arrays into one table: the bytes of one run.
+    Join the parts of a job array into one table, with the same bytes as the table of a single run.
 
-    PART is what scanfab compute -o PART --frames I::N has written, with its PART.manifest.json.
-    Parts of several series, or whole tables, become one table of all of them.
+    PART is a table that scanfab compute -o PART --frames I::N wrote, with PART.manifest.json beside
+    it. Parts of several series, or whole tables, are joined into one table.
 
     \b
     Job I of 8:  scanfab compute dumps/ --frames I::8 -o part_I.csv
@@ -34,14 +34,14 @@ def merge(parts: tuple[Path, ...], output: Path | None, frames: str | None) -> i
         chosen = parse_frames(frames)
         if output is not None:
             check_no_part(output, parts)
-    found = merged(parts, chosen)
+    table = merged(parts, chosen)
     if output is not None:
-        found.save(output)
+        table.save(output)
     elif is_readable():
-        print_table(found.rows, found.excerpt)
+        print_table(table.rows, table.excerpt)
     else:
-        print_csv(found.rows, found.excerpt, found.columns)
-    # a choice of columns may say nothing of the void fabric
-    if not found.rows or "alpha_vs" not in [one.name for one in found.columns]:
+        print_csv(table.rows, table.excerpt, table.columns)
+    # the user may have chosen columns without the void fabric
+    if not table.rows or "alpha_vs" not in [column.name for column in table.columns]:
         return 0
-    return 0 if any(row.get("alpha_vs") is not None for row in found.rows) else 1
+    return 0 if any(row.get("alpha_vs") is not None for row in table.rows) else 1

@@ -1,4 +1,4 @@
-"""What a command line says: options, made of their declarations, and sources; or wrong usage."""
+"""Options and sources of the command line, made from the declarations in the library."""
 
 from __future__ import annotations
 
@@ -30,32 +30,32 @@ if TYPE_CHECKING:
 Function = Callable[..., Any]
 S = TypeVar("S", bound=Settings)
 
-# options that several commands have
+# groups of options that several commands share
 SETS: dict[str, Sequence[str]] = {
-    "READING": [one.name for one in READING_OPTIONS],
+    "READING": [option.name for option in READING_OPTIONS],
     "SAMPLE": ("boundary", "min_contacts", "rattlers", "min_force", "contact_tolerance"),
     "WINDOW": ("rv", "rv_radius", "rv_center", "rv_shape", "rv_size", "rv_axis", "rv_follows"),
     "EXCERPT": ("fields", "digits"),
 }
-# the cut-off of commands that take tables
+# --cutoff of commands that take tables
 OF_SEVERAL: dict[str, Any] = {
     "type": float,
     "default": None,
     "metavar": "C",
-    "help": "If a table has several cut-offs, take the rows of this one; in the table's unit.",
+    "help": "If a table has several cut-offs, use the rows of this one (in the table's unit).",
 }
 METAVARS: dict[type, str] = {int: "N", float: "X", Path: "FILE"}
-# numbers that may stand apart behind an option, as users write them
+# how many numbers, separated by blanks, may follow these options
 COUNTS = {"--cell": (3, 6), "--rv-center": (3,), "--rv-size": (2, 3)}
-TITLES = {"": "What most need", **{group: group.capitalize() for group in GROUPS}}
-# letters for an option and what it takes; what is longer has a line of its own
+TITLES = {"": "Most used options", **{group: group.capitalize() for group in GROUPS}}
+# width of the first column of the help; an option that is wider gets a line of its own
 COLUMN = 22
 NUMBER = re.compile(r"[-+]?[\d.]+([eE][-+]?\d+)?")
 
 
 @contextmanager
 def usage_errors(before: str = "") -> Iterator[None]:
-    """Settings that cannot be are wrong usage; ``before`` stands before the message."""
+    """Turn errors of settings into usage errors; ``before`` is put before the message."""
     try:
         yield
     except (SettingsError, UnknownFormatError) as error:
@@ -63,7 +63,7 @@ def usage_errors(before: str = "") -> Iterator[None]:
 
 
 class SourceCommand(Command):
-    """A command with sources: help in groups, and options whose numbers may stand apart."""
+    """A command that takes sources; its help has groups, and some options take several numbers."""
 
     def __init__(self, *args: Any, **more: Any) -> None:
         super().__init__(*args, **more)
@@ -73,21 +73,21 @@ class SourceCommand(Command):
         self.params.insert(0, argument)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The options in their groups, those first that most users need."""
+        """Write the options in their groups; the most used options come first."""
         records: dict[str, list[tuple[str, str]]] = {group: [] for group in TITLES}
         for parameter in self.get_params(ctx):
             record = parameter.get_help_record(ctx) if isinstance(parameter, click.Option) else None
             if record is not None:
-                one = DECLARED.get(str(parameter.name))
-                group = "output" if one is None else "" if one.first else one.group
-                # all groups in one column
+                option = DECLARED.get(str(parameter.name))
+                group = "output" if option is None else "" if option.first else option.group
+                # pad, so that the texts of all groups are aligned
                 records[group].append((record[0].ljust(COLUMN), record[1]))
         for group in (group for group in TITLES if records[group]):
             with formatter.section(TITLES[group]):
                 formatter.write_dl(records[group], col_max=COLUMN)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Join the numbers behind an option into one word, as click knows no variable count."""
+        """Join the numbers that follow an option into one word: click allows no variable count."""
         joined: list[str] = []
         rest = list(args)
         while rest:
@@ -103,11 +103,11 @@ class SourceCommand(Command):
 def options(
     *names: str, declared: Mapping[str, Option] = DECLARED, **changes: Any
 ) -> Callable[[Function], Function]:
-    """Declared options of a command, by name or by set, in this order, with changes."""
-    every = [one for name in names for one in SETS.get(name, (name,))]
+    """Add declared options to a command, by name or by set, in this order, with changes."""
+    listed = [option_name for name in names for option_name in SETS.get(name, (name,))]
 
     def add(command: Function) -> Function:
-        for name in reversed(every):
+        for name in reversed(listed):
             command = _click_option(declared[name], changes)(command)
         return command
 
@@ -115,13 +115,13 @@ def options(
 
 
 def in_order(declared: Mapping[str, Option]) -> list[str]:
-    """The names of options in the order of the help."""
+    """The names of options, in the order of the groups in the help."""
     order = ("output", "sample", "reading", "window", "scan", "fabric")
     return sorted(declared, key=lambda name: order.index(declared[name].group))
 
 
 def _click_option(option: Option, changes: Mapping[str, Any]) -> Callable[[Function], Function]:
-    """An option as click has it; changes are those of its attributes there."""
+    """The click option for a declared option; ``changes`` replaces its attributes."""
     is_folder = option.metavar == "DIR"
     a_path = click.Path(dir_okay=is_folder, file_okay=not is_folder, path_type=Path)
     attributes = {
@@ -136,9 +136,9 @@ def _click_option(option: Option, changes: Mapping[str, Any]) -> Callable[[Funct
         **changes,
     }
     words, default = as_options(attributes["help"]), attributes.get("default")
-    # a switch has no default to show, which is False, but an option whose default is 0 has one
+    # show the default 0 of a number, but not the default False of a switch
     if default is not None and default != () and default is not False and "(default: " not in words:
-        # 1e10 and 0, where click would write 10000000000.0 and 0.0
+        # click would write 10000000000.0 and 0.0 instead of 1e10 and 0
         short = f"{default:g}".replace("e+", "e") if isinstance(default, float) else default
         words += f"  [default: {short}]"
     return click.option(option.flag, option.name, **attributes | {"help": words})
@@ -147,95 +147,97 @@ def _click_option(option: Option, changes: Mapping[str, Any]) -> Callable[[Funct
 def _completed(
     option: Option, ctx: click.Context, parameter: click.Parameter, text: str
 ) -> list[CompletionItem]:
-    """What a shell offers for an option, which may take other words too: some words, and files."""
+    """The completions that a shell offers for an option: its words, and files if it takes any."""
     words = option.choices() if callable(option.choices) else option.choices
-    # of a list the last word
+    # in a list separated by commas, only the last word is completed
     before = text[: text.rfind(",") + 1] if ",..." in option.form else ""
     named = [before + word for word in words if word not in before.split(",")]
-    found = [CompletionItem(word) for word in named if word.startswith(text)]
+    items = [CompletionItem(word) for word in named if word.startswith(text)]
     takes_files = option.also.startswith(("FILE", "PATH"))
-    return [*found, CompletionItem(text, type="file")] if takes_files else found
+    return [*items, CompletionItem(text, type="file")] if takes_files else items
 
 
 def _output(ctx: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
-    """The file; ``-`` is standard output, which gets CSV wherever it goes."""
+    """The output file; ``-`` means CSV on standard output, even on a terminal."""
     ctx.meta[AS_CSV] = path == Path("-")
     return None if path == Path("-") else path
 
 
 def take_output(chosen: dict[str, Any], *kinds: str) -> Output:
     """
-    Take what is to be written, and where, out of the options of a command.
+    Remove the options of output from ``chosen`` and return them.
 
-    A figure that is not of these kinds, or cannot be drawn to its file, is wrong usage.
+    It is a usage error if the figure is not of one of these kinds, or its file has a wrong format.
     """
     from scanfab.viz.figures.page import find_figure
     from scanfab.viz.figures.style import check_plot_file
 
-    asked = Output(**{name: chosen.pop(name) for name in vars(Output()) if name in chosen})
-    if asked.plot is None and asked.figure is not None:
+    outputs = Output(**{name: chosen.pop(name) for name in vars(Output()) if name in chosen})
+    if outputs.plot is None and outputs.figure is not None:
         raise click.UsageError("--figure goes with --plot FILE")
-    if asked.figure is not None:
+    if outputs.figure is not None:
         with usage_errors():
-            find_figure(asked.figure, *kinds)
-    if asked.plot is not None:
+            find_figure(outputs.figure, *kinds)
+    if outputs.plot is not None:
         with usage_errors("--plot: "):
-            check_plot_file(asked.plot)
-    return asked
+            check_plot_file(outputs.plot)
+    return outputs
 
 
-def excerpt_of(asked: Output, columns: Sequence[Column]) -> Excerpt:
-    """Which columns and digits are asked for; wrong usage if they, or a file, cannot be written."""
+def excerpt_of(outputs: Output, columns: Sequence[Column]) -> Excerpt:
+    """The chosen columns and digits; a usage error if they or the file cannot be written."""
     from scanfab.table.writing import Excerpt, check_output
 
     with usage_errors():
-        if asked.output is not None:
-            check_output(asked.output)
-        return Excerpt.make(columns, asked.fields, asked.digits)
+        if outputs.output is not None:
+            check_output(outputs.output)
+        return Excerpt.make(columns, outputs.fields, outputs.digits)
 
 
 def tables_argument(**more: Any) -> Callable[[Function], Function]:
-    """The argument of commands that take tables."""
+    """The argument TABLE... of commands that take tables."""
     a_table = click.Path(exists=True, dir_okay=False, **more)
     return click.argument("tables", metavar="TABLE...", nargs=-1, required=True, type=a_table)
 
 
 def check_labels(labels: tuple[str, ...], tables: tuple[Any, ...]) -> None:
-    """A usage error if some tables have a label, and others none."""
+    """Raise a usage error unless there is one label for each table, or none at all."""
     if labels and len(labels) != len(tables):
-        raise click.UsageError(f"--label: expected one a table: {len(tables)}, found {len(labels)}")
+        raise click.UsageError(
+            f"--label: expected one per table: {len(tables)}, found {len(labels)}"
+        )
 
 
 def _expanded(
     ctx: click.Context, parameter: click.Parameter, sources: tuple[str, ...]
 ) -> tuple[str, ...]:
     """
-    The sources, globs as a shell would have expanded them.
+    The sources, with globs expanded as a shell would.
 
-    The settings file beside them becomes the defaults of the command.
+    The settings file beside the sources sets the defaults of the command.
     """
     from scanfab.io.families import expanded
 
     try:
-        every = tuple(str(path) for one in sources for path in expanded(one))
+        paths = tuple(str(path) for source in sources for path in expanded(source))
     except ReadError as error:
         raise click.UsageError(str(error)) from None
-    for path in every:
+    for path in paths:
         if path != "-" and not Path(path).exists():
             raise click.UsageError(f"{path}: there is no such file, folder or glob")
-    take_settings_file(ctx, every)
-    return every
+    take_settings_file(ctx, paths)
+    return paths
 
 
 def checked(chosen: dict[str, Any], kind: type[S]) -> tuple[dict[str, Any], S]:
-    """The options of a command as those of reading and as settings; wrong ones are wrong usage."""
+    """Split the options into those of reading and the settings; wrong values are usage errors."""
     tell_used(click.get_current_context())
     with usage_errors():
         return take_reading(chosen), kind(**chosen)
 
 
 def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Series]:
-    """The series of a command line; ``-`` is one that comes by standard input."""
+    """Open the series that the sources name; ``-`` is a series from standard input."""
     from dataclasses import replace
 
     from scanfab.io.files import PART, temporary_copy
@@ -246,7 +248,7 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
     if reading["format"] is None:
         raise click.UsageError("standard input needs --format NAME")
     if len(sources) > 1:
-        raise click.UsageError("standard input is a series of its own: name no other source")
+        raise click.UsageError("standard input cannot be combined with other sources: name only -")
     copy = temporary_copy(iter(partial(sys.stdin.buffer.read, PART), b""), "standard input")
     if copy.stat().st_size == 0:
         raise ReadError("standard input: expected a dump, found nothing")
@@ -254,9 +256,9 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
 
 
 def open_one(sources: tuple[str, ...], reading: dict[str, Any], done: str) -> Series:
-    """The one series of a command that takes no more."""
-    found = open_series(sources, reading)
-    if len(found) > 1:
-        names = ", ".join(one.name for one in found)
-        raise click.UsageError(f"one series can be {done} at a time, found {names}")
-    return found[0]
+    """Open the series of a command that takes only one."""
+    all_series = open_series(sources, reading)
+    if len(all_series) > 1:
+        names = ", ".join(series.name for series in all_series)
+        raise click.UsageError(f"only one series can be {done} at a time, found {names}")
+    return all_series[0]

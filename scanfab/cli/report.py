@@ -1,4 +1,4 @@
-"""scanfab report: one file to hand on."""
+"""scanfab report: one HTML file to share."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def report(tables: tuple[Path, ...], output: Path, author: str | None, **chosen:
     """
     Write a report on fabric tables: one HTML file that opens without a network.
 
-    TABLE is what scanfab compute wrote with -o. Settings, versions and the source of the 3D view
-    come from TABLE.manifest.json beside it; without it, the report says that they are not known.
+    TABLE is a table that scanfab compute -o wrote. Settings, versions and the source of the 3D view
+    come from TABLE.manifest.json beside it; without this file the report says they are unknown.
     """
     from scanfab.viz.report.page import check_page_file
 
@@ -45,10 +45,10 @@ def report(tables: tuple[Path, ...], output: Path, author: str | None, **chosen:
 
 
 def _full_name() -> str:
-    """The user's full name; empty where the system knows only the name of the account."""
+    """The user's full name; empty if the system knows only the account name."""
     import os
 
-    # another system, or a container without such a user
+    # Windows has no pwd; a container may not know the user
     with suppress(ImportError, KeyError):
         import pwd
 

@@ -1,4 +1,4 @@
-"""A table computed, written as its rows come, and drawn: what compute and map have in common."""
+"""Compute a table, write its rows as they come, and draw it; shared by compute and map."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 def write_table(sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Settings]) -> int:
     """
-    Compute a table as the options of a command ask, write it, and draw it; returns the exit code.
+    Compute a table with the options of a command, write it, draw it, and return the exit code.
 
-    ``kind`` are the settings of the table.
+    ``kind`` is the class of the table's settings.
     """
     from scanfab.pipeline.job import Job
     from scanfab.pipeline.record import asked_for
@@ -35,45 +35,46 @@ def write_table(sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Set
 
     ctx = click.get_current_context()
     figures = ("map",) if kind is MapSettings else ("table", "frames")
-    asked = take_output(chosen, *figures)
-    cluster = asked.scheduler or asked.scheduler_file
+    outputs = take_output(chosen, *figures)
+    cluster = outputs.scheduler or outputs.scheduler_file
     for is_wrong, words in (
-        (asked.plot and chosen.get("cutoffs"), "--plot is of one cut-off: leave out --cutoffs"),
-        (asked.resume and not asked.output, "--resume goes with -o FILE"),
-        ((asked.follow_for or 0) < 0, "--follow-for: expected 0 or more"),
-        (asked.vtk and cluster, "--vtk is written where frames are computed: not with --scheduler"),
+        (outputs.plot and chosen.get("cutoffs"), "--plot draws one cut-off: leave out --cutoffs"),
+        (outputs.resume and not outputs.output, "--resume needs -o FILE"),
+        ((outputs.follow_for or 0) < 0, "--follow-for: expected 0 or more"),
+        (outputs.vtk and cluster, "--vtk cannot be used with --scheduler: leave out one of them"),
     ):
         if is_wrong:
             raise click.UsageError(words)
     reading, settings = checked(chosen, kind)
-    excerpt = excerpt_of(asked, settings.columns)
-    follows = asked.follow or asked.follow_for is not None
+    excerpt = excerpt_of(outputs, settings.columns)
+    follows = outputs.follow or outputs.follow_for is not None
     if follows and (len(sources) > 1 or "-" in sources):
         raise click.UsageError("--follow takes one folder, or one file that grows")
     if follows:
-        followed = scanfab.follow_series(sources[0], seconds=asked.follow_for, **reading)
+        followed = scanfab.follow_series(sources[0], seconds=outputs.follow_for, **reading)
         series: list[Series] = [followed]
     else:
         series = open_series(sources, reading)
-    drawing = _Drawing(asked, figures)
+    drawing = _Drawing(outputs, figures)
     if drawing.kind == "frames" and len(series) > 1:
-        raise click.UsageError(f"--figure {asked.figure} draws one series: name one source")
+        raise click.UsageError(f"--figure {outputs.figure} draws one series: name one source")
     announce(series, settings.workers)
     with ExitStack() as stack:
         with usage_errors():
             executor = None
             if cluster:
-                dask = scanfab.dask_executor(asked.scheduler, scheduler_file=asked.scheduler_file)
+                file = outputs.scheduler_file
+                dask = scanfab.dask_executor(outputs.scheduler, scheduler_file=file)
                 executor = stack.enter_context(dask)
-            vtk, resume = asked.vtk, asked.resume
+            vtk, resume = outputs.vtk, outputs.resume
             job = Job(
                 series,
                 settings,
                 asked_for(sources, reading, settings, excerpt),
-                asked.output,
+                outputs.output,
                 excerpt,
                 resume=resume,
-                manifest_path=asked.manifest,
+                manifest_path=outputs.manifest,
                 more={"settings_file": listed} if (listed := as_listed(ctx)) else {},
                 observers=vtk_folders(vtk, len(series), settings, resume) if vtk else (),
                 told=ctx.obj,
@@ -89,42 +90,42 @@ def write_table(sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Set
 
 
 class _Drawing:
-    """The figures of a table, if they are asked for."""
+    """Draws the figures of a table that the options name."""
 
-    def __init__(self, asked: Output, kinds: tuple[str, ...]) -> None:
+    def __init__(self, outputs: Output, kinds: tuple[str, ...]) -> None:
         from scanfab.table.plots import figures_of
         from scanfab.viz.figures.page import find_figure
 
-        self.asked, self.kind, self._drawn = asked, kinds[0], 0
-        figures = list(figures_of(self.kind).values()) if asked.plot is not None else []
-        if asked.figure is not None:
-            figures = [find_figure(asked.figure, *kinds)[0]]
+        self.outputs, self.kind, self._drawn = outputs, kinds[0], 0
+        figures = list(figures_of(self.kind).values()) if outputs.plot is not None else []
+        if outputs.figure is not None:
+            figures = [find_figure(outputs.figure, *kinds)[0]]
             self.kind = figures[0].kind
-        self.needed = tuple(dict.fromkeys(name for one in figures for name in one.columns))
-        """The columns that they need."""
+        self.needed = tuple(dict.fromkeys(name for figure in figures for name in figure.columns))
+        """The columns that the figures need."""
 
     def draw(self, job: Job) -> None:
-        """Draw the rows that there are."""
-        plot, rows = self.asked.plot, job.every_row
+        """Draw the rows that are computed so far."""
+        plot, rows = self.outputs.plot, job.every_row
         if plot is not None and not job.found_void_fabric:
             click.echo(f"scanfab: {plot} is not drawn: no row has a void fabric", err=True)
         elif self.kind == "frames":
-            draw(self.asked, scanfab.ScannedFrames(job.series[0], job.settings, rows), self.kind)
+            draw(self.outputs, scanfab.ScannedFrames(job.series[0], job.settings, rows), self.kind)
         elif plot is not None:
             comparison = scanfab.compare_tables(rows) if self.kind == "table" else None
             table = scanfab.Table(rows, job.settings.columns)
-            draw(self.asked, table, self.kind, comparison=comparison)
+            draw(self.outputs, table, self.kind, comparison=comparison)
 
     def redraw(self, job: Job) -> None:
-        """Draw a series that is followed if there are new frames; a new scan waits for the end."""
+        """Redraw a followed series if it has new frames; figures that need a scan wait."""
         if self.kind != "frames" and job.found_void_fabric and job.done > self._drawn:
             self._drawn = job.done
             self.draw(job)
 
 
 def _write(job: Job, excerpt: Excerpt) -> None:
-    """Write the rows as they come; if that is interrupted or fails, say how to go on."""
-    # asked for now, as a signal comes at any moment
+    """Write the rows as they come; if that fails or is interrupted, say how to continue."""
+    # decided here, because a signal handler calls `_standing` at any moment
     as_table = job.output is None and is_readable()
     standing = partial(_standing, job, as_table)
     try:
@@ -147,7 +148,7 @@ def _write(job: Job, excerpt: Excerpt) -> None:
 
 
 def _standing(job: Job, as_table: bool) -> str:
-    """How far a job is, and how to go on."""
+    """How far the job has come, and how to continue it."""
     output = job.output
     if output is not None and job.done == job.taken_over > 0 and output.exists():
         again = f"{output} is as it was; the same command goes on"

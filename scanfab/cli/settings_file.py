@@ -1,4 +1,4 @@
-"""scanfab.toml beside the dumps: options of compute, below those of the command line."""
+"""scanfab.toml beside the dumps sets options of compute; the command line overrides them."""
 
 from __future__ import annotations
 
@@ -17,40 +17,40 @@ from scanfab.pipeline.options import OPTIONS
 SECTION = "compute"
 META = "scanfab.settings_file"
 KEYS = {
-    one.flag.removeprefix("--"): one
-    for one in OPTIONS.values()
-    if one.decides or one.name == "workers"
+    option.flag.removeprefix("--"): option
+    for option in OPTIONS.values()
+    if option.decides or option.name == "workers"
 }
-"""What the file may hold: the options that say how samples are read and computed."""
+"""The options that the file may hold: those that say how samples are read and computed."""
 
 
 def take_settings_file(ctx: click.Context, sources: Iterable[str]) -> None:
     """
-    Make the options of the settings file beside the sources defaults of the command.
+    Use the options of the settings file beside the sources as defaults of the command.
 
-    A file that cannot be right is a usage error in every command, as are two files.
+    A file with an error is a usage error in every command, and so are two settings files.
     """
     from scanfab.io.families import SETTINGS_FILE
 
     folders = {Path(s) if Path(s).is_dir() else Path(s).parent for s in sources if s != "-"}
-    found = [folder / SETTINGS_FILE for folder in sorted(folders)]
-    found = [path for path in found if path.is_file()]
-    if len(found) > 1:
+    files = [folder / SETTINGS_FILE for folder in sorted(folders)]
+    files = [path for path in files if path.is_file()]
+    if len(files) > 1:
         raise click.UsageError(
-            f"the sources have several settings files: {', '.join(map(str, found))}; "
+            f"the sources have several settings files: {', '.join(map(str, files))}; "
             f"compute them one by one"
         )
-    for path in found:
+    for path in files:
         given = _read(path)
         try:
-            ctx.default_map = {KEYS[key].name: _as_typed(key, one) for key, one in given.items()}
+            ctx.default_map = {KEYS[key].name: _as_typed(key, given[key]) for key in given}
         except SettingsError as error:
             raise click.UsageError(f"{path}: {error}") from None
         ctx.meta[META] = path, list(given)
 
 
 def as_listed(ctx: click.Context) -> dict[str, Any]:
-    """The file as a manifest lists it: which of its options the command took; empty without one."""
+    """The settings file as manifests list it, with the options that were used; empty if none."""
     if META not in ctx.meta:
         return {}
     path, keys = ctx.meta[META]
@@ -60,24 +60,24 @@ def as_listed(ctx: click.Context) -> dict[str, Any]:
 
 
 def tell_used(ctx: click.Context) -> None:
-    """Say by a note which options the file has given."""
+    """Write a note that names the options taken from the file."""
     if (file := as_listed(ctx)) and file["used"]:
         note(f"options from {file['path']}: {', '.join(file['used'])}")
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """The options in the one section that there may be, each of them a known one."""
+    """Read the options of the section [compute]; any other section or option is a usage error."""
     import tomllib
 
     try:
         content = tomllib.loads(path.read_text("utf-8"))
     except ValueError as error:
-        advice = 'text stands in quotes, as in boundary = "type=2"'
+        advice = 'text needs quotes, as in boundary = "type=2"'
         raise click.UsageError(f"{path}: {error}: {advice}") from None
     for name, value in content.items():
         if name != SECTION or not isinstance(value, dict):
             raise click.UsageError(
-                f"{path}: {name!r} has no meaning: options stand in the section [{SECTION}]"
+                f"{path}: {name!r} is not known: put options into the section [{SECTION}]"
             )
     options: dict[str, Any] = content.get(SECTION, {})
     for key in (key for key in options if key not in KEYS):
@@ -88,13 +88,13 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _as_typed(key: str, value: Any) -> Any:
-    """A value of the settings file as users would type it, if the option can have it."""
+    """A value of the settings file as users would type it; SettingsError if it is not valid."""
     option, several = KEYS[key], value if isinstance(value, list) else [value]
-    for one in several:
-        # a truth value would count as the number 1
-        if isinstance(one, bool) or not isinstance(one, str | int | float):
-            raise unusable(key, "numbers or text in quotes, one or a list of them", one)
-    words = [str(one) for one in several]
+    for item in several:
+        # bool is a subclass of int, so True would be taken for the number 1
+        if isinstance(item, bool) or not isinstance(item, str | int | float):
+            raise unusable(key, "numbers or text in quotes, one or a list of them", item)
+    words = [str(item) for item in several]
     typed = words if option.several else ",".join(words)
     option.parse(key, typed)
     return typed

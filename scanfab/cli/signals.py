@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: the process ends at once, and says how far it came."""
+"""Ctrl-C and SIGTERM end the process at once, with a message that says how far it came."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from typing import NoReturn
 from scanfab.base.ending import finish
 
 ENDED: dict[int, str] = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
-# clear the line of progress, and show the cursor that it hides
+# clear the progress bar, and show the cursor that it hides
 PLAIN_LINE = "\r\x1b[2K\x1b[?25h"
 _more: list[Callable[[], str]] = []
 
 
 @contextmanager
 def telling(words: Callable[[], str]) -> Iterator[None]:
-    """In the block these words follow "interrupted", such as "after 4 of 5 frames"."""
+    """Inside the block, add these words to "interrupted", for instance "after 4 of 5 frames"."""
     _more[:] = [words]
     try:
         yield
     except Exception:
         _more.clear()
         raise
-    # where KeyboardInterrupt ended the block, the words are still to be said
+    # not in a finally: after KeyboardInterrupt the words are still needed for the message
     _more.clear()
 
 
 def interrupted_words(number: int) -> str:
-    """What is said of a signal that ended the process."""
+    """The message about a signal that ended the process."""
     return " ".join([f"scanfab: {ENDED[number]}", *(words() for words in _more)])
 
 
 def catch_signals() -> None:
-    """From now on signals end the process in our way; one that is ignored stays so."""
+    """Install our handler of SIGTERM and Ctrl-C; Ctrl-C stays ignored if the shell ignores it."""
     signal.signal(signal.SIGTERM, _end)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, _end)
@@ -45,24 +45,24 @@ def catch_signals() -> None:
 
 @contextmanager
 def ending_in_order(end: Callable[[], object]) -> Iterator[None]:
-    """In the block the first signal calls this; a second one ends the process in our way."""
+    """Inside the block, the first signal calls ``end``; a second signal ends the process."""
 
-    before = {one: signal.getsignal(one) for one in ENDED}
-    before = {one: what for one, what in before.items() if what is not signal.SIG_IGN}
+    before = {number: signal.getsignal(number) for number in ENDED}
+    before = {number: what for number, what in before.items() if what is not signal.SIG_IGN}
 
     def restore() -> None:
-        for one, what in before.items():
-            signal.signal(one, what)
+        for number, what in before.items():
+            signal.signal(number, what)
 
     def first(number: int, frame: FrameType | None) -> None:
         restore()
         end()
-        words = f"scanfab: {ENDED[number]}: frames under way are finished, again to leave at once\n"
+        words = f"scanfab: {ENDED[number]}: finishing frames under way; repeat to stop at once\n"
         with suppress(OSError):
             os.write(2, words.encode())
 
-    for one in before:
-        signal.signal(one, first)
+    for number in before:
+        signal.signal(number, first)
     try:
         yield
     finally:
@@ -71,38 +71,38 @@ def ending_in_order(end: Callable[[], object]) -> Iterator[None]:
 
 def _end(number: int, frame: FrameType | None) -> None:
     """
-    Say it, remove what is temporary, and leave.
+    Print the message, remove temporary files, and end the process.
 
-    No exception is raised: it would come up anywhere, and extension modules, the compiler and their
-    callbacks swallow it, take it for a failure of their own, or crash.
+    This raises no exception, because it would appear at any line: extension modules, the compiler
+    and their callbacks swallow it, take it for a failure of their own, or crash.
     """
     for again in ENDED:
-        signal.signal(again, signal.SIG_DFL)  # a second one ends even what follows
+        signal.signal(again, signal.SIG_DFL)  # a second signal interrupts even the code below
     try:
         words = interrupted_words(number) + "\n"
         on_terminal = sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
-        # not by the stream, which may be in the middle of a line itself
+        # os.write, because sys.stderr may be in the middle of writing a line
         os.write(2, ((PLAIN_LINE if on_terminal else "") + words).encode(errors="replace"))
-    except Exception:  # a closed stream, no memory: it ends all the same
+    except Exception:  # a closed stream or no memory: the process ends all the same
         pass
     finally:
         leave_at_once(128 + number)
 
 
 def leave(code: int) -> NoReturn:
-    """Exit with what has been printed; a signal from now on would only spoil the exit code."""
+    """Flush the output and exit; further signals are ignored, as they would spoil the exit code."""
     for late in ENDED:
         signal.signal(late, signal.SIG_IGN)
     if code == 0:
         sys.exit(code)
     for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError):  # a full disk, a closed pipe: told already
+        with suppress(OSError):  # a full disk or a closed pipe: this was reported already
             stream.flush()
     leave_at_once(code)
 
 
 def leave_at_once(code: int) -> NoReturn:
-    """Exit without waiting for the frames that other threads are computing."""
+    """Exit without waiting for frames that other threads are computing."""
     try:
         finish()
     finally:

@@ -12,14 +12,14 @@ import scanfab
 from scanfab.cli.console import announce
 from scanfab.cli.options import SourceCommand, checked, open_one, options, usage_errors
 
-# letters of the source in a title, which has frame and strain behind it
+# letters of the source in the title, which also names frame and strain
 LONGEST_SOURCE = 60
 
 
 @click.command(cls=SourceCommand)
 @options("READING", "frame", "SAMPLE", "WINDOW", "cutoff", "axis", "strain")
 @click.option(
-    "--cut", is_flag=True, help="Leave out the grains in front, and show scan lines in the section."
+    "--cut", is_flag=True, help="Cut away the grains in front, and show scan lines in the section."
 )
 @options("screenshot")
 def view(
@@ -28,8 +28,8 @@ def view(
     """
     Show a frame in 3D: grains, rattlers, and the representative volume (RV).
 
-    SOURCE is as for scanfab compute; boundary particles are not drawn, and the loading axis is
-    upright.
+    SOURCE is the same as for scanfab compute. Boundary particles are not drawn. The loading axis
+    points up.
     """
     from scanfab.base.files import check_folder
     from scanfab.table.curves import middle_out, spelt_strain

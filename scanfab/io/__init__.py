@@ -1,8 +1,8 @@
 """
-From files, as users name them, to series of frames.
+Reading and writing of files: users name files, scanfab makes series of frames of them.
 
-These names are what a reader of another package may import; see docs/adding-a-reader.md. Where they
-are defined may change.
+Readers in other packages may import the names below (see docs/adding-a-reader.md). The modules that
+define these names may change.
 """
 
 from scanfab.io.columns import grain_table as grain_table

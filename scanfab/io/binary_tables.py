@@ -1,4 +1,4 @@
-"""Tables that are no text: Parquet, NPZ and ``.xyzd``. None of them runs what it holds."""
+"""Binary tables: Parquet, NPZ and ``.xyzd``. Reading them never runs code from the file."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from scanfab.packing.cell import Cell
 
 IS_PARQUET = b"PAR1"
 IS_NPZ = b"PK"
-# characters of the header of an array
+# longest header of an array, in characters
 MOST_HEADER = 10_000
-# kinds of arrays that hold numbers or text
+# numpy's kinds of arrays with numbers or text
 KINDS = "biufU"
-# how packing.nfo names the numbers of a packing
+# the lines of packing.nfo that are read: a name and numbers
 NFO = re.compile(
     r"(?im)^\s*(dimensions|final porosity|theoretical porosity)\s*:?"
     r"((?:[ \t]+[-+]?[0-9]+\.?[0-9]*(?:e[-+]?[0-9]+)?(?![^\s,;]))+)"
 )
-# arrays of an NPZ file that are centres, and those that are pairs
+# names of arrays in an NPZ file that hold centres, and names of arrays that hold pairs
 POSITIONS = ("position", "positions", "pos", "points", "centers", "centres")
 PAIRS = ("pairs", "contacts", "ids")
 
 
 def binary_names(path: Path) -> list[str] | None:
-    """The names of the columns of a binary table; None if the file is no such table."""
-    if is_xyzd(path):  # doubles may begin as any other file does
+    """The names of the columns of a binary table; None if the file is not a binary table."""
+    if is_xyzd(path):  # first, because its bytes may look like any other file
         return ["x", "y", "z", "diameter"]
     head = first_bytes(path, 8)
     if head.startswith(IS_PARQUET):
@@ -46,7 +46,7 @@ def binary_names(path: Path) -> list[str] | None:
 
 
 def read_binary(path: Path) -> Columns:
-    """The columns of a binary table, without those that are neither numbers nor text."""
+    """The columns of a binary table that hold numbers or text."""
     if is_xyzd(path):
         return _read_xyzd(path)
     if first_bytes(path, 8).startswith(IS_PARQUET):
@@ -56,19 +56,19 @@ def read_binary(path: Path) -> Columns:
     for name, values in read_npz(path).items():
         parts = _parts(name, values.shape)
         columns |= dict(zip(parts, values.T if values.ndim == 2 else [values], strict=False))
-    # arrays of another length than the grains are no columns of them
+    # arrays that do not have one row per grain are left out
     rows = len(columns["x"]) if "x" in columns else max(map(len, columns.values()), default=0)
     return {name: values for name, values in columns.items() if len(values) == rows}
 
 
 @contextmanager
 def _told(path: Path, kind: str) -> Iterator[None]:
-    """Turn the errors of a library into those of the file."""
+    """Turn any error of a library into a ReadError that names the file."""
     try:
         yield
     except ReadError:
         raise
-    # for a damaged file libraries raise whatever they meet
+    # for a damaged file, libraries raise errors of any type
     except Exception as error:
         reason = str(error).partition("\n")[0][:200] or type(error).__name__
         raise ReadError(f"{path}: cannot be read as {kind}: {reason}") from None
@@ -81,50 +81,50 @@ def _open_parquet(path: Path) -> Any:
 
 
 def _read_parquet(path: Path) -> Columns:
-    found: Columns = {}
+    columns: Columns = {}
     file = _open_parquet(path)
     names = file.schema_arrow.names
     _check_room(path, 8.0 * file.metadata.num_rows * len(names))
     for name, column in zip(names, file.read().columns, strict=True):
         values = column.to_numpy()
-        if values.dtype == object and all(isinstance(one, str | None) for one in values):
-            values = np.array([one or "" for one in values], dtype=np.str_)
+        if values.dtype == object and all(isinstance(word, str | None) for word in values):
+            values = np.array([word or "" for word in values], dtype=np.str_)
         if values.dtype.kind in KINDS:
-            found[name] = values
-    return found
+            columns[name] = values
+    return columns
 
 
 def _check_room(path: Path, room: float) -> None:
-    """ReadError if what a file says that it holds is too much for its size or the memory."""
+    """ReadError if a file claims more bytes than its size or the memory allows."""
     check_times(path, plain(path).stat().st_size, room)
     check_memory(path, 2.0 * room)
 
 
 def _parts(name: str, shape: tuple[int, ...]) -> list[str]:
-    """The names of the columns of an array of an NPZ file; none if it cannot be columns."""
+    """The names of the columns in an array of an NPZ file; empty if its shape fits no table."""
     if len(shape) != 2 or shape[1] > 9:
         return [name] if len(shape) == 1 else []
     axes = list("xyz"[: shape[1]]) if shape[1] < 4 else [f"{k}" for k in range(shape[1])]
     is_pair = name.lower() in PAIRS and shape[1] == 2
-    known = axes if name.lower() in POSITIONS else ["id1", "id2"] if is_pair else None
-    return known or [f"{name}_{axis}" for axis in axes]
+    parts = axes if name.lower() in POSITIONS else ["id1", "id2"] if is_pair else None
+    return parts or [f"{name}_{axis}" for axis in axes]
 
 
 def npz_shapes(path: Path) -> dict[str, tuple[int, ...]]:
     """The shapes of the arrays of numbers and text in an NPZ file."""
-    found, form = {}, np.lib.format
+    shapes, form = {}, np.lib.format
     read = {(1, 0): form.read_array_header_1_0, (2, 0): form.read_array_header_2_0}
     with _told(path, "NPZ"), zipfile.ZipFile(plain(path)) as archive:
-        for name in (one for one in archive.namelist() if one.endswith(".npy")):
+        for name in (member for member in archive.namelist() if member.endswith(".npy")):
             with archive.open(name) as stream:
                 shape, _, dtype = read[form.read_magic(stream)](stream, MOST_HEADER)
             if dtype.kind in KINDS:
-                found[name.removesuffix(".npy")] = shape
-    return found
+                shapes[name.removesuffix(".npy")] = shape
+    return shapes
 
 
 def read_npz(path: Path, wanted: Iterable[str] | None = None) -> Columns:
-    """The arrays of numbers and text in an NPZ file, those wanted; pickled objects are refused."""
+    """The arrays of numbers and text in an NPZ file, or the wanted ones; never pickled objects."""
     names = [name for name in npz_shapes(path) if wanted is None or name in wanted]
     with _told(path, "NPZ"), np.load(plain(path), max_header_size=MOST_HEADER) as archive:
         _check_room(path, float(sum(member.file_size for member in archive.zip.infolist())))
@@ -132,7 +132,7 @@ def read_npz(path: Path, wanted: Iterable[str] | None = None) -> Columns:
 
 
 def is_xyzd(path: Path) -> bool:
-    """By the ending: the content is nothing but doubles."""
+    """Whether the name ends in .xyzd; the content is plain doubles and cannot be recognised."""
     return bare_name(path).lower().endswith(".xyzd")
 
 
@@ -140,8 +140,8 @@ def _read_xyzd(path: Path) -> Columns:
     """
     The columns x, y, z and diameter of a binary packing of PackingGeneration.
 
-    The program writes the diameters that it began with. Those that it ended with are larger by
-    ((1 - final porosity) / (1 - theoretical porosity))^(1/3), which stand in ``packing.nfo``.
+    The program writes the initial diameters. The final diameters are larger by the factor
+    ((1 - final porosity) / (1 - theoretical porosity))^(1/3); ``packing.nfo`` has both porosities.
     """
     file = plain(path)
     size = file.stat().st_size
@@ -159,16 +159,16 @@ def _read_xyzd(path: Path) -> Columns:
         )
         factor = (final / theory) ** (1 / 3) if min(final, theory) > 0 else np.nan
         if not 0.5 < factor < 2.0:
-            expected = "a theoretical and a final porosity between 0 and 1, which scale diameters"
+            expected = "theoretical and final porosities between 0 and 1 to scale the diameters"
             raise ReadError(f"{path.with_name('packing.nfo')}: expected {expected}")
     if factor != 1.0:
-        told = f"diameters are multiplied by {factor:.6g}, from the porosities in packing.nfo"
-        note(f"{path}: {told}")
+        change = f"diameters are multiplied by {factor:.6g}, from the porosities in packing.nfo"
+        note(f"{path}: {change}")
     return {"x": x, "y": y, "z": z, "diameter": factor * diameter}
 
 
 def xyzd_cell(path: Path) -> Cell | None:
-    """The cell by the dimensions in ``packing.nfo``, which repeats along all axes."""
+    """The cell, periodic along all axes, from the dimensions in ``packing.nfo``."""
     edges = (_nfo(path) or {}).get("dimensions", [])
     try:
         return Cell(edges) if len(edges) == 3 else None
@@ -177,9 +177,9 @@ def xyzd_cell(path: Path) -> Cell | None:
 
 
 def _nfo(path: Path) -> dict[str, list[float]] | None:
-    """The numbers in ``packing.nfo`` beside a packing by their names; None without the file."""
+    """The numbers in the file ``packing.nfo`` of a packing, by name; None without the file."""
     info = path.with_name("packing.nfo")
     if not info.is_file():
         return None
-    found = NFO.findall(info.read_bytes()[:10_000].decode("utf-8", "replace"))
-    return {key.lower(): [float(word) for word in words.split()] for key, words in found}
+    matches = NFO.findall(info.read_bytes()[:10_000].decode("utf-8", "replace"))
+    return {key.lower(): [float(word) for word in words.split()] for key, words in matches}

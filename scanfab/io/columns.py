@@ -1,4 +1,4 @@
-"""From the columns of a dump, by name, to positions, radii and ids."""
+"""Find positions, radii and ids among the columns of a dump, by the names of the columns."""
 
 from __future__ import annotations
 
@@ -18,35 +18,35 @@ from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
 from scanfab.packing.cell import Cell
 
 BODIES = "scanfab_bodies"
-"""A column of this name is the number of each sphere's body, whatever other columns say."""
+"""The column of this name numbers the body of each sphere, whatever other columns say."""
 WALLS = "scanfab_wall_contacts"
-"""A column of this name is the number of contacts with walls of each grain."""
+"""The column of this name is each grain's number of contacts with walls."""
 
-# names are compared without regard to case
+# upper and lower case are the same
 RADIUS_NAMES = ("radius", "radii", "rad", "r", "f_radius")
 DIAMETER_NAMES = ("diameter", "diam")
 ID_NAMES = ("id", "ids", "particle_id", "particleid", "body_id", "bodyid")
-# other names that a radius may have, such as c_rad and f_r[1]
+# other likely names of a radius, such as c_rad and f_r[1]; messages suggest them
 LIKE_A_RADIUS = re.compile(r"(?i)rad(i|$|[^a-z])|(^|_)r($|\[)")
-# coordinates in the order of preference, and whether they are fractions of the box
+# names of coordinates, best first, and whether they are fractions of the box
 POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("xsu ysu zsu", True))
 
 # LIGGGHTS' half axes and exponents (and their older names): a superquadric is a sphere if all half
-# axes are its radius and the exponents 2, within the rounding of six digits
+# axes equal its radius and all exponents equal 2, up to rounding to six digits
 HALF_AXES, EXPONENTS = ("shapex", "shapey", "shapez"), ("blockiness1", "blockiness2")
 OLD_EXPONENTS, SIX_DIGITS = ("roundness1", "roundness2"), 1e-5
-# a number is damaged if a grain lies this many periodic cells from the cell's origin, or without a
-# cell this many times as far from 0 as the others: rounding would leave nothing of its place
+# a grain this many periodic cells away from the cell's origin has a damaged coordinate, because
+# rounding destroys its place; without a cell: this many times as far from 0 as the other grains
 FAR = 1e12
-# a diameter that differs from twice the radius by more than this share of it is another size:
-# numbers of few digits are rounded
+# a diameter contradicts the radius if it differs from twice the radius by more than this fraction;
+# smaller differences come from numbers with few digits
 ROUNDED = 0.05
-# whole numbers below this are exact as decimals
+# doubles hold whole numbers below this exactly
 EXACT = 2.0**53
 
 
 def has_radius(names: Sequence[str]) -> bool:
-    """Whether some column is a radius or a diameter."""
+    """Whether a column is named as a radius or a diameter."""
     lower = {name.lower() for name in names}
     return bool(lower & {*RADIUS_NAMES, *DIAMETER_NAMES})
 
@@ -55,21 +55,21 @@ def grain_table(
     path: Path, columns: Columns, cell: Cell | None, options: ReadOptions, where: str = ""
 ) -> GrainTable:
     """
-    Sort out which column is what.
+    Make grains of the columns of a dump.
 
     Parameters
     ----------
     path : Path
-        For messages.
+        The file, for messages.
     columns : mapping of str to ndarray
         All columns by the dump's names, N rows each; coordinates may be a column ``position`` of
         shape (N, 3).
     cell : Cell, optional
-        From the dump.
+        The dump's own cell.
     options : ReadOptions
-        Names, radius and cell from the user.
+        The user's names of columns, radius and cell.
     where : str, optional
-        For messages, such as ``", step 100"``.
+        Follows the path in messages, for instance ``", step 100"``.
 
     Raises
     ------
@@ -92,11 +92,11 @@ def grain_table(
 
 
 def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | None:
-    """The dump's cell with the user's cell and periodic on top."""
+    """The cell of a frame: the user's options ``cell`` and ``periodic`` override the dump."""
     if options.beside is not None:
         cell = None if options.beside == "none" else options.beside
-    asked = options.periodic
-    periodic = None if asked is None else ("x" in asked, "y" in asked, "z" in asked)
+    along = options.periodic
+    periodic = None if along is None else ("x" in along, "y" in along, "z" in along)
     if options.cell is not None:
         lx, ly, lz, xy, xz, yz = (*options.cell, 0.0, 0.0, 0.0)[:6]
         vectors = [[lx, 0, 0], [xy, ly, 0], [xz, yz, lz]]
@@ -105,28 +105,28 @@ def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | Non
     if periodic is None:
         return cell
     if cell is None:
-        lacks = f'`periodic="{asked}"` needs a cell, which the dump does not name'
+        lacks = f'`periodic="{along}"` needs a cell, and the dump has none'
         raise ReadError(f"{path}: {lacks}: give it with `cell=(LX, LY, LZ)`")
     return Cell(cell.vectors, periodic, cell.origin)
 
 
 def refuse_named_twice(path: Path, named: Mapping[str, str], option: str) -> None:
     """
-    One column serves as one thing.
+    Refuse an option that uses one column for two quantities.
 
     Parameters
     ----------
     path : Path
-        For messages.
+        The file, for messages.
     named : mapping of str to str
-        What the user says: the file's own name or number of each column, by what it is.
+        The user's choice: quantity to the file's own name or number of the column.
     option : str
-        The argument by which the user says it.
+        The name of the option, for messages.
 
     Raises
     ------
     ReadError
-        If two of them are the same column.
+        If two quantities have the same column.
     """
     serves: dict[str, str] = {}
     for standard, own in named.items():
@@ -136,52 +136,52 @@ def refuse_named_twice(path: Path, named: Mapping[str, str], option: str) -> Non
 
 
 def _named_by_user(path: Path, columns: Columns, options: ReadOptions) -> dict[str, Any]:
-    """All columns, those that the user named by their standard names."""
+    """All columns; those that the user named get their standard names."""
     refuse_named_twice(path, options.columns, "columns")
     rest, named = dict(columns), {}
     for standard, own in options.columns.items():
         if own not in rest:
-            there = f"the columns are {', '.join(rest)}"
-            raise ReadError(f"{path}: there is no column {own!r} to serve as {standard}; {there}")
+            listed = f"the columns are {', '.join(rest)}"
+            raise ReadError(f"{path}: there is no column {own!r} to serve as {standard}; {listed}")
         named[standard] = rest.pop(own)
-    # a column of the file that has such a standard name already is something else
-    return {name + "_of_dump" * (name in named): one for name, one in rest.items()} | named
+    # if the file itself has a column of that standard name, it is another quantity: rename it
+    return {name + "_of_dump" * (name in named): values for name, values in rest.items()} | named
 
 
 def _position(
     where: str, rest: dict[str, Any], options: ReadOptions, cell: Cell | None
 ) -> FloatArray:
-    """Take the coordinates out of the columns."""
-    # a dump may have a column of single numbers called position, too
+    """Remove the coordinates from the columns and return them, shape (N, 3)."""
+    # a dump may also have a column "position" of single numbers
     if "position" in rest and np.ndim(rest["position"]) == 2:
         return _lengths(where, rest.pop("position"), "a coordinate")
     for names, scaled in POSITION_NAMES:
-        known = zip(names.split(), "xyz", strict=True)
-        wanted = [first_of([a if a in options.columns else name], rest) for name, a in known]
+        pairs = zip(names.split(), "xyz", strict=True)
+        wanted = [first_of([a if a in options.columns else name], rest) for name, a in pairs]
         if not all(wanted):
             continue
-        found = np.column_stack([rest.pop(name) for name in wanted if name])
-        position = _lengths(where, found, "a coordinate")
+        coordinates = np.column_stack([rest.pop(name) for name in wanted if name])
+        position = _lengths(where, coordinates, "a coordinate")
         if not scaled:
             return position
         if cell is None:
             raise ReadError(f"{where}: {names} are fractions of a box, but there is no box")
-        # Packing refuses numbers that are not finite
+        # Packing refuses infinite results
         with np.errstate(over="ignore", invalid="ignore"):
             return np.asarray(cell.origin + position @ cell.vectors)
-    there, advice = ", ".join(rest) or "none", '`columns={"x": ..., "y": ..., "z": ...}` names them'
-    raise ReadError(f"{where}: no coordinates (x y z, xu yu zu, xs ys zs) in {there}; {advice}")
+    names, advice = ", ".join(rest) or "none", '`columns={"x": ..., "y": ..., "z": ...}` names them'
+    raise ReadError(f"{where}: no coordinates (x y z, xu yu zu, xs ys zs) in {names}; {advice}")
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def _refuse_far(where: str, position: FloatArray, radius: FloatArray, cell: Cell | None) -> None:
-    """ReadError if a grain is so far away that rounding leaves nothing of its place or size."""
+    """ReadError if a grain is so far away that rounding destroys its place or size."""
     periodic = cell if cell is not None and cell.is_periodic else None
     if not len(radius):
         return
     away = np.abs(position - (0.0 if periodic is None else periodic.origin)).max(axis=1)
     size = np.median(away) if periodic is None else np.abs(periodic.vectors).max()
-    # Packing refuses numbers that cannot be lengths
+    # numbers that cannot be lengths are refused by Packing
     far = np.flatnonzero((away < MOST) & (away > FAR * max(radius.max(), size)))
     if len(far):
         found = f"grain {far[0] + 1} lies {away[far[0]]:g} from the origin"
@@ -189,9 +189,9 @@ def _refuse_far(where: str, position: FloatArray, radius: FloatArray, cell: Cell
 
 
 def _radius(where: str, rest: dict[str, Any], options: ReadOptions, count: int) -> FloatArray:
-    """Take the radii out of the columns, or half the diameters; or the user's for all."""
+    """Remove radii or diameters from the columns and return radii; or the user's radius for all."""
     own = options.columns
-    # if the user names one size, the other column is not compared with it
+    # if the user names only a radius or only a diameter, the other column is ignored
     sizes = own.keys() & {"radius", "diameter"} or {"radius", "diameter"}
     name = first_of(RADIUS_NAMES, rest) if "radius" in sizes else None
     other = first_of(DIAMETER_NAMES, rest) if "diameter" in sizes else None
@@ -204,33 +204,33 @@ def _radius(where: str, rest: dict[str, Any], options: ReadOptions, count: int) 
         row = None if other is None else other_size(radius, rest[other])
         if row is not None:
             names = own.get("radius", name), own.get("diameter", other)
-            told = f"the columns {names[0]!r} and {names[1]!r} contradict each other"
+            problem = f"the columns {names[0]!r} and {names[1]!r} contradict each other"
             advice = f'`columns={{"radius": "{names[0]}"}}` names one'
-            raise ReadError(f"{where}: {told} at grain {row + 1}: {advice}")
+            raise ReadError(f"{where}: {problem} at grain {row + 1}: {advice}")
         return radius
     if other is not None:
         return 0.5 * _lengths(where, rest.pop(other), "a diameter")
     like = next((name for name in rest if LIKE_A_RADIUS.search(name)), "...")
-    found, doubt = ", ".join(rest) or "none", " (if that is one)" * (like != "...")
+    listed, doubt = ", ".join(rest) or "none", " (if that is one)" * (like != "...")
     advice = f'name it with `columns={{"radius": "{like}"}}`{doubt}, or give all grains a `radius`'
-    raise ReadError(f"{where}: no radius: expected radius or diameter, found {found}; {advice}")
+    raise ReadError(f"{where}: no radius: expected radius or diameter, found {listed}; {advice}")
 
 
 def other_size(radius: FloatArray, diameter: AnyArray) -> int | None:
     """
-    The first grain whose diameter is not twice its radius, as nearly as numbers are printed.
+    Find the first grain whose diameter is not twice its radius, up to rounding.
 
     Parameters
     ----------
     radius : ndarray, shape (N,)
         Dump's length unit.
     diameter : ndarray
-        A column that may be one of diameters.
+        A column that may hold diameters.
 
     Returns
     -------
     int or None
-        Its row; None if all agree, or the column is none of lengths.
+        The row of the grain; None if all agree, or if the column does not hold lengths.
     """
     if diameter.shape != radius.shape or diameter.dtype.kind not in "iuf":
         return None
@@ -240,40 +240,40 @@ def other_size(radius: FloatArray, diameter: AnyArray) -> int | None:
 
 
 def _refuse_superquadrics(where: str, rest: Columns, radius: FloatArray) -> None:
-    """ReadError if some particles are no spheres: their radius is that of a sphere around them."""
+    """ReadError if particles are superquadrics: their radius is that of an enclosing sphere."""
     expected = dict.fromkeys(HALF_AXES, radius) | dict.fromkeys((*EXPONENTS, *OLD_EXPONENTS), 2.0)
     for name in [name for name in rest if name.lower() in expected]:
         value = expected[name.lower()]
         count = np.count_nonzero(np.abs(rest[name] - value) > SIX_DIGITS * np.abs(value))
         if count:
-            told = f"{count} of {len(radius)} particles are superquadrics (by the column {name})"
-            raise ReadError(f"{where}: {told}: fill them with spheres, to be joined by `bodies`")
+            problem = f"{count} of {len(radius)} particles are superquadrics (by the column {name})"
+            raise ReadError(f"{where}: {problem}: fill them with spheres, joined by `bodies`")
 
 
 def first_of(known: Sequence[str], names: Iterable[str]) -> str | None:
-    """The first name that is one of those known, in the order of these; without regard to case."""
+    """The first of the known names that is among ``names``, ignoring case; None if none is."""
     lower = {name.lower(): name for name in reversed([*names])} | {name: name for name in names}
     return next((lower[name] for name in known if name in lower), None)
 
 
 def whole_numbers(path: Path, values: npt.ArrayLike, where: str = "") -> npt.NDArray[np.int64]:
-    """Ids as whole numbers; ReadError if they are not."""
+    """Ids as int64; ReadError if they are not whole numbers."""
     numbers = np.asarray(values)
     is_whole = numbers.ndim == 1 and numbers.dtype.kind in "biuf"
     if is_whole and numbers.dtype.kind in "uf":
-        # larger decimals may have been rounded; comparisons with NaN are false
+        # larger floats may have been rounded; comparisons with NaN are False
         most = EXACT if numbers.dtype.kind == "f" else 2.0**63
         is_whole = bool(np.all((np.abs(numbers) < most) & (numbers == np.rint(numbers))))
     if not is_whole:
-        told = "ids must be whole numbers, below 2^53 where they are read as decimals"
-        raise ReadError(f"{path}{where}: {told}")
+        expected = "ids must be whole numbers, and below 2^53 if the file has them as decimals"
+        raise ReadError(f"{path}{where}: {expected}")
     whole = numbers.astype(np.int64, copy=False)
     whole.flags.writeable = False  # so that the packing need not copy it
     return whole
 
 
 def _lengths(where: str, values: npt.ArrayLike, what: str) -> FloatArray:
-    """Numbers that may be lengths; which of them cannot be is the packing's to say."""
+    """Numbers as doubles; Packing checks later whether they are possible lengths."""
     array = np.asarray(values)
     if array.dtype.kind not in "biuf":
         raise ReadError(f"{where}: expected numbers for {what}, found {array.dtype}")
@@ -282,23 +282,23 @@ def _lengths(where: str, values: npt.ArrayLike, what: str) -> FloatArray:
 
 def body_numbers(path: Path, grains: GrainTable, named: str | None) -> IntArray | None:
     """
-    The number of the body that each sphere is of, shape (N,); negative: a grain of its own.
+    Number the rigid body (clump) to which each sphere belongs.
 
     Parameters
     ----------
     path : Path
-        For messages.
+        The file, for messages.
     grains : GrainTable
-        Of one frame.
+        The spheres of one frame.
     named : str, optional
-        The column that says it; ``id``: each sphere is a grain. Without it a column that numbers
-        clumps whatever the format; one of molecules is never taken unasked, as these may be bonded
-        spheres that move against one another.
+        The column with the numbers; ``id`` makes each sphere a grain. By default a column with a
+        usual name for clumps. A column of molecules must be named, because molecules may be bonded
+        spheres that move relative to each other.
 
     Returns
     -------
     ndarray of int, shape (N,), or None
-        None if each sphere is a grain.
+        Negative for a sphere that is a grain of its own; None if all spheres are.
 
     Raises
     ------
@@ -310,11 +310,11 @@ def body_numbers(path: Path, grains: GrainTable, named: str | None) -> IntArray 
         if grains.bodies is not None:
             return grains.bodies
         name = first_of(CLUMP_COLUMNS, columns)
-    # an empty frame may have lost its columns; `id` makes each sphere a grain, also without ids
+    # an empty frame may lack the column; `id` makes each sphere a grain, even if there are no ids
     if name is None or not len(grains.radius) or (name == "id" and name not in columns):
         return None
     if name not in columns:
-        there = ", ".join(["id", *columns])
-        raise ReadError(f"{path}: `bodies`: there is no column {name!r}; the columns are {there}")
+        listed = ", ".join(["id", *columns])
+        raise ReadError(f"{path}: `bodies`: there is no column {name!r}; the columns are {listed}")
     numbers = whole_numbers(path, columns[name], f": `bodies`: the column {name}")
     return np.where(numbers > 0, numbers, -1) if name.lower() in MOLECULE_COLUMNS else numbers

@@ -1,8 +1,8 @@
 """
-The companion files of a file of grains, which hold what its format has no place for.
+Companion files hold the data of a packing for which the format of its grain file has no place.
 
-``STEM.contacts.csv``, ``STEM.frame.csv`` and ``STEM.columns.csv`` belong to the file STEM with any
-ending. :func:`scanfab.convert` writes them, and whoever reads the file finds them there.
+``STEM.contacts.csv``, ``STEM.frame.csv`` and ``STEM.columns.csv`` belong to the grain file STEM,
+whatever its ending. :func:`scanfab.convert` writes them, and reading the grain file reads them too.
 """
 
 from __future__ import annotations
@@ -25,43 +25,43 @@ from scanfab.io.writer import Left, as_arrays, csv_bytes, more_columns
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
-# the first line of each kind
+# the first line of each kind of companion file
 HEADS = {
     "contacts": r"id1,id2,ix,iy,iz(,fx2,fy2,fz2|,fn)?\r?$",
     "frame": "step,time,ax,",
     "columns": "scanfab_id,",
 }
-# columns of contacts by the names of writer.Arrays; the force acts on the second grain, and the
-# normal force is positive in compression
+# columns of the contacts file for each array of writer.Arrays; the force acts on the second grain,
+# and the normal force is positive in compression
 PARTS = {"id1": ["id1"], "id2": ["id2"], "image": ["ix", "iy", "iz"]}
 PARTS |= {"force": ["fx2", "fy2", "fz2"], "force_n": ["fn"]}
 WHOLE = ("id1", "id2", *PARTS["image"])
-# vectors and corner of the cell
+# the three vectors of the cell, and its corner (o)
 CELL = tuple(f"{vector}{axis}" for vector in "abco" for axis in "xyz")
 FRAME = ("step", "time", *CELL, "periodic", "grains", "contacts")
-# bytes of memory for each byte of a file
+# bytes of memory needed for each byte of a file
 IN_MEMORY = 12.0
 
 
 def companion_file(path: Path, kind: str) -> Path:
-    """Where a companion file of a file of grains is, or would be."""
+    """The path of a companion file of a grain file, whether it exists or not."""
     return path.with_name(f"{Path(bare_name(path)).stem}.{kind}.csv")
 
 
 def companion_kind(path: Path) -> str | None:
-    """``contacts``, ``frame`` or ``columns`` by the first line of a file; None: it is another."""
+    """``contacts``, ``frame`` or ``columns``, judged by the first line; None for any other file."""
     line = first_bytes(path).partition(b"\n")[0].decode("utf-8", "replace")
     return next((kind for kind, head in HEADS.items() if re.match(head, line)), None)
 
 
 def companion_there(path: Path, kind: str) -> Path | None:
-    """A companion file of a file of grains, if it exists and is no file of others."""
+    """The companion file of a grain file; None if there is none, or another program wrote it."""
     file = companion_file(path, kind)
     return file if file.is_file() and companion_kind(file) == kind else None
 
 
 def companions_of(packing: Packing, path: Path, left: Left) -> dict[Path, bytes]:
-    """The companion files of a packing, for all that a writer left out of its file of grains."""
+    """The bytes of the companion files that hold the data a writer left out of the grain file."""
     arrays = as_arrays(packing)
     tables: dict[str, dict[str, Any]] = {}
     if left.contacts and packing.contacts is not None:
@@ -84,7 +84,7 @@ def companions_of(packing: Packing, path: Path, left: Left) -> dict[Path, bytes]
 
 
 def _rows(path: Path) -> Any:
-    """A companion file as a polars table of words, whose first row holds the names of columns."""
+    """A companion file as a polars table of words; its first row has the names of the columns."""
     import polars
 
     file = plain(path)
@@ -93,43 +93,43 @@ def _rows(path: Path) -> Any:
     if not data.endswith(b"\n"):
         raise ReadError(f"{path}: the last line has no end: the file is incomplete")
     try:
-        # polars leaves doubled quotes in the names of columns, but not in words
+        # header row as words, because polars keeps doubled quotes in a header it parses itself
         return polars.read_csv(data, has_header=False, infer_schema=False)
     except polars.exceptions.PolarsError as error:
         raise ReadError(f"{path}: cannot be read: {str(error).partition(chr(10))[0]}") from None
 
 
 def _columns(path: Path) -> Columns:
-    """The columns of a companion file: each whole numbers, numbers or texts, as all words are."""
+    """The columns of a companion file; each becomes int64 or float64 if all its words allow it."""
     import polars
 
     words = _rows(path)
     if any(words.null_count().row(0)):
         raise ReadError(f"{path}: a line is incomplete")
-    found = {}
+    columns = {}
     for name, column in zip(words.row(0), words.slice(1), strict=True):
         casts = [column.cast(kind, strict=False) for kind in (polars.Int64, polars.Float64)]
-        values = next((one for one in casts if not one.null_count()), column).to_numpy()
-        found[str(name)] = values.astype(str) if values.dtype == object else values
-    return found
+        values = next((cast for cast in casts if not cast.null_count()), column).to_numpy()
+        columns[str(name)] = values.astype(str) if values.dtype == object else values
+    return columns
 
 
 def read_contacts(path: Path, grains: GrainTable) -> JoinedContacts:
     """
-    The contacts of a file, joined to its grains.
+    Read a contacts file, and join its contacts to the grains.
 
     Raises
     ------
     ReadError
-        If a line is damaged or names a grain that does not exist; or if the frame file beside it
-        says another number of contacts.
+        If a line is damaged or names a grain that does not exist; or if the frame file counts
+        another number of contacts.
     """
     if companion_kind(path) != "contacts":
         raise ReadError(f"{path}: expected contacts under the line id1,id2,ix,iy,iz and forces")
     table = _columns(path)
     if any(values.dtype.kind == "U" for values in table.values()):
-        raise ReadError(f"{path}: expected numbers as {', '.join(table)}, found other words")
-    # the frame file is the same whatever the ending of the grain file
+        raise ReadError(f"{path}: expected numbers in the columns {', '.join(table)}, found text")
+    # any ending will do here: the frame file is found by the stem
     grain_file = path.with_name(f"{bare_name(path).removesuffix('.contacts.csv')}.csv")
     _check_count(path, len(table["id1"]), "contacts", read_frame(grain_file))
     if grains.id is None:
@@ -140,38 +140,38 @@ def read_contacts(path: Path, grains: GrainTable) -> JoinedContacts:
     return join_ids(path, grains, ids, force, walls=False, image=image, force_n=normal)
 
 
-def _check_count(path: Path, found: int, what: str, told: FrameData | None) -> None:
-    """ReadError if a file has lost rows on its way, or belongs to another frame."""
-    if told is not None and getattr(told, what) not in (None, found):
-        expected = f"expected {getattr(told, what)} by {told.file.name}"
-        raise ReadError(f"{path}: holds {found} {what}, {expected}: it was cut, or is of others")
+def _check_count(path: Path, count: int, what: str, frame: FrameData | None) -> None:
+    """ReadError if a file does not have as many rows as the frame file says."""
+    if frame is not None and getattr(frame, what) not in (None, count):
+        expected = f"but {frame.file.name} counts {getattr(frame, what)}"
+        raise ReadError(f"{path}: holds {count} {what}, {expected}: it is cut or of another frame")
 
 
 class FrameData(NamedTuple):
-    """What a frame file says of a frame."""
+    """The content of a frame file."""
 
     file: Path
     step: int | None
     time: float | None
     cell: Cell | None
     grains: int | None
-    """How many there are; None if the file does not say."""
+    """The number of grains; None if the file does not say."""
     contacts: int | None
-    """None: there need not be a contacts file."""
+    """The number of contacts; None if no contacts file is needed."""
 
     def moment_of(self, snapshot: Snapshot) -> Snapshot:
-        """The snapshot at this step and time; if there is no step, its name says none either."""
+        """The snapshot with this step and time; without a step, numbers in its name are ignored."""
         return replace(snapshot, step=self.step, time=self.time, stepless=self.step is None)
 
 
 def read_frame(path: Path) -> FrameData | None:
     """
-    The frame file of a file of grains; None if there is none.
+    Read the frame file of a grain file; None if there is none.
 
     Raises
     ------
     ReadError
-        If it is damaged.
+        If the frame file is damaged.
     """
     file = companion_there(path, "frame")
     if file is None:
@@ -187,23 +187,23 @@ def read_frame(path: Path) -> FrameData | None:
             numbers = np.array([float(words[name]) for name in CELL]).reshape(4, 3)
             cell = Cell(numbers[:3], ("x" in along, "y" in along, "z" in along), numbers[3])
         counts = ("step", "grains", "contacts")
-        step, grains, contacts = (int(words[one]) if one in words else None for one in counts)
+        step, grains, contacts = (int(words[count]) if count in words else None for count in counts)
         time = float(words["time"]) if "time" in words else None
     except (KeyError, ValueError, PackingError) as error:
         raise ReadError(f"{file}: cannot be read as cell, step and time: {error}") from None
     return FrameData(file, step, time, cell, grains, contacts)
 
 
-def check_contacts_are_there(path: Path, told: FrameData | None) -> None:
+def check_contacts_are_there(path: Path, frame: FrameData | None) -> None:
     """
-    Check grains that are read without contacts: none may have been lost.
+    Check that grains without contacts have not lost their contacts file.
 
     Parameters
     ----------
     path : Path
-        The file of grains.
-    told : FrameData, optional
-        Its frame file.
+        The grain file.
+    frame : FrameData, optional
+        The content of its frame file.
 
     Raises
     ------
@@ -212,7 +212,7 @@ def check_contacts_are_there(path: Path, told: FrameData | None) -> None:
     """
     file = companion_file(path, "contacts")
     is_empty = file.is_file() and not file.stat().st_size
-    count = "" if told is None or told.contacts is None else f"{told.contacts} "
+    count = "" if frame is None or frame.contacts is None else f"{frame.contacts} "
     if count or is_empty:
         found = "an empty file" if is_empty else "other words" if file.is_file() else "no such file"
         advice = 'copy it again, or choose `contacts="geometric"`'
@@ -220,26 +220,26 @@ def check_contacts_are_there(path: Path, told: FrameData | None) -> None:
         raise ReadError(f"{file}: {expected}, found {found}: {advice}")
 
 
-def with_columns(path: Path, grains: GrainTable, told: FrameData | None) -> GrainTable:
+def with_columns(path: Path, grains: GrainTable, frame: FrameData | None) -> GrainTable:
     """
-    Grains with the columns of their columns file.
+    Add the columns of the columns file to the grains.
 
     Raises
     ------
     ReadError
-        If it is damaged or belongs to other grains; or if the frame file says another number of
-        grains.
+        If the columns file is damaged or belongs to other grains; or if the frame file counts
+        another number of grains.
     """
-    _check_count(path, len(grains.radius), "grains", told)
+    _check_count(path, len(grains.radius), "grains", frame)
     file = companion_there(path, "columns")
     if file is None:
         return grains
-    own = _columns(file)
+    columns = _columns(file)
     id = np.arange(len(grains.radius)) if grains.id is None else grains.id
-    if not np.array_equal(own.pop("scanfab_id"), id):
-        raise ReadError(f"{file}: holds columns of other grains than {path.name}")
-    if BODIES in own:
-        grains = grains._replace(bodies=whole_numbers(file, own.pop(BODIES)))
-    if WALLS in own:
-        grains = grains._replace(wall_contacts=whole_numbers(file, own.pop(WALLS)))
-    return grains._replace(columns={**grains.columns, **own})
+    if not np.array_equal(columns.pop("scanfab_id"), id):
+        raise ReadError(f"{file}: its ids are not those of the grains in {path.name}")
+    if BODIES in columns:
+        grains = grains._replace(bodies=whole_numbers(file, columns.pop(BODIES)))
+    if WALLS in columns:
+        grains = grains._replace(wall_contacts=whole_numbers(file, columns.pop(WALLS)))
+    return grains._replace(columns={**grains.columns, **columns})

@@ -35,40 +35,40 @@ def convert(
     **reading: Any,
 ) -> list[Path]:
     """
-    Write frames in another format; nothing of the common table is lost.
+    Write frames in another format without losing data.
 
-    What a format has no place for goes into companion files, which whoever reads the file finds by
-    itself: contacts into ``STEM.contacts.csv``, cell, step and time into ``STEM.frame.csv``,
-    columns into ``STEM.columns.csv``. A note says what is lost nevertheless.
+    Data for which the format has no place go into companion files, which scanfab reads with the
+    file: contacts into ``STEM.contacts.csv``, cell, step and time into ``STEM.frame.csv``, columns
+    into ``STEM.columns.csv``. A note says what is lost nevertheless.
 
     Parameters
     ----------
     source : path, Series, Packing or iterable of Packing
-        What to write.
+        The frames to write.
     out : path
-        A file for one frame; a folder, or a name with ``{step}``, for a file each. For a frame
-        without a step its number is taken.
+        A file for one frame. For several frames a folder, or a file name with ``{step}``, which
+        becomes the step of the frame, or its number if it has no step.
     to : str, optional
-        Name of the format; without it the suffix of ``out`` says it. A folder needs it.
+        Name of the format; by default it follows from the suffix of ``out``. Needed for a folder.
     frames : str, int or slice, optional
-        Which, as a Python slice; all by default.
+        The frames to write, as a Python slice; all by default.
     after : callable, optional
-        Called when a frame is written.
+        Called after each frame that was written.
     **reading
-        How to read paths; see :func:`scanfab.read_series`.
+        Options for reading a path; see :func:`scanfab.read_series`.
 
     Returns
     -------
     list of Path
-        The files that hold grains, in the order of the frames.
+        The grain files, in the order of the frames.
 
     Raises
     ------
     SettingsError
-        If there is no such format, several frames are to go into one file, two have one step, or a
-        companion file that belongs to another file of the name would be changed.
+        If there is no such format, ``out`` is one file for several frames, two frames have the same
+        step, or a companion file of another grain file would be overwritten.
     ReadError, PackingError
-        If a frame cannot be read; files are complete or untouched.
+        If a frame cannot be read. Each file is complete or untouched.
     OSError
         If a file cannot be written.
 
@@ -92,16 +92,16 @@ def convert(
     pattern = out / f"frame_{STEP}{writer.extensions[0]}" if is_folder else out
     check_folder(pattern if out.is_dir() else out)
     refuse_unknown("convert", reading, [*READING, "to", "frames"])
-    found = _packings(source, parse_frames(frames), reading)
+    packings = _packings(source, parse_frames(frames), reading)
     if STEP not in pattern.name:
-        # look for a second frame before the file is touched
-        first = list(islice(found, 2))
+        # look for a second frame before the file is written
+        first = list(islice(packings, 2))
         if len(first) > 1:
             where = f"a folder, or a file with {STEP} in its name, or one frame by `frames`"
             raise SettingsError(f"{out}: there are several frames for one file: name {where}")
-        found = iter(first)
+        packings = iter(first)
     written: dict[Path, int] = {}
-    for number, packing in found:
+    for number, packing in packings:
         if not isinstance(packing, Packing):
             raise SettingsError(f"source: expected packings, found {packing!r} among them")
         step = number if packing.step is None else packing.step
@@ -119,53 +119,53 @@ def convert(
 
 
 def _packings(source: Any, chosen: slice, reading: dict[str, Any]) -> Iterator[tuple[int, Packing]]:
-    """The chosen frames with their numbers."""
+    """The chosen packings with the numbers of their frames."""
     if isinstance(source, str | os.PathLike):
         source = read_series(source, **reading)
     elif reading:
-        raise SettingsError(f"`{next(iter(reading))}` is for files that are yet to be read")
+        raise SettingsError(f"`{next(iter(reading))}` is for files that are not read yet")
     if isinstance(source, Series):
-        for one in source.contacts:
-            if companion_kind(one.largest) is None:
-                note(f"{one.pattern}: of contacts only pairs, images and forces are written")
+        for family in source.contacts:
+            if companion_kind(family.largest) is None:
+                note(f"{family.pattern}: only pairs, images and forces of the contacts are written")
         return ((frame.number, frame.read()) for frame in source[chosen])
     packings = [source] if isinstance(source, Packing) else source
     if not isinstance(packings, Iterable):
         raise SettingsError(f"source: expected a path, a Series or packings, found {source!r}")
     bounds = (chosen.start, chosen.stop, chosen.step)
     if any((bound or 0) < 0 for bound in bounds):
-        # a bound counts from the end, so all packings are needed first
+        # a bound that counts from the end needs the number of packings
         return iter(list(enumerate(packings))[chosen])
     return islice(enumerate(packings), *bounds)
 
 
 def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> None:
     """
-    One packing into one file, with its companion files; all files are complete or untouched.
+    Write one packing to a file and its companion files; each file is complete or untouched.
 
     Parameters
     ----------
     packing : Packing
-        What to write.
+        The packing.
     path : Path
-        Where to.
+        The grain file.
     writer : Writer, optional
-        By default the one that the suffix names.
+        By default the writer of the suffix of ``path``.
     """
     writer = writer or writer_for(path)
-    there = [file for kind in HEADS if (file := companion_there(path, kind))]
-    other = _other_grains(path) if there else None
+    companions = [file for kind in HEADS if (file := companion_there(path, kind))]
+    other = _other_grains(path) if companions else None
     if other is not None:
-        names = " and ".join(file.name for file in there)
+        names = " and ".join(file.name for file in companions)
         raise SettingsError(f"{path}: {names} may belong to {other.name}: choose another name")
     with ExitStack() as files:
-        # files take their places in reverse order: the grain file last, when all others are there
+        # the stack is unwound in reverse: the grain file appears last, after its companion files
         left = writer.write(packing, files.enter_context(whole_file(path)))
         made = companions_of(packing, path, left)
         for file, data in made.items():
             files.enter_context(whole_file(file)).write_bytes(data)
-    for file in set(there) - made.keys():
-        # it belonged to an earlier packing of this name
+    for file in set(companions) - made.keys():
+        # left over from an earlier packing of this name
         with suppress(OSError):
             file.unlink()
     for text in left.notes:
@@ -175,7 +175,7 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
 
 
 def _other_grains(path: Path) -> Path | None:
-    """Another file with the same name and the ending of a format, to which companions belong."""
+    """Another grain file of the same stem, to which existing companion files may belong."""
     offers = [*installed_writers().values(), *installed_readers().values()]
     endings = sorted({ending for offer in offers for ending in offer.plugin.extensions})
     stem = Path(bare_name(path)).stem

@@ -1,7 +1,7 @@
 """
-The files that users name, sorted by their names into families: one family for each series.
+Sort the files that users name into families: one family for each series.
 
-The files of a family are of one kind, and their names differ in the step only. Contact files are
+The files of a family are of one kind, and their names differ only in the step. Contact files are
 paired with grain files by step and name.
 """
 
@@ -25,26 +25,26 @@ from scanfab.io.reader import FileKind, Reader, ReadOptions, installed_readers, 
 
 PathLike = str | os.PathLike[str]
 Numbered = list[tuple[int | None, Path]]
-"""Files with the numbers that tell them apart."""
+"""Files with the number in each name that is its step; None for a name without a number."""
 
 SETTINGS_FILE = "scanfab.toml"
-# endings of what editors and interrupted programs leave
+# endings of files that editors and interrupted programs leave behind
 LEFTOVERS = ("~", ".part", ".tmp", ".bak")
 NUMBER = re.compile(r"\d+")
 
 
 def expanded(source: PathLike) -> list[PathLike]:
-    """What a glob names that stood in quotes, so that no shell expanded it; else the source."""
+    """The paths that a quoted glob matches (no shell expanded it); any other source as it is."""
     if Path(source).exists() or not glob.has_magic(os.fspath(source)):
         return [source]
-    found: list[PathLike] = [*sorted(glob.glob(os.fspath(source)))]
-    if not found:
-        raise ReadError(f"{source}: matches nothing: there is no file or folder of such a name")
-    return found
+    paths: list[PathLike] = [*sorted(glob.glob(os.fspath(source)))]
+    if not paths:
+        raise ReadError(f"{source}: matches nothing: there is no file or folder of this name")
+    return paths
 
 
 def named_once(sources: Iterable[PathLike]) -> list[PathLike]:
-    """Sources as they are spelt, each file and folder once; a warning names the repeated ones."""
+    """The sources, each file and folder once; a warning names those that are given twice."""
     first: dict[Path, PathLike] = {}
     again = []
     for source in chain.from_iterable(map(expanded, sources)):
@@ -52,7 +52,7 @@ def named_once(sources: Iterable[PathLike]) -> list[PathLike]:
             again.append(f"{source}")
         first.setdefault(place, source)
     if again:
-        warn(f"{some(again)}: named twice among the sources, and read once")
+        warn(f"{some(again)}: named twice among the sources, but read once")
     return list(first.values())
 
 
@@ -62,64 +62,64 @@ def some(names: Sequence[str]) -> str:
 
 
 def files_of(path: Path) -> list[Path]:
-    """A file, or the files of a folder; a note names the pipes and devices in it."""
+    """The file itself, or the files of a folder; a note names skipped pipes and devices."""
     if not path.exists():
         raise ReadError(f"{path}: there is no such file, folder or glob")
     if not path.is_dir():
         return [path]
-    for one in sorted(path.iterdir()):
-        if (kind := kind_of(one)) is not None:
-            note(f"skipped {one}: it is {kind}, not a file")
+    for entry in sorted(path.iterdir()):
+        if (kind := kind_of(entry)) is not None:
+            note(f"skipped {entry}: it is {kind}, not a file")
     return files_in(path)
 
 
 def files_in(folder: Path) -> list[Path]:
-    """The files of a folder that may be dumps: neither hidden nor left behind by an editor."""
+    """The files of a folder that may be dumps; hidden files and leftovers are left out."""
     names = [name for name in sorted(os.listdir(folder)) if name != SETTINGS_FILE]
     files = [folder / name for name in names if name[0] != "." and not name.endswith(LEFTOVERS)]
     return [file for file in files if file.is_file()]
 
 
 def files_around(files: Iterable[Path]) -> list[Path]:
-    """All files in the folders of these; a folder that cannot be listed adds none."""
-    found: list[Path] = []
+    """All files in the folders of the given files; folders that cannot be listed are skipped."""
+    around: list[Path] = []
     for folder in {file.parent: None for file in files}:
         with suppress(OSError):
-            found += files_in(folder)
-    return found
+            around += files_in(folder)
+    return around
 
 
 @dataclass(frozen=True)
 class Family:
-    """Files of one kind that differ in the step only."""
+    """Files of one kind whose names differ only in the step."""
 
     pattern: str
-    """A glob for users, such as ``dumps/dump_*.txt``."""
+    """A glob that matches the files, for messages: ``dumps/dump_*.txt``."""
     files: dict[int | None, Path]
-    """By the number in the name, in natural order; None for a name without a number."""
+    """The files by the number in the name, in natural order; None if a name has no number."""
     reader: Reader | None
-    """None if no reader knows them."""
+    """The reader of the files; None if no reader knows them."""
     kind: FileKind
     problem: str | None = None
-    """Why the reader cannot tell what they hold."""
+    """Why the reader cannot tell what the files hold."""
     clash: str | None = None
-    """What is wrong with their steps."""
+    """What is wrong with the steps of the files."""
     has_steps: bool = True
-    """Whether the numbers are steps; the number in the name of a single file may mean anything."""
+    """Whether the numbers are steps; in the name of a single file a number may mean anything."""
 
     @property
     def largest(self) -> Path:
-        """The file that tells reader and kind."""
+        """The largest file; it decides the reader and the kind of the family."""
         return max(self.files.values(), key=lambda file: file.stat().st_size)
 
     @property
     def is_table(self) -> bool:
-        """Whether they are tables, which may hold anything."""
+        """Whether the files are general tables, which may hold anything."""
         return bool(getattr(self.reader, "is_table", False))
 
     @property
     def stems(self) -> set[str]:
-        """The STEM of each file, by which ``STEM.contacts.csv`` would name it."""
+        """The STEM of each file; its contacts file would be called ``STEM.contacts.csv``."""
         return set(map(_own_stem, self.files.values()))
 
     @property
@@ -132,22 +132,22 @@ def sort_into_families(
     files: Iterable[Path], options: ReadOptions, groups: Iterable[Numbered] | None = None
 ) -> list[Family]:
     """
-    Sort files into families; the largest file of each tells its reader and kind.
+    Sort files into families; the largest file of each family decides its reader and kind.
 
-    ``groups`` are those of :func:`group_by_name`, where other files were grouped with these: they
-    show which number in a name is the step.
+    ``groups`` come from :func:`group_by_name`. They may hold further files, which help to find the
+    number in a name that is the step.
     """
     files = set(files)
     groups = group_by_name(files) if groups is None else groups
-    own = [([one for one in group if one[1] in files], len(group) > 1) for group in groups]
-    return [_family_of(members, files, options, several) for members, several in own if members]
+    chosen = [([pair for pair in group if pair[1] in files], len(group) > 1) for group in groups]
+    return [_family_of(members, files, options, several) for members, several in chosen if members]
 
 
 def group_by_name(*listings: Iterable[Path]) -> list[Numbered]:
     """
-    Group all files whose names differ in the step only, in natural order.
+    Group all files whose names differ only in the step, in natural order.
 
-    A file that another one of its listing names as one of its parts is left out.
+    A file is left out if another file of its listing lists it as one of its parts.
     """
     readers = [offer.plugin for offer in installed_readers().values()]
     listers = [reader for reader in readers if hasattr(reader, "listed_by")]
@@ -162,10 +162,10 @@ def group_by_name(*listings: Iterable[Path]) -> list[Numbered]:
 
 def _split(group: list[Path]) -> Iterable[Numbered]:
     """
-    Tell series apart whose names differ in several numbers (run1_100, run1_200, run2_100).
+    Separate series whose names differ in several numbers (run1_100, run1_200, run2_100).
 
-    The last number that differs is the step. All files are one series if the numbers before it
-    never fall while the step rises, and no step occurs twice.
+    The last number that differs is the step. All files form one series if the numbers before the
+    step never fall while the step rises, and no step occurs twice.
     """
     numbers = {file: numbers_in(file) for file in group}
     columns = list(zip(*numbers.values(), strict=True))
@@ -183,8 +183,8 @@ def _split(group: list[Path]) -> Iterable[Numbered]:
 
 
 def numbers_in(file: Path) -> tuple[int, ...]:
-    """The numbers in a name, of which one may be the step."""
-    # digits in the ending (.mp4) are no step, unless the whole ending is a number (dump.100)
+    """The numbers in a file name; one of them may be the step."""
+    # digits in the ending (.mp4) are not a step, unless the ending is a number (dump.100)
     name = Path(bare_name(file))
     text = name.name if name.suffix[1:].isdigit() else name.stem
     return tuple(map(int, NUMBER.findall(text)))
@@ -193,7 +193,7 @@ def numbers_in(file: Path) -> tuple[int, ...]:
 def _family_of(
     members: Numbered, among: Collection[Path], options: ReadOptions, has_steps: bool
 ) -> Family:
-    """The family of some files; its pattern matches none of the others ``among`` which they are."""
+    """The family of some files; its pattern matches no other file in ``among``."""
     files: dict[int | None, Path] = {}
     clash = None
     for step, file in members:
@@ -206,13 +206,13 @@ def _family_of(
         reader = reader_for(family.largest, options)
         kind = "other" if reader is None else reader.kind(family.largest)
     except ReadError as error:
-        # a folder is read without its damaged files; of a single file this is the error
+        # kept, not raised: a folder is read without its damaged files
         return replace(family, reader=reader, problem=str(error))
     return replace(family, reader=reader, kind=kind)
 
 
 def _glob(members: list[Path], among: Iterable[Path]) -> str:
-    """The names with stars for the numbers that differ; some names if stars match other files."""
+    """A glob with stars for the numbers that differ; a list of names if it matches other files."""
     numbers = [NUMBER.findall(file.name) for file in members]
     differs = [len(set(column)) > 1 for column in zip(*numbers, strict=False)]
     pieces = re.split(r"(\d+)", members[0].name)
@@ -228,33 +228,33 @@ def _glob(members: list[Path], among: Iterable[Path]) -> str:
 
 
 def _own_stem(file: Path) -> str:
-    """The name without its ending; dumps called dump.100 and dump.200 share no stem."""
+    """The name without its ending; a number (dump.100) is not an ending."""
     name = bare_name(file)
     stem, _, ending = name.rpartition(".")
     return name if ending.isdigit() else stem or name
 
 
 def _owner(file: Path) -> str | None:
-    """STEM of a file called ``STEM.contacts.csv``; None for any other name."""
+    """The STEM of a file called ``STEM.contacts.csv``; None for any other name."""
     stem, ending, _ = bare_name(file).rpartition(".contacts.")
     return stem if ending else None
 
 
 def _words(family: Family) -> list[str]:
-    """The words of the pattern, without its ending."""
+    """The words in the name of the files, without the ending."""
     name = re.sub(r"(\.[A-Za-z]\w*)+$", "", bare_name(Path(family.pattern)))
     return re.findall(r"[^\W_]+", name)
 
 
 def _kinship(one: Family, two: Family) -> tuple[int, bool]:
-    """How many words two names begin with in common, and whether they have the same ending."""
+    """The number of first words that two names share, and whether their endings are the same."""
     common = takewhile(lambda pair: pair[0] == pair[1], zip(_words(one), _words(two), strict=False))
     endings = {Path(bare_name(Path(family.pattern))).suffix for family in (one, two)}
     return len(list(common)), len(endings) == 1
 
 
 def are_tied(grains: Family, contacts: Family) -> bool:
-    """Whether step or name tell that contacts belong to grains: a number or the first word."""
+    """Whether contacts surely belong to grains: they share the first word, or a step."""
     shared = set(grains.files) & set(contacts.files) - {None}
     return _kinship(grains, contacts)[0] > 0 or (bool(shared) and not any(contacts.owners))
 
@@ -263,81 +263,88 @@ def without_tables(
     families: Sequence[Family], named: Collection[Path] = (), grains: Family | None = None
 ) -> list[Family]:
     """
-    The families; tables that are neither grains nor contacts get ``other`` as their kind.
+    The families, in which tables that do not count as dumps get the kind ``other``.
 
-    A table beside dumps in a program's own format may hold anything, such as results. It counts if
-    the user has ``named`` it, or if it is ``STEM.contacts.csv`` of some grains. Where all are
-    tables, one without names of columns counts only if no other table has names. ``grains`` are
-    those beside which the families lie.
+    A table beside dumps in a program's own format may hold anything, for instance results. It
+    counts if the user has ``named`` it, or if it is ``STEM.contacts.csv`` of a grain file. If all
+    files are tables, a table without names of columns counts only if no table has names. ``grains``
+    is the family in whose folders the other families were found.
     """
     chosen = [] if grains is None else [grains]
-    frames = [one for one in [*families, *chosen] if one.kind in ("grains", "index")]
-    dumps = [one for one in frames if not one.is_table]
-    tables = [one for one in frames if one.is_table]
-    with_names = [one for one in tables if one.reader and one.reader.recognises(one.largest)]
-    stems = set[str | None]().union(*(one.stems for one in [*dumps, *chosen]))
+    frames = [family for family in [*families, *chosen] if family.kind in ("grains", "index")]
+    dumps = [family for family in frames if not family.is_table]
+    tables = [family for family in frames if family.is_table]
+    with_names = [
+        table for table in tables if table.reader and table.reader.recognises(table.largest)
+    ]
+    stems = set[str | None]().union(*(family.stems for family in [*dumps, *chosen]))
 
-    def counts(one: Family) -> bool:
-        if not one.is_table or set(one.files.values()) & set(named):
+    def counts(family: Family) -> bool:
+        if not family.is_table or set(family.files.values()) & set(named):
             return True
         if dumps:
-            return bool(one.owners & stems)
-        return one.kind != "grains" or one in with_names or not with_names
+            return bool(family.owners & stems)
+        return family.kind != "grains" or family in with_names or not with_names
 
-    return [one if counts(one) else replace(one, kind="other") for one in families]
+    return [family if counts(family) else replace(family, kind="other") for family in families]
 
 
 def contacts_beside(
     grains: Family, groups: Iterable[Numbered], options: ReadOptions
 ) -> tuple[list[Family], list[Family]]:
     """
-    The families that lie beside single grain files with their numbers, and those of their contacts.
+    The families in the folders of single grain files, and which of them are their contacts.
 
-    ``STEM.contacts.csv`` belongs to STEM. Another contact file belongs to the grains of its number
-    whose names begin with the most words in common with its name; of those with as many, to the one
-    with the same ending. Of several contact files, those with the most common words are read. A
-    note tells which are, or may be meant.
+    ``STEM.contacts.csv`` belongs to STEM. Any other contact file belongs to the grain files of its
+    number whose names share the most first words with its name; between equals the same ending
+    decides. Of several contact files, those that share the most words are read. A note names the
+    contact files that are read, or that may belong to the grains.
     """
     if grains.kind == "index":
         return [], []
     families = without_tables(_families_beside(grains, groups, options), (), grains)
-    frames = [one for one in families if one.kind in ("grains", grains.kind)]
-    rivals = [one for one in frames if _words(one) != _words(grains)]
-    candidates = [one for one in families if one.kind == "contacts" and one.clash is None]
+    frames = [family for family in families if family.kind in ("grains", grains.kind)]
+    rivals = [family for family in frames if _words(family) != _words(grains)]
+    candidates = [
+        family for family in families if family.kind == "contacts" and family.clash is None
+    ]
 
     def nearest_rival(contacts: Family) -> tuple[int, bool]:
-        return max((_kinship(one, contacts) for one in rivals), default=(-1, False))
+        return max((_kinship(rival, contacts) for rival in rivals), default=(-1, False))
 
-    own = [one for one in candidates if one.owners <= grains.stems]
+    own = [family for family in candidates if family.owners <= grains.stems]
     if not own:
-        free = [one for one in candidates if one.owners == {None}]
-        near = [one for one in free if _kinship(grains, one) > nearest_rival(one)]
-        most = max((_kinship(grains, one)[0] for one in near), default=0)
-        own = [one for one in near if _kinship(grains, one)[0] == most]
+        free = [family for family in candidates if family.owners == {None}]
+        near = [family for family in free if _kinship(grains, family) > nearest_rival(family)]
+        most = max((_kinship(grains, family)[0] for family in near), default=0)
+        own = [family for family in near if _kinship(grains, family)[0] == most]
     doubtful = [
-        Path(one.pattern).name for one in candidates if _kinship(grains, one) >= nearest_rival(one)
+        Path(family.pattern).name
+        for family in candidates
+        if _kinship(grains, family) >= nearest_rival(family)
     ]
     if own:
-        note(f"contacts are read from {', '.join(one.pattern for one in own)}, beside the grains")
+        patterns = ", ".join(family.pattern for family in own)
+        note(f"contacts are read from {patterns}, beside the grains")
     elif doubtful:
-        told = f"neither step nor name tells that they belong to {grains.pattern}"
-        note(f"skipped {some(doubtful)}: contacts, but {told}: if they do, name them by `contacts`")
+        doubt = f"neither step nor name shows that these contacts belong to {grains.pattern}"
+        note(f"skipped {some(doubtful)}: {doubt}; if they do, name the files with `contacts`")
     return families, own
 
 
 def _families_beside(
     grains: Family, groups: Iterable[Numbered], options: ReadOptions
 ) -> list[Family]:
-    """Other files in the folders of grain files: of the same numbers, or named as theirs."""
+    """Families of other files in the folders of grain files, with the same numbers or stems."""
     files = set(grains.files.values())
     others = [group for group in groups if files.isdisjoint(file for _, file in group)]
     around = {*files, *(file for group in others for _, file in group)}
-    own = {(file.parent, step) for step, file in grains.files.items()}
+    moments = {(file.parent, step) for step, file in grains.files.items()}
     steps = {_own_stem(file): step for step, file in grains.files.items()}
-    found = []
+    families = []
     for group in others:
         same = [(steps[stem], file) for _, file in group if (stem := _owner(file) or "") in steps]
-        same = same or [(step, file) for step, file in group if (file.parent, step) in own]
+        same = same or [(step, file) for step, file in group if (file.parent, step) in moments]
         if same:
-            found.append(_family_of(same, around, options, len(group) > 1))
-    return found
+            families.append(_family_of(same, around, options, len(group) > 1))
+    return families

@@ -1,9 +1,9 @@
 """
-A worker process for libraries that were seen to crash, to hang or to take all memory.
+A worker process for libraries that crash, hang or take all memory on damaged files.
 
-VTK ends the whole process when a header promises 10^12 points, HDF5 may hang on a damaged file. One
-worker reads all such files. It is started when it is first needed, and again after each file that
-ended it. Its memory and its time for a file are limited.
+VTK ends the whole process when a header promises 10^12 points, and HDF5 may hang on a damaged file.
+One worker process reads the files of these libraries. It is started when it is first needed, and
+again after a file that ended it. Its memory and its time for each file are limited.
 """
 
 from __future__ import annotations
@@ -25,27 +25,27 @@ from scanfab.base.files import free_memory
 from scanfab.io.files import check_memory, plain
 
 Answer = TypeVar("Answer")
-# seconds for a file, and bytes that are read in one more
+# a file may take this many seconds, and one more second for each PER_SECOND bytes
 SECONDS, PER_SECOND = 8.0, 10e6
-# bytes of memory that any file may take, and how many times its size a large one may take
+# a file may take this many bytes of memory, and GROWTH bytes more for each of its bytes
 MEMORY, GROWTH = 512e6, 100
 _workers: dict[int, tuple[threading.Lock, list[Any]]] = {}
-"""The lock of each process, and its worker if that waits; a forked process has its own."""
+"""By process id (a forked process has its own): the lock, and the worker if it is idle."""
 
 
 def fenced(function: Callable[..., Answer], path: Path, *more: Any) -> Answer:
     """
-    Call a function with a file in the worker process.
+    Call a function with a file in the worker process, and return its answer.
 
     Parameters
     ----------
     function : callable
-        Of a module, so that the worker can import it. It is called with the path of the
-        decompressed file as a str and with `more`. What it raises becomes a ReadError.
+        A function of a module, so that the worker can import it. It is called with the path of the
+        decompressed file as a str and with `more`. Any error it raises becomes a ReadError.
     path : Path
         The file.
     *more
-        Further arguments, which must be picklable, as the answer must.
+        Further arguments. They and the answer must be picklable.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def fenced(function: Callable[..., Answer], path: Path, *more: Any) -> Answer:
         except (OSError, EOFError, pickle.UnpicklingError):
             is_sound, answer = False, "its library crashed, or took too much time or memory"
         finally:
-            # it ended; or we were interrupted, and its next answer would belong to this question
+            # the worker ended; or we were interrupted, and its answer to this call would come later
             if not idle:
                 with suppress(OSError), worker:
                     worker.kill()
@@ -77,8 +77,8 @@ def fenced(function: Callable[..., Answer], path: Path, *more: Any) -> Answer:
 
 
 def _start() -> Any:
-    """A worker that imports what we import, on one thread, and that Ctrl-C does not reach."""
-    places = os.pathsep.join(os.path.abspath(one) for one in sys.path if one)
+    """Start a worker with our import path and one thread; Ctrl-C does not reach it."""
+    places = os.pathsep.join(os.path.abspath(place) for place in sys.path if place)
     more = {"PYTHONPATH": places, "OPENBLAS_NUM_THREADS": "1", "VTK_SMP_MAX_THREADS": "1"}
     words = [sys.executable, "-P", "-m", "scanfab.io.fence"]
     pipe, none = subprocess.PIPE, subprocess.DEVNULL
@@ -90,30 +90,30 @@ def _start() -> Any:
 
 
 def _limit_memory(count: float) -> None:
-    """Limit how many more bytes the worker may take, where the system can limit them."""
+    """Limit how many more bytes the worker may take, if the system supports it."""
     with suppress(ImportError, ValueError, OSError):
         import resource
 
-        # libraries and earlier files may keep memory, which is not of this file
+        # memory that libraries and earlier files still hold does not count against this file
         held = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
         hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
         resource.setrlimit(resource.RLIMIT_DATA, (held + int(count), hard))
 
 
 def _serve() -> None:
-    """Answer until there are no more questions; whatever libraries print goes nowhere."""
+    """Serve calls until the parent process ends; the output of libraries is discarded."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-    # the questions end with the process that asks them
+    # end of file: the parent process has ended
     with suppress(EOFError):
         while True:
             function, arguments, memory, seconds = pickle.load(sys.stdin.buffer)
             _limit_memory(memory)
-            # ends the worker from a thread of its own, even while a library hangs
+            # a watchdog thread ends the worker even if a library hangs
             faulthandler.dump_traceback_later(seconds, exit=True)
             try:
                 answer: tuple[bool, Any] = True, function(*arguments)
-            # libraries raise whatever they meet, and exit for what they do not know
+            # libraries raise errors of any type, and some call exit()
             except (Exception, SystemExit) as error:
                 answer = False, (str(error).splitlines() or [type(error).__name__])[0]
             faulthandler.cancel_dump_traceback_later()

@@ -1,4 +1,4 @@
-"""One file: opened, decompressed, what it may take of memory, and whether it still grows."""
+"""Open and decompress one file, check its size against the memory, and note if it still grows."""
 
 from __future__ import annotations
 
@@ -23,32 +23,32 @@ from scanfab.base.errors import ReadError, warn
 from scanfab.base.files import check_file, free_memory
 
 COMPRESSED_SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".lz4")
-# in the standard library since Python 3.14
+# zstd is in the standard library since Python 3.14
 ZSTD = "compression.zstd" if sys.version_info >= (3, 14) else "backports.zstd"
 DECOMPRESSORS = {b"\x1f\x8b": "gzip", b"BZh": "bz2", b"\xfd7zXZ\x00": "lzma"}
-# zstd, and a frame to skip with which pzstd begins
+# zstd, and the skippable frame with which files of pzstd begin
 DECOMPRESSORS |= {b"\x28\xb5\x2f\xfd": ZSTD, b"\x50\x2a\x4d\x18": ZSTD}
 DECOMPRESSORS |= {b"\x04\x22\x4d\x18": "lz4.frame"}
-"""The module that opens a file, by the first bytes of the file."""
+"""First bytes of a compressed file, and the module that opens it."""
 MAGIC_BYTES = max(map(len, DECOMPRESSORS))
-# how many times its compressed size a file may grow to; up to ANYWAY bytes, any file may
+# how many times its compressed size a file may grow to; ANYWAY bytes are always allowed
 MOST_TIMES = 1000.0
 ANYWAY = 64 << 20
-# decompressed copies that are kept although nobody is reading them
+# number of decompressed copies that are kept for later reads
 KEPT = 16
-# bytes that are copied at a time
+# bytes that are copied in one piece
 PART = 4 << 20
-# folders of decompressed copies are named so
+# names of the folders of decompressed copies begin with this
 PREFIX = "scanfab-"
 Stamp = tuple[str, int, int, int]
-"""Tells a file from other files, and from itself after it was changed."""
+"""Identifies a file in its present state: path, inode, size and time of change."""
 _grows: ContextVar[bool] = ContextVar("grows", default=False)
 _times: ContextVar[float] = ContextVar("times", default=MOST_TIMES)
 Value = TypeVar("Value")
 
 
 class _Copy(type(Path())):  # type: ignore[misc]
-    """The path of a temporary copy, which is deleted when nobody holds its path any more."""
+    """The path of a temporary copy, which is deleted with the last reference to the path."""
 
 
 def bare_name(path: Path) -> str:
@@ -57,7 +57,7 @@ def bare_name(path: Path) -> str:
 
 
 def stamp_of(path: Path) -> Stamp:
-    """Place, number, size and time of change; a relative path may come to mean another file."""
+    """The stamp of a file; the path is absolute, as the current folder may change."""
     status = path.stat()
     return os.path.abspath(path), status.st_ino, status.st_size, status.st_mtime_ns
 
@@ -70,10 +70,10 @@ def first_bytes(path: Path, count: int = 4096) -> bytes:
 
 def plain(path: Path) -> Path:
     """
-    The file itself, or a decompressed temporary copy that keeps its bare name.
+    The file itself, or a decompressed temporary copy with its bare name.
 
-    The copy exists as long as somebody holds this path. The last few copies stay longer, so that a
-    file is decompressed once for all questions to its reader.
+    The copy exists as long as something refers to the returned path. The last few copies stay
+    longer, so that a reader that opens its file several times decompresses it once.
     """
     if _decompressor(_head(path, MAGIC_BYTES)) is None:
         return path
@@ -82,27 +82,27 @@ def plain(path: Path) -> Path:
 
 @lru_cache(KEPT)
 def _copy_of(path: Path, stamp: Stamp, process: int) -> Path:
-    """A copy of a file as it is now; a forked process makes its own."""
+    """A decompressed copy of a file in the state of its stamp; a forked process makes its own."""
     copy: Path = _Copy(temporary_copy(pieces(path), bare_name(path)))
     finalize(copy, _remove, os.path.dirname(copy), process)
     return copy
 
 
 def _remove(folder: str, process: int) -> None:
-    """Delete the folder of a copy, unless this is a forked process: the parent still needs it."""
+    """Delete the folder of a copy, but not from a forked process: the parent still needs it."""
     if os.getpid() == process:
         shutil.rmtree(folder, ignore_errors=True)
 
 
 def pieces(path: Path, size: int = PART) -> Iterator[bytes]:
-    """The decompressed content of a file, so many bytes at a time; raises nothing but ReadError."""
+    """The decompressed content of a file, ``size`` bytes at a time; raises only ReadError."""
     module = _decompressor(_head(path, MAGIC_BYTES))
     zstd_error, unpacked = getattr(module, "ZstdError", OSError), 0
     try:
         with open(path, "rb") as packed, packed if module is None else module.open(packed) as file:
             while piece := file.read(size):
                 unpacked += len(piece)
-                # checked while reading, so that a bomb is found long before its end
+                # checked while reading, so that a decompression bomb is found early
                 check_times(path, packed.tell(), unpacked)
                 yield piece
     except (OSError, EOFError, RuntimeError, zlib.error, lzma.LZMAError, zstd_error) as error:
@@ -120,43 +120,43 @@ def _set(variable: ContextVar[Value], value: Value) -> Iterator[None]:
 
 
 def unpacking_up_to(times: float | None) -> AbstractContextManager[None]:
-    """Inside the block, let files grow to so many times their size; None changes nothing."""
+    """Inside the block, files may decompress to this many times their size; None: no change."""
     return _set(_times, times or _times.get())
 
 
 def check_times(path: Path, packed: int, unpacked: float) -> None:
-    """ReadError if a file would unpack to far more than one so small can hold."""
+    """ReadError if a file decompresses to far more bytes than its size allows."""
     times = _times.get()
     if unpacked > max(ANYWAY, times * packed):
-        told = f"{packed:,} bytes of it unpack to more than {times:g} times as many"
-        raise ReadError(f"{path}: {told}: if it is a dump, allow more with `max_unpacked`")
+        problem = f"{packed:,} bytes of it decompress to more than {times:g} times their size"
+        raise ReadError(f"{path}: {problem}: if it is a dump, allow more with `max_unpacked`")
 
 
 def check_memory(path: Path, needed: float) -> None:
-    """ReadError if there are not so many bytes for what a file holds."""
+    """ReadError if there is not enough free memory for the content of a file."""
     free = free_memory()
     if needed > free:
-        sizes = f"about {needed / 1e9:.1f} GB of memory, and {free / 1e9:.1f} GB are free"
-        raise ReadError(f"{path}: to read it takes {sizes}")
+        sizes = f"about {needed / 1e9:.1f} GB of memory, but only {free / 1e9:.1f} GB are free"
+        raise ReadError(f"{path}: reading it takes {sizes}")
 
 
 def file_inside(index: Path, name: str) -> Path:
     """
-    The file that another one names, which must lie in its folder or below.
+    The path of a file that an index file names; it must be in the folder of the index or below.
 
     Raises
     ------
     ReadError
-        If it lies elsewhere, or is not there: whoever hands on a list of files must not be able to
-        make others read what they like.
+        If the file is elsewhere or does not exist. An index from a stranger must not make scanfab
+        read arbitrary files.
     """
     folder = os.path.abspath(index.parent)
     file = os.path.normpath(os.path.join(folder, name.replace("\\", "/")))
     if "\0" in name or os.path.commonpath([folder, file]) != folder or file == folder:
-        told = "which does not lie in its folder: move the files together"
-        raise ReadError(f"{index}: names {name!r}, {told}")
+        problem = "which is outside the folder of this file: move the files together"
+        raise ReadError(f"{index}: names {name!r}, {problem}")
     path = index.parent / os.path.relpath(file, folder)
-    # a name may be too long for any file
+    # isfile also copes with a name that is too long
     if not os.path.isfile(path):
         raise ReadError(f"{index}: names {name[:200]!r}, but there is no such file")
     return path
@@ -164,12 +164,12 @@ def file_inside(index: Path, name: str) -> Path:
 
 def temporary_copy(content: Iterable[bytes], name: str) -> Path:
     """
-    Some content as a file that is deleted at the end of the process.
+    Write content to a file that is deleted at the end of the process.
 
     Raises
     ------
     ReadError
-        If it cannot be written, for instance to a full disk.
+        If the file cannot be written, for instance to a full disk.
     """
     folder = ""
     try:
@@ -181,22 +181,22 @@ def temporary_copy(content: Iterable[bytes], name: str) -> Path:
     except BaseException as error:
         shutil.rmtree(folder, ignore_errors=True)
         if isinstance(error, OSError):
-            told = f"{_reason(error)}: make room there, or name another folder by TMPDIR"
+            advice = f"{_reason(error)}: make room there, or name another folder by TMPDIR"
             place = tempfile.tempdir or "any folder"
-            raise ReadError(f"{name}: cannot be written to {place}: {told}") from None
+            raise ReadError(f"{name}: cannot be written to {place}: {advice}") from None
         raise
 
 
 @cache
 def _folder(process: int) -> str:
-    """The folder for the copies of a process, which goes at its end."""
+    """The folder for the copies of a process; it is removed at the end of the process."""
     folder = tempfile.mkdtemp(prefix=PREFIX)
     at_end(partial(_remove_at_end, folder))
     return folder
 
 
 def _remove_at_end(folder: str) -> None:
-    # renamed first, so that no thread that is still reading can add a copy
+    # renamed first, so that a thread that is still reading cannot add a copy
     last = f"{folder}-removed"
     with suppress(OSError):
         os.rename(folder, last)
@@ -205,7 +205,7 @@ def _remove_at_end(folder: str) -> None:
 
 def without_temporary(text: str) -> str:
     """
-    A text in which temporary copies go by the names of what they are copies of.
+    A text with the original names in place of the paths of temporary copies.
 
     Examples
     --------
@@ -213,19 +213,19 @@ def without_temporary(text: str) -> str:
     >>> without_temporary(f"{temporary_copy([], 'standard input')}: no grains")
     'standard input: no grains'
     """
-    # the folder is known as soon as there is a copy
+    # tempfile.tempdir is set once there is a copy
     folder = re.escape(os.path.join(tempfile.tempdir or "", PREFIX))
     return re.sub(rf"{folder}\w+[/\\]tmp\w+[/\\]", "", text)
 
 
 def _decompressor(head: bytes) -> Any:
-    """The module that opens a file that begins with these bytes; None if it is not compressed."""
-    name = next((one for key, one in DECOMPRESSORS.items() if head.startswith(key)), None)
+    """The module that opens a file with these first bytes; None if it is not compressed."""
+    name = next((module for key, module in DECOMPRESSORS.items() if head.startswith(key)), None)
     return name and import_module(name)
 
 
 def _head(path: Path, count: int) -> bytes:
-    """The first bytes as they stand there."""
+    """The first bytes of the file, not decompressed."""
     check_file(path)
     try:
         with open(path, "rb") as stream:
@@ -241,12 +241,12 @@ def _reason(error: Exception) -> str:
 
 
 def growing() -> AbstractContextManager[None]:
-    """In the block files may still be being written: what lacks at their end is no warning."""
+    """Inside the block, files may still be growing: an incomplete end draws no warning."""
     return _set(_grows, True)
 
 
 def grows() -> bool:
-    """Whether files may still be being written."""
+    """Whether files may still be growing."""
     return _grows.get()
 
 

@@ -1,4 +1,4 @@
-"""follow_series(): a series that grows while it is read, each frame as soon as it is whole."""
+"""follow_series(): read a series while a simulation writes it, each frame once it is complete."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from scanfab.io.options import take_reading
 from scanfab.io.series import ENDLESS, Series
 from scanfab.io.sources import READING, as_text, read_series
 
-# seconds between two looks at the files, or this many times what the last look took
+# seconds between two looks at the files, or PAUSES times the duration of the last look
 PAUSE, PAUSES = 0.2, 3.0
-# a file that did not change for so many seconds is whole, if it can be read to its end
+# a file that has not changed for this many seconds is complete, if it can be read to its end
 QUIET = 1.0
 
 
@@ -33,31 +33,32 @@ def follow_series(
     """
     Open a series that a simulation is still writing.
 
-    Going through it waits for its frames: each comes once its files are whole, that is, they can be
-    read to their end and have not changed for a second, or a later frame is there. A file that is
-    still broken when a later frame is whole comes as it is, for whoever reads it to stop or to pass
-    it over. :func:`scanfab.compute` and :func:`scanfab.compute_file` take it as any other series,
-    and make the rows of a run over the finished one.
+    Iterating over the series waits for its frames. A frame comes when its files are complete: they
+    can be read to their end, and either have not changed for a second or a later frame exists. If a
+    later frame is complete and a file is still broken, its frame comes as it is, and reading it
+    raises the error. :func:`scanfab.compute` and :func:`scanfab.compute_file` take the series as
+    any other, and give the same rows as for the finished series.
 
     Parameters
     ----------
     source : path
         A folder, which may be empty, or a file that grows.
     seconds : float, optional
-        It ends so long after the last new frame, or the start; otherwise when ``end()`` is called.
+        The series ends this many seconds after the last new frame, or after the start; by default
+        it ends when ``end()`` is called.
     **options
         See :func:`scanfab.read_series`.
 
     Returns
     -------
     FollowedSeries
-        Its slices are those of the frames that are there already.
+        Slices of it hold the frames that exist already.
 
     Raises
     ------
     ReadError
-        If there is no such folder or file; while frames are waited for, if it vanishes, or if files
-        come that belong before frames that were taken.
+        If there is no such folder or file; later, if it vanishes, or if files appear that belong
+        before frames that were already returned.
     SettingsError
         If an option has a value that cannot be used.
 
@@ -77,29 +78,29 @@ def follow_series(
 
 
 State = tuple[Path, int, int, list[Path]]
-"""Where a frame lies (file, first byte, last byte), and its contact files: once a frame was taken,
-this may not change any more."""
+"""The place of a frame (file, first byte, last byte) and its contact files; it must not change
+after the frame was taken."""
 
 
 class FollowedSeries(Series):
-    """A series whose frames are waited for; its files are those of the frames taken so far."""
+    """A series that waits for its frames; its files are those of the frames taken so far."""
 
     def __init__(self, source: str, seconds: float | None, reading: dict[str, Any]) -> None:
         nothing = Family(source, {}, None, "grains")
         super().__init__(as_text(source), nothing, sources=(source,), reading=reading)
         self.idle: Callable[[], object] = lambda: None
-        """Is called each time that there is nothing to do but to wait."""
+        """Called each time there is no new frame, before waiting."""
         self._seconds = math.inf if seconds is None else seconds
         self._is_over = False
         self._taken: list[tuple[Frame, State]] = []
         self._since = time.monotonic()
         """When the last frame was taken."""
         self._seen: dict[Path, tuple[Stamp, float]] = {}
-        """How each file is, and since when."""
+        """The last stamp of each file, and the time since when it has it."""
         self._looked: list[Any] = []
-        """The files as they were when the series was opened."""
+        """The files and their stamps when the series was last opened."""
         self._told: list[warnings.WarningMessage] = []
-        """What was told when the files were opened, for when the first frame is taken."""
+        """Warnings from opening the files; they are shown once the first frame is taken."""
         self._problem: Exception | None = None
         """Why the source cannot be opened, or the next frame cannot be read."""
 
@@ -110,7 +111,7 @@ class FollowedSeries(Series):
         return (frame for frame in self.as_they_come() if frame is not None)
 
     def as_they_come(self) -> Iterator[Frame | None]:
-        """The frames; None, after a moment, where the next one is not there yet."""
+        """Iterate over the frames; gives None each time the next frame is not complete yet."""
         number = 0
         while True:
             begun = time.monotonic()
@@ -129,12 +130,12 @@ class FollowedSeries(Series):
                 time.sleep(max(PAUSE, PAUSES * (time.monotonic() - begun)))
 
     def end(self) -> None:
-        """Take no more frames."""
+        """End the series: no more frames are taken."""
         self._is_over = True
 
     @property
     def as_it_is(self) -> Series:
-        """The series of what is there now, which is not waited for."""
+        """The series of the files that exist now; it does not wait."""
         self._look()
         return self.whole
 
@@ -144,11 +145,11 @@ class FollowedSeries(Series):
         return str(self._problem or f"{self.name}: no whole frame has come")
 
     def files(self, number: int = ENDLESS, known: Container[Path] = ()) -> Iterator[Path]:
-        """Those of the frames that were taken: others may be in the middle of being written."""
+        """The files of the frames that were taken; other files may be incomplete."""
         return super().files(min(number, len(self._taken) - 1), known)
 
     def _take_next(self) -> None:
-        """Take the next frame if it is whole, or broken while a later frame is whole."""
+        """Take the next frame if it, or a later frame, is complete."""
         if self._is_over and self._taken:
             return
         self._look()
@@ -157,7 +158,7 @@ class FollowedSeries(Series):
         if any(self._is_whole(frame, has_later=frame is not waiting[-1]) for frame in waiting):
             self._take(waiting[0])
         elif self._is_over or waited >= self._seconds:
-            # stop waiting, also for contact files
+            # the series ends: do not wait for contact files either
             self._seconds = 0.0
             if any(map(self._can_be_read, waiting)):
                 self._take(waiting[0])
@@ -165,29 +166,29 @@ class FollowedSeries(Series):
             self._is_over = True
             if waiting:
                 path = waiting[0].snapshot.path
-                warn(f"{path}: is left out, as it was not whole at the end: {self._problem}")
+                warn(f"{path}: left out, because it was incomplete at the end: {self._problem}")
 
     def _take(self, frame: Frame) -> None:
         self._taken.append((frame, _state(frame.series, frame)))
         self._since = time.monotonic()
 
     def _frames_of(self, series: Series) -> list[Frame]:
-        """The frames of a series that are there now, whole or not."""
+        """The frames of a series that exist now, complete or not."""
         with growing():
             return [] if series.grains.reader is None else list(series.whole)
 
     def _look(self) -> None:
-        """Open the series again if files have changed; ReadError if it cannot be gone on with."""
+        """Open the series again if files have changed; ReadError if it cannot be continued."""
         source = Path(self.sources[0])
         if not source.exists():
-            told = f"has vanished while it was followed, after {len(self._taken)} frames of it"
-            raise ReadError(f"{source}: {told}: bring it back and go on with `resume`")
+            problem = f"has vanished while it was followed, after {len(self._taken)} frames of it"
+            raise ReadError(f"{source}: {problem}: bring it back and go on with `resume`")
         names = files_in(source) if source.is_dir() else [source]
         quiet = [self._quiet(path) for path in names]
         looked = [(path, self._seen.get(path)) for path in names]
         if looked == self._looked:
             return
-        # threads that compute frames are heard, too
+        # warnings of threads that compute frames are recorded as well
         with warnings.catch_warnings(record=True) as self._told, growing():
             warnings.simplefilter("always")
             try:
@@ -205,16 +206,16 @@ class FollowedSeries(Series):
             raise ReadError(str(self._problem))
 
     def _check_taken(self, series: Series) -> None:
-        """ReadError if the frames that were taken are not the first of the series any more."""
+        """ReadError if the frames that were taken are no longer the first frames of the series."""
         frames = self._frames_of(series)[: len(self._taken)] if self._taken else []
         for (taken, old), frame in zip_longest(self._taken, frames):
             if frame is None or _state(series, frame) != old:
-                told = f"was taken as frame {taken.number}, but since then files up to it"
+                problem = f"was read as frame {taken.number}, but since then files up to it"
                 advice = "compute the finished folder without `follow`"
-                raise ReadError(f"{old[0]}: {told} have changed or come: {advice}")
+                raise ReadError(f"{old[0]}: {problem} have changed or appeared: {advice}")
 
     def _is_whole(self, frame: Frame, *, has_later: bool) -> bool:
-        """Whether all files of a frame are there, are not written any more, and can be read."""
+        """Whether all files of a frame exist, are no longer being written, and can be read."""
         series, path = frame.series, frame.snapshot.path
         contacts = _contacts(series, frame)
         beside = [] if series.grains.kind == "index" else series.beside(path)
@@ -224,8 +225,8 @@ class FollowedSeries(Series):
             return False
         if has_later or frame.number:
             return self._can_be_read(frame)
-        # while there is one frame only, nobody knows whether contact files will come, nor whether
-        # the number in its name is a step
+        # as long as there is only one frame, contact files may still come, and the number in its
+        # name may or may not be a step
         may_come = series.contacts_from in ("auto", "beside") and not series.contacts
         has_step = frame.step is not None or frame.name_step is None
         return has_step and self._can_be_read(frame, needs_contacts=may_come)
@@ -240,7 +241,7 @@ class FollowedSeries(Series):
         return packing.contacts is not None or not needs_contacts
 
     def _quiet(self, path: Path) -> float:
-        """For how many seconds a file has not changed; 0 if it is not there."""
+        """How many seconds a file has not changed; 0 if it does not exist."""
         try:
             stamp = stamp_of(path)
         except OSError:
@@ -251,18 +252,18 @@ class FollowedSeries(Series):
 
 
 def _state(series: Series, frame: Frame) -> State:
-    """How a frame is now."""
+    """The present state of a frame."""
     path, stop = frame.snapshot.path, frame.snapshot.stop
     stop = path.stat().st_size if stop is None and path.exists() else stop or 0
     return path, frame.snapshot.start, stop, [*filter(None, _contacts(series, frame))]
 
 
 def _contacts(series: Series, frame: Frame) -> list[Path | None]:
-    """The contact file of a frame in each family of contacts, if it is there and can be read."""
-    found: list[Path | None] = []
+    """The contact file of a frame in each contact family; None if it is missing or unreadable."""
+    paths: list[Path | None] = []
     for family in series.contacts:
         snapshot = None
         with suppress(ReadError), growing():
             snapshot = series.contacts_of(frame, family)
-        found.append(None if snapshot is None else snapshot.path)
-    return found
+        paths.append(None if snapshot is None else snapshot.path)
+    return paths

@@ -1,4 +1,4 @@
-"""One frame of a series, not read yet: its grains, its contacts, and how they become a packing."""
+"""One frame of a series: it finds grains and contacts in the files and makes a packing of them."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Frame:
     """
-    One frame of a series, not read yet.
+    One frame of a series; its files are read by :meth:`read`.
 
     Attributes
     ----------
     series : Series
-        The series, or the part of it, that the frame is of.
+        The series, or part of a series, to which the frame belongs.
     snapshot : Snapshot
-        Where the frame lies in its file.
+        The place of the frame in its file.
     name_step : int or None
         The step in the file's name.
     number : int
-        In the series, from 0.
+        The number of the frame in the series, from 0.
     told : FrameData or None
-        What the frame file beside the dump says, as :func:`scanfab.convert` leaves one.
+        The content of its frame file, a companion file that :func:`scanfab.convert` writes.
     problem : ReadError or None
-        Why the file cannot even be searched for its frames.
+        Why the file cannot be searched for its frames.
 
     Examples
     --------
@@ -65,24 +65,24 @@ class Frame:
 
     def alone(self) -> Frame:
         """
-        The frame for another process, which need not know the other files nor our folder.
+        Make a copy for another process, which does not need the files of other frames.
 
         Returns
         -------
         Frame
-            With absolute paths.
+            All its paths are absolute, as the other process may have another folder.
         """
         series, snapshot = self.series, self.snapshot
         known = replace(series.known, snapshots={})
-        # a series whose space is not known yet looks for it in the frames before
+        # while the space is not known, it is looked for in the frames before, so keep their files
         is_known = series.dim == 3 or known.space is not None
         steps = {None, self.name_step, self.step} | (set() if is_known else {*series.grains.files})
         families = []
-        for one in (series.grains, *series.contacts):
-            # plus one more: if a family has one file only, that may belong to any step
-            wanted = {*steps, next((step for step in one.files if step not in steps), None)}
-            files = {step: file.absolute() for step, file in one.files.items() if step in wanted}
-            families.append(replace(one, files=files))
+        for family in (series.grains, *series.contacts):
+            # keep a second file: the only file of a family would count for any step
+            wanted = {*steps, next((step for step in family.files if step not in steps), None)}
+            files = {step: file.absolute() for step, file in family.files.items() if step in wanted}
+            families.append(replace(family, files=files))
         parts = tuple(part.absolute() for part in snapshot.parts)
         return replace(
             self,
@@ -98,19 +98,20 @@ class Frame:
 
     def read(self) -> Packing:
         """
-        The frame's packing.
+        Read the frame's packing.
 
         Returns
         -------
         Packing
-            Its contacts are None if no file lists them: :func:`scanfab.find_contacts` finds them.
+            Its contacts are None if no file lists them; then :func:`scanfab.find_contacts` finds
+            them by geometry.
 
         Raises
         ------
         ReadError
-            If a file is not as it should be.
+            If a file is damaged or incomplete.
         PackingError
-            If its content is no packing.
+            If the data cannot be a packing, for instance because a radius is negative.
         """
         try:
             with unpacking_up_to(self.series.options.max_unpacked):
@@ -120,7 +121,7 @@ class Frame:
 
     def read_grains(self) -> GrainTable:
         """
-        What the file of grains itself says of them.
+        Read the grain file alone, without companion files and contact files.
 
         Returns
         -------
@@ -129,7 +130,7 @@ class Frame:
         Raises
         ------
         ReadError
-            If the file is not as it should be.
+            If the file is damaged or incomplete.
         """
         if self.problem is not None:
             raise self.problem
@@ -154,9 +155,9 @@ class Frame:
         if not lists and series.contacts_from == "grains":
             raise ReadError(f'{path}: there is no contact file, which `contacts="file"` needs')
         if not lists and series.contacts_from == "path":
-            told = "lists contacts with walls only: those between grains are found by geometry"
-            warn(f"{named}: {told}, unless `contacts` names their file")
-        # a contacts file that `convert` wrote lists no walls: the grain file counts them
+            advice = "lists contacts with walls only: those between grains are found by geometry"
+            warn(f"{named}: {advice}, unless `contacts` names their file")
+        # a contacts file of `convert` lists no walls; the grain file counts contacts with walls
         if grains.wall_contacts is not None and (
             takes_own or any(companion_kind(file) == "contacts" for file in files)
         ):
@@ -169,7 +170,7 @@ class Frame:
             columns=grains.columns,
             bodies=body_numbers(path, grains, series.options.bodies),
             contacts=lists[0] if lists else None,
-            wall_contacts=sum((one.wall_contacts for one in parts), none) if parts else None,
+            wall_contacts=sum((part.wall_contacts for part in parts), none) if parts else None,
             wall_forces=_wall_forces(parts),
             cell=grains.cell,
             step=self.step,
@@ -178,12 +179,12 @@ class Frame:
         )
 
     def _contacts(self, grains: GrainTable) -> tuple[list[Path], list[JoinedContacts]]:
-        """The contact files of the frame, and their contacts joined to its grains."""
+        """The contact files of the frame, and the contacts in each, joined to the grains."""
         series, options = self.series, self._options()
         files: list[Path] = []
         parts: list[JoinedContacts] = []
         if series.contacts:
-            # contacts are joined by lengths and ids, so errors in these are reported first
+            # joining contacts needs sound lengths and ids, so their errors are reported first
             id = np.arange(len(grains.radius)) if grains.id is None else grains.id
             check_lengths(grains.position, grains.radius, id)
         for family in series.contacts:
@@ -198,7 +199,7 @@ class Frame:
                 is_theirs = series.contacts_from != "beside" or are_tied(series.grains, family)
                 is_sure = isinstance(error, OtherGrainsError) and is_theirs
                 if not isinstance(error, NotContactsError) or options.contact_columns or is_sure:
-                    advice = 'lies beside the grains; `contacts="geometric"` leaves it alone'
+                    advice = 'was found beside the grains; `contacts="geometric"` ignores it'
                     raise ReadError(f"{error} (this file {advice})") from None
                 note(f"skipped {error}")
         if series.contacts and not files:
@@ -214,7 +215,7 @@ class Frame:
 
     @property
     def step(self) -> int | None:
-        """The step in the dump, else in the file's name, unless the dump says that it has none."""
+        """The step in the dump, else in the file's name; None if the dump says it has no step."""
         if self.snapshot.step is not None:
             return self.snapshot.step
         is_named = self.series.grains.has_steps and not self.snapshot.stepless
@@ -222,38 +223,38 @@ class Frame:
 
     @property
     def carries(self) -> Carries:
-        """What the dump, its frame file or the user say of a cell."""
+        """How much of a cell the dump, its frame file or the user give."""
         ask = getattr(self.reader, "carries", None)
         options = self.series.options
-        told = self.told or self.series.cells or options.cell or options.periodic is not None
+        is_given = self.told or self.series.cells or options.cell or options.periodic is not None
         with unpacking_up_to(options.max_unpacked):
-            return "cell" if told or ask is None else ask(self.snapshot.path)
+            return "cell" if is_given or ask is None else ask(self.snapshot.path)
 
     @property
     def named(self) -> dict[str, bool]:
-        """Whether the user names a cell (or what is periodic), and which spheres are one body."""
+        """Whether the user names a cell (or periodic directions), and a column of bodies."""
         options = self.series.options
         cell = bool(self.series.cells or options.cell or options.periodic)
         return {"cell_is_named": cell, "bodies_are_named": options.bodies is not None}
 
     def _options(self) -> ReadOptions:
-        """How to read this frame, with its cell if a file names those of the frames."""
+        """The options for this frame, with its own cell if a file lists a cell for each frame."""
         options, cells = self.series.options, self.series.cells
         if self.told is not None:
             options = replace(options, beside=self.told.cell or "none")
         if cells is None:
             return options
-        found = cells.at(self.number, self.name_step if self.step is None else self.step)
-        if found is None:
+        vectors = cells.at(self.number, self.name_step if self.step is None else self.step)
+        if vectors is None:
             frame = f"frame {self.number}, step {self.step}, {self.snapshot.path}"
             raise ReadError(f"{cells.path}: has no row with the cell of {frame}")
-        return replace(options, cell=found)
+        return replace(options, cell=vectors)
 
 
 def _wall_forces(walls: list[JoinedContacts]) -> ListedWallForces | None:
-    """The forces of all contacts with walls; None if a file lists such contacts without forces."""
-    parts = [one.wall_forces for one in walls if one.wall_contacts.any()]
-    known = [part for part in parts if part is not None]
-    if not known or len(known) < len(parts):
+    """The forces of all contacts with walls; None if a file lists wall contacts without forces."""
+    parts = [part.wall_forces for part in walls if part.wall_contacts.any()]
+    forces = [part for part in parts if part is not None]
+    if not forces or len(forces) < len(parts):
         return None
-    return ListedWallForces(*(np.concatenate(values) for values in zip(*known, strict=True)))
+    return ListedWallForces(*(np.concatenate(values) for values in zip(*forces, strict=True)))

@@ -1,4 +1,4 @@
-"""A table of text of any program: how it is written, by its first rows, and its columns."""
+"""Tables of text from any program: find the layout from the first rows, and read the columns."""
 
 from __future__ import annotations
 
@@ -15,56 +15,55 @@ from scanfab.io.files import first_bytes
 from scanfab.io.reader import Snapshot
 from scanfab.io.text import CutError, Layout, is_number, read_rows, text_of, words_of
 
-# bytes of a file that are looked at, and the rows among them
+# how many bytes and rows at the top of a file are examined
 HEAD, SAMPLE = 1 << 18, 20
 COMMENTS = ("#", "%", "//", "!")
 CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f]")
-# a word with a comma, and one whose comma may stand before thousands: no decimal number has two
-# commas, or begins with 0
+# a word with a comma, and a word whose commas may separate thousands: 1,234 may, 0,234 may not
 WITH_COMMA = re.compile(rb"[-+0-9.eE]*,[-+0-9.,eE]*")
 THOUSANDS = re.compile(rb"[-+]?[1-9][0-9]{0,2}(,[0-9]{3})+")
-# separators (a blank stands for any run of blanks and tabs) without and with a decimal comma
+# separators (a blank means any run of blanks and tabs), and whether the decimal sign is a comma
 WAYS = [("\t", False), ("\t", True), (";", False), (";", True), (",", False), (" ", False)]
 WAYS += [(" ", True)]
 
 
 class TextTable(NamedTuple):
-    """A table, as its first rows show it."""
+    """The layout of a table, found from its first rows."""
 
     layout: Layout
-    """With the number of a column as its name where it has none, or that of another column."""
+    """How rows are written. A column without a name of its own gets its number as name."""
     own: Sequence[str]
-    """The names of the columns as they stand there, or their numbers."""
+    """The names of the columns as in the file, or their numbers."""
     is_named: bool
-    """Whether the table has names."""
+    """Whether the table has names of columns."""
     start: int = 0
-    """Byte of the first row in the file."""
+    """Offset of the first row in the file, in bytes."""
     rows: Sequence[Sequence[str]] = ()
     """The words of the first rows."""
 
 
 def text_table(path: Path, skip: int) -> TextTable:
     """
-    How a table of text is written.
+    Find out how a table of text is written.
 
     Parameters
     ----------
     path : Path
         A file, which may be compressed.
     skip : int
-        Lines before the table.
+        The number of lines before the table.
 
     Raises
     ------
     ReadError
-        If it is no table: no text, or its first rows differ in width.
+        If the file is not a table: it is not text, or its first rows differ in width.
     """
     head = _first_lines(path)
     try:
         lines = head.decode("utf-8-sig").split("\n")
     except UnicodeDecodeError:
         lines = head.decode("latin-1").split("\n")
-    # comments and empty lines stand above the table, and no empty line counts within the sample
+    # skip comments and empty lines above the table, and empty lines among the examined rows
     numbers = [k for k in range(skip, len(lines)) if lines[k].strip()]
     while numbers and lines[numbers[0]].lstrip().startswith(COMMENTS):
         del numbers[0]
@@ -77,7 +76,7 @@ def text_table(path: Path, skip: int) -> TextTable:
     rows = [words_of(text, separator) for text in texts]
     width, first = len(rows[0]), numbers[0]
     names: list[str] | None = None
-    # a name beside a number is no header: "P 0.3 1.2 4.1" is a row
+    # a line of names has no number: "P 0.3 1.2 4.1" is a row
     if not any(is_number(word, comma) for word in rows[0]):
         names = [word.strip() for word in words_of(texts[0].strip().rstrip(separator), separator)]
         first, rows = numbers[1] if len(numbers) > 1 else first + 1, rows[1:]
@@ -85,20 +84,20 @@ def text_table(path: Path, skip: int) -> TextTable:
             raise CutError(f"{path}: the file ends within its line of names: it is incomplete")
         width = len(rows[0]) if rows else len(names)
     elif first > skip:
-        # the line above the rows may be their names, as numpy.savetxt writes them
+        # the last comment above the rows may hold the names, as numpy.savetxt writes them
         words = re.split(r"[\s,;]+", lines[first - 1].strip().lstrip("#%!/").strip())
         names = words if len(words) == width and not any(map(is_number, words)) else None
-    # rows below names are checked when the table is read
+    # rows below a line of names are checked later, when the table is read
     for number, row in zip(numbers if names is None else (), rows, strict=False):
         if len(row) != width:
             wrong = f"expected {width} columns as above, found {len(row)}"
             raise ReadError(f"{path}, line {number + 1}: {wrong}")
     if width > 1 and len(names or ()) != width and rows and not any(row[-1] for row in rows):
-        width -= 1  # there is a separator at the end of each row
+        width -= 1  # each row ends with a separator
     own = names or [f"{place + 1}" for place in range(width)]
-    # a name that is empty, or stands before, is the number of its column
+    # a column whose name is empty or occurs before gets its number as key
     places = {name: place for place, name in reversed([(-1, ""), *enumerate(own)])}
-    keys = [one if places[one] == k else f"{k + 1}" for k, one in enumerate(own)]
+    keys = [name if places[name] == k else f"{k + 1}" for k, name in enumerate(own)]
     layout = Layout(tuple(keys), separator, first + 1, comma=comma)
     start = sum(len(line) + 1 for line in head.split(b"\n")[:first])
     return TextTable(layout, own, names is not None, start, [row[:width] for row in rows])
@@ -108,40 +107,40 @@ def read_text(
     path: Path, table: TextTable, numbers: Sequence[str], whole: Sequence[str]
 ) -> Columns:
     """
-    All columns of a table of text.
+    Read all columns of a table of text.
 
     Parameters
     ----------
     path : Path
-        Of the file.
+        The file.
     table : TextTable
-        How it is written.
+        The layout of the table.
     numbers : sequence of str
-        Columns that must hold a number in each row; others may have gaps or hold words.
+        Columns that must have a number in each row; other columns may have gaps or words.
     whole : sequence of str
-        Columns among them that hold whole numbers.
+        Those of ``numbers`` that hold whole numbers.
 
     Raises
     ------
     ReadError
-        If a row does not fit the columns, or a comma may stand before thousands.
+        If a row does not fit the columns, or commas may separate thousands.
     """
     names = table.layout.names
     if table.rows and len(names) != len(table.rows[0]):
-        told = f"expected {len(names)} columns as there are names, found {len(table.rows[0])}"
-        advice = "leave the names out by `skip`, and use `columns`"
-        raise ReadError(f"{path}, line {table.layout.line}: {told}: {advice}")
+        problem = f"expected {len(names)} columns, one for each name, found {len(table.rows[0])}"
+        advice = "skip the line of names by `skip`, and name the columns by `columns`"
+        raise ReadError(f"{path}, line {table.layout.line}: {problem}: {advice}")
     rows = text_of(Snapshot(path, start=table.start))
     first = WITH_COMMA.search(rows) if table.layout.comma else None
-    if first and all(THOUSANDS.fullmatch(one[0]) for one in WITH_COMMA.finditer(rows)):
-        doubt = "may be a decimal sign or one of thousands: write numbers with a point"
+    if first and all(THOUSANDS.fullmatch(match[0]) for match in WITH_COMMA.finditer(rows)):
+        doubt = "may be a decimal sign or separate thousands: write numbers with a point"
         raise ReadError(f"{path}: the comma in {first[0].decode()!r} {doubt}")
     optional = [name for name in names if name not in numbers]
     return read_rows(Snapshot(path), rows, table.layout._replace(whole=whole, optional=optional))
 
 
 def _first_lines(path: Path) -> bytes:
-    """The lines that are looked at, each whole; ReadError if they are no text."""
+    """The first lines of a file, none cut; ReadError if they are not text."""
     head = first_bytes(path, HEAD)
     if found := CONTROL.search(head):
         line = head.count(b"\n", 0, found.start()) + 1
@@ -152,47 +151,47 @@ def _first_lines(path: Path) -> bytes:
 
 
 def _score(lines: Sequence[str], separator: str, comma: bool) -> float:
-    """How well lines fit a separator: by the words of a row, as many in each, and the numbers."""
+    """How well lines fit a separator: do rows have as many words each, and are these numbers?"""
     rows = [words_of(line, separator) for line in lines]
     words = [word for row in rows for word in row]
     alike = sum(len(row) == len(rows[0]) > 1 for row in rows) / len(rows)
     numbers = sum(not word or is_number(word, comma) for word in words) / max(len(words), 1)
-    # if no separator splits the rows, it is a table of blanks with one column
+    # if no separator splits the rows, take blanks: the table has one column
     return alike * (1e-3 + numbers) if alike or separator == " " else -1.0
 
 
 class FrameFile:
     """
-    Numbers of each frame from a table: strains, or cells of a series that does not carry them.
+    A table with numbers for each frame: strains, or the cells of a series whose dumps have none.
 
     Parameters
     ----------
     path : Path
         A table of text with a column ``step`` or ``frame``.
     names : sequence of str
-        Columns that must be there.
+        Columns that the table must have.
     optional : sequence of str, optional
-        Columns that are 0 if none of them is there, and otherwise must all be.
+        Columns that the table has all or none of; without them their values are 0.
     positive : int, optional
-        How many of the first columns must be above 0.
+        The first so many columns of ``names`` must be above 0.
 
     Raises
     ------
     ReadError
-        If a column is missing, a value is no number, or a frame occurs twice with other numbers.
+        If a column is missing, a value is not finite, or a frame occurs twice with other numbers.
     """
 
     def __init__(
         self, path: Path, names: Sequence[str], optional: Sequence[str] = (), *, positive: int = 0
     ) -> None:
         self.path, table = path, text_table(path, 0)
-        known = table.layout.names
-        self.key = "step" if "step" in known else "frame"
-        """Whether rows go by step or by frame."""
-        wanted = [*names, *(optional if set(optional) & set(known) else ())]
-        if not {self.key, *wanted} <= set(known):
+        present = table.layout.names
+        self.key = "step" if "step" in present else "frame"
+        """``step`` or ``frame``: the column that identifies the frame of a row."""
+        wanted = [*names, *(optional if set(optional) & set(present) else ())]
+        if not {self.key, *wanted} <= set(present):
             expected = f"expected the columns step or frame, and {', '.join(wanted)}"
-            raise ReadError(f"{path}: {expected}, found {', '.join(known)}")
+            raise ReadError(f"{path}: {expected}, found {', '.join(present)}")
         columns = read_text(path, table, [self.key, *wanted], [self.key])
         blank = np.zeros(len(columns[self.key]))
         rows = np.column_stack([columns.get(name, blank) for name in (*names, *optional)])
@@ -208,6 +207,6 @@ class FrameFile:
                 raise ReadError(f"{path}, line {line}: {self.key} {number} occurs twice")
 
     def at(self, frame: int, step: int | None) -> tuple[float, ...] | None:
-        """The numbers of a frame; None if the file does not name it."""
+        """The numbers of a frame; None if the file has no row for it."""
         number = step if self.key == "step" else frame
         return None if number is None else self._rows.get(number)

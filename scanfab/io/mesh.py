@@ -1,11 +1,11 @@
 """
-One mesh from any file of VTK: points, lines between them, and the arrays of both.
+Read any file of VTK as a mesh: points, lines between them, and the arrays of both.
 
 VTK's own readers do the work, in the worker process of `fence`, because a damaged header may crash
-them. They raise no errors, but write into VTK's output window: any text there is an error. Two
-faults are not told even there. VTK fills the arrays of a legacy file that was cut off with zeros:
-so an array is appended to the file, and must be found behind all others. VTK drops the values of an
-XML array that are more than its piece counts: so they are counted before VTK reads the file.
+them. They raise no errors, but write into VTK's output window; any text there counts as an error.
+VTK does not report two faults at all. It fills the arrays of a truncated legacy file with zeros;
+therefore an extra array is appended to the content, and must be found last. And it drops surplus
+values of an XML array; therefore the values are counted before VTK reads the file.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from scanfab.io.fence import fenced
 from scanfab.io.files import check_memory, file_inside, first_bytes, plain
 from scanfab.io.hdf import is_hdf, read_hdf_file
 
-# files that hold a mesh; and files that list the pieces of one frame
+# kinds of files that hold a mesh, and of files that list the pieces of one mesh
 MESHES = {"polydata", "unstructuredgrid", "unstructured_grid", "rectilineargrid", "xdmf"}
 MESHES |= {"rectilinear_grid", "multiblockdataset", "partitioneddatasetcollection"}
 PIECES = ("PPolyData", "PUnstructuredGrid")
-# VTK's numbers for kinds of cells
+# VTK's numbers of cell types
 VERTEX, POLY_VERTEX, LINE, POLY_LINE = 1, 2, 3, 4
-# bit of vtkGhostType: the point belongs to another piece
+# bit of vtkGhostType for a point that belongs to another piece
 DUPLICATE = 1
-# VTK itself writes a NaN into keys that describe arrays, and cannot read it
+# messages without harm: VTK writes a NaN into keys that describe arrays, and cannot read it back
 HARMLESS = re.compile("InformationKey|Could not locate key")
 FORM = re.compile(
     rb"\A# vtk DataFile.*?^\s*DATASET\s+(\w+)|<VTKFile[^>]*\btype=[\"'](\w+)|<(Xdmf)\b",
@@ -42,10 +42,10 @@ FORM = re.compile(
 )
 TEXT = re.compile(rb"# vtk DataFile[^\n]*\n[^\n]*\n\s*ASCII\s", re.IGNORECASE)
 NO_POINTS = re.compile(rb"# vtk.*^POINTS\s+0\s", re.MULTILINE | re.DOTALL)
-# the sections of XML whose arrays all have a row for each point, or for each cell
+# sections of XML whose arrays have a row for each point or each cell
 COUNTED = ("Points", "PointData", "CellData")
 BASE64 = re.compile(r"[A-Za-z0-9+/=]*")
-# what is appended to a legacy file: an array without values
+# an array without values, which is appended to the content of a legacy file
 END = "scanfab_end"
 APPENDED = f"FIELD scanfab 1\n{END} 1 0 int\n".encode()
 
@@ -54,24 +54,24 @@ class Mesh(NamedTuple):
     """The content of a VTK file."""
 
     points: FloatArray
-    """Shape (N, 3); of a box with coordinates along its axes, its two corners."""
+    """Shape (N, 3); for a rectilinear grid its two corners."""
     point_arrays: Columns
-    """N rows each."""
+    """Arrays of the points, N rows each."""
     lines: IntArray
-    """The points at both ends of each line, shape (M, 2)."""
+    """Rows of the points at both ends of each line, shape (M, 2)."""
     line_arrays: Columns
-    """M rows each."""
+    """Arrays of the lines, M rows each."""
     has_faces: bool
-    """Whether there are triangles, boxes and the like."""
+    """Whether the mesh has triangles, boxes or other cells besides points and lines."""
     field_arrays: Columns
-    """Of the file as a whole, with any number of rows."""
+    """Arrays of the file as a whole, with any number of rows."""
 
 
 NO_LINES: IntArray = np.zeros((0, 2), np.int64)
 
 
 def form_of(path: Path) -> str | None:
-    """``PolyData``, ``UNSTRUCTURED_GRID``, ``Xdmf``, ...: what the header says; None if no VTK."""
+    """The kind in the header, such as ``PolyData`` or ``Xdmf``; None if it is not a VTK file."""
     head = first_bytes(path)
     if is_hdf(head):
         form = read_hdf_file(path, with_data=False).attributes.get("VTKHDF", {}).get("Type")
@@ -81,7 +81,7 @@ def form_of(path: Path) -> str | None:
 
 
 def holds_mesh(form: str | None) -> bool:
-    """Whether a file of this form holds points and cells, or lists pieces that do."""
+    """Whether a file of this kind holds points and cells, or lists pieces that do."""
     return form is not None and (form.lower() in MESHES or form in PIECES)
 
 
@@ -94,14 +94,14 @@ def read_mesh(path: Path, parts: Sequence[Path] = ()) -> Mesh:
     path : Path
         The file.
     parts : sequence of Path, optional
-        Files with more of the same mesh; their points come behind those of `path`.
+        Further files of the same mesh; their points follow those of `path`.
 
     Raises
     ------
     ReadError
-        If a file is damaged, incomplete, or no mesh.
+        If a file is damaged, incomplete, or does not hold a mesh.
     """
-    return _joined(path, [_read_one(one) for one in (path, *parts)])
+    return _joined(path, [_read_one(file) for file in (path, *parts)])
 
 
 def _read_one(path: Path) -> Mesh:
@@ -115,7 +115,7 @@ def _read_one(path: Path) -> Mesh:
             raise ReadError(f"{path}: one of its pieces lists pieces itself")
         return _joined(path, [_read_one(piece) for piece in pieces])
     if NO_POINTS.match(head):
-        # VTK takes it for an error
+        # VTK reports an empty file as an error
         return Mesh(np.zeros((0, 3)), {}, NO_LINES, {}, False, {})
     if form == "Xdmf":
         _check_xdmf(path)
@@ -126,7 +126,7 @@ def _read_one(path: Path) -> Mesh:
 
 
 def _check_xdmf(path: Path) -> None:
-    """ReadError if an XDMF file names a file outside of its folder."""
+    """ReadError if an XDMF file names a file outside its folder."""
     for item in elements(path).iter():
         if "include" in item.tag.lower():
             raise ReadError(f"{path}: XDMF that includes other files is not read")
@@ -135,7 +135,7 @@ def _check_xdmf(path: Path) -> None:
 
 
 def elements(path: Path) -> ElementTree.Element:
-    """The elements of an XML file that names other files."""
+    """The root element of an XML file that lists other files."""
     check_memory(path, 4.0 * plain(path).stat().st_size)
     try:
         return ElementTree.fromstring(plain(path).read_bytes())
@@ -145,47 +145,47 @@ def elements(path: Path) -> ElementTree.Element:
 
 def listed(path: Path, tag: str, key: str) -> list[Path]:
     """
-    The files that an XML file names, such as ``<Piece Source="...">``, in its order.
+    The files that an XML file lists, for instance ``<Piece Source="...">``, in the same order.
 
     Raises
     ------
     ReadError
-        If one is not below the folder of the file, or not there.
+        If a listed file is outside the folder of the list, or does not exist.
     """
-    names = [one.attrib[key] for one in elements(path).iter(tag) if key in one.attrib]
+    names = [element.attrib[key] for element in elements(path).iter(tag) if key in element.attrib]
     return [file_inside(path, name) for name in names]
 
 
 def joined_arrays(parts: Sequence[Columns]) -> Columns:
-    """The arrays that all parts have, with as many components, one behind the other."""
-    found: Columns = {}
+    """Concatenate the arrays that all parts have, with equal numbers of components."""
+    joined: Columns = {}
     for name in parts[0]:
-        own = [one[name] for one in parts if name in one]
-        if len(own) == len(parts) and len({one.shape[1:] for one in own}) == 1:
-            found[name] = np.concatenate(own)
-    return found
+        same_name = [part[name] for part in parts if name in part]
+        if len(same_name) == len(parts) and len({values.shape[1:] for values in same_name}) == 1:
+            joined[name] = np.concatenate(same_name)
+    return joined
 
 
 def _joined(path: Path, parts: Sequence[Mesh]) -> Mesh:
-    """Parts one behind the other; empty ones have lost their arrays, and count for nothing."""
-    filled = [one for one in parts if len(one.points)] or list(parts[:1])
+    """Concatenate the parts of a mesh; empty parts are left out, as VTK drops their arrays."""
+    filled = [part for part in parts if len(part.points)] or list(parts[:1])
     if not filled:
         raise ReadError(f"{path}: expected a piece, found none")
-    starts = np.cumsum([0, *(len(one.points) for one in filled)])
+    starts = np.cumsum([0, *(len(part.points) for part in filled)])
     return filled[0]._replace(
-        points=np.concatenate([one.points for one in filled]),
-        point_arrays=joined_arrays([one.point_arrays for one in filled]),
-        lines=np.concatenate([one.lines + at for one, at in zip(filled, starts, strict=False)]),
-        line_arrays=joined_arrays([one.line_arrays for one in filled]),
-        has_faces=any(one.has_faces for one in filled),
+        points=np.concatenate([part.points for part in filled]),
+        point_arrays=joined_arrays([part.point_arrays for part in filled]),
+        lines=np.concatenate([part.lines + at for part, at in zip(filled, starts, strict=False)]),
+        line_arrays=joined_arrays([part.line_arrays for part in filled]),
+        has_faces=any(part.has_faces for part in filled),
     )
 
 
-# from here on, in the worker process: errors are ValueErrors, and the fence names the file
+# the functions below run in the worker process: they raise ValueError, and the fence adds the path
 
 
 def mesh_in_worker(path: str) -> Mesh:
-    """The mesh of one file; of several blocks all that have points."""
+    """The mesh of one file; blocks of a file are joined."""
     data = _read_by_vtk(path)
     if not data.IsA("vtkCompositeDataSet"):
         return _mesh_of(data)
@@ -197,7 +197,7 @@ def mesh_in_worker(path: str) -> Mesh:
 
 
 def faces_in_worker(path: str) -> tuple[FloatArray, list[IntArray]]:
-    """The points of PolyData, and the triangles into which VTK cuts its polygons and strips."""
+    """The points of a PolyData file, and its faces, which VTK cuts into triangles."""
     from vtkmodules.vtkFiltersCore import vtkTriangleFilter
 
     data, triangles = _read_by_vtk(path), vtkTriangleFilter()
@@ -209,12 +209,12 @@ def faces_in_worker(path: str) -> tuple[FloatArray, list[IntArray]]:
 
 
 def damaged(reason: str) -> ValueError:
-    """The error for a file that does not hold what its headers say."""
+    """The error for a file whose content does not match its headers."""
     return ValueError(f"the file is damaged or incomplete: {reason}")
 
 
 def _read_by_vtk(path: str) -> Any:
-    """What VTK reads of a file; ValueError if it has written anything into its output window."""
+    """VTK's data set of a file; ValueError if VTK wrote an error into its output window."""
     from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 
     content = Path(path).read_bytes()
@@ -223,14 +223,15 @@ def _read_by_vtk(path: str) -> Any:
     vtkOutputWindow.SetInstance(window)
     reader.Update()
     data = reader.GetOutputDataObject(0)
-    told = [one for one in window.GetOutput().split("\n\n\n") if one and not HARMLESS.search(one)]
-    if told or data is None:
-        reason = re.sub(r"^.*(\n.*\((0x[0-9a-f]+|nullptr)\):)?", "", told[0] if told else "no data")
+    texts = window.GetOutput().split("\n\n\n")
+    said = [text for text in texts if text and not HARMLESS.search(text)]
+    if said or data is None:
+        reason = re.sub(r"^.*(\n.*\((0x[0-9a-f]+|nullptr)\):)?", "", said[0] if said else "no data")
         raise damaged(" ".join(reason.split()))
     if content.startswith(b"# vtk"):
         places = (data.GetFieldData(), data.GetPointData(), data.GetCellData())
-        last = next((one for one in places if one.HasArray(END)), None)
-        # behind the number of rows stands at least the header of an array
+        last = next((place for place in places if place.HasArray(END)), None)
+        # POINT_DATA and CELL_DATA need an array of their own: if there is only ours, it was cut off
         if last is None or (last is not places[0] and last.GetNumberOfArrays() == 1):
             raise damaged("it has fewer or more values than its headers say")
         last.RemoveArray(END)
@@ -238,7 +239,7 @@ def _read_by_vtk(path: str) -> Any:
 
 
 def _reader(path: str, content: bytes) -> Any:
-    """VTK's reader of a file; that of a legacy file reads the content with an array behind it."""
+    """VTK's reader of a file; a legacy file is read from memory, with an array appended."""
     reader: Any
     if content.startswith(b"# vtk"):
         from vtkmodules.vtkIOLegacy import vtkGenericDataObjectReader
@@ -246,7 +247,7 @@ def _reader(path: str, content: bytes) -> Any:
         reader = vtkGenericDataObjectReader()
         for kind in ("Scalars", "Vectors", "Normals", "Tensors", "ColorScalars", "Fields"):
             getattr(reader, f"ReadAll{kind}On")()
-        # bytes that were cut off would swallow empty lines
+        # for text only: if binary values are missing, VTK would read the empty lines in their place
         content += b"\n\n" * bool(TEXT.match(content)) + APPENDED
         reader.ReadFromInputStringOn()
         reader.SetBinaryInputString(content, len(content))
@@ -272,25 +273,25 @@ def _check_counts(content: bytes) -> None:
     """ValueError if an array of an XML file has fewer or more values than its piece counts."""
     end = content.find(b"<AppendedData")
     try:
-        # behind the elements may stand bytes
+        # raw bytes may follow the elements
         root = ElementTree.fromstring(content if end < 0 else content[:end] + b"</VTKFile>")
         for piece in root.iter("Piece"):
             counts = {name[8:]: int(word) for name, word in piece.items() if name[:8] == "NumberOf"}
-            points, every = counts.get("Points", 0), sum(counts.values())
-            rows = {**counts, "Points": points, "PointData": points, "CellData": every - points}
-            for section, array in ((one.tag, array) for one in piece for array in one):
+            points, count = counts.get("Points", 0), sum(counts.values())
+            rows = {**counts, "Points": points, "PointData": points, "CellData": count - points}
+            for section, array in ((child.tag, array) for child in piece for array in child):
                 name = array.get("Name", section)
-                # of the arrays that describe cells, one has a row for each point of each cell
+                # not connectivity, which has a row for each point of each cell
                 is_counted = section in COUNTED or name in ("offsets", "types")
                 if section not in rows or not is_counted or array.get("type") == "String":
                     continue
                 expected = rows[section] * int(array.get("NumberOfComponents") or 1)
                 stored = _stored(content, array, root, end)
                 if section == "CellData" and stored > expected:
-                    # VTK would give the values to other lines than theirs
-                    told = f"{name} has {stored} values for {expected} contacts: VTKRecorder"
+                    # VTK would assign the values to the wrong lines
+                    problem = f"{name} has {stored} values for {expected} contacts: VTKRecorder"
                     advice = 'use VTKExporter or `contacts="geometric"`'
-                    raise ValueError(f"{told} loses those across a periodic cell: {advice}")
+                    raise ValueError(f"{problem} loses those across a periodic cell: {advice}")
                 if stored != expected:
                     raise ValueError(f"{name} has {stored} of {expected} values")
     except (ElementTree.ParseError, ValueError, LookupError, TypeError) as error:
@@ -298,7 +299,7 @@ def _check_counts(content: bytes) -> None:
 
 
 def _stored(content: bytes, array: ElementTree.Element, root: ElementTree.Element, end: int) -> int:
-    """How many values an array has: its words, or as the sizes before its bytes say."""
+    """The number of values in an array: its words, or the size stored before its bytes."""
     text = " ".join([array.text or "", *(child.tail or "" for child in array)]).strip()
     if array.get("format") == "ascii":
         return len(text.split())
@@ -308,15 +309,15 @@ def _stored(content: bytes, array: ElementTree.Element, root: ElementTree.Elemen
         start = content.index(b"_", end) + 1 + int(array.attrib["offset"])
         head = content[start : start + 4 * width]
     elif not BASE64.fullmatch(text):
-        # VTK passes over all letters that are no base64, and so shifts the values behind them
-        raise ValueError("an array is not as base64 writes it")
+        # VTK skips letters that are not base64, which shifts the values behind them
+        raise ValueError("an array is not valid base64")
     if array.get("format") != "appended" or b"raw" not in content[end : end + 100]:
         digits = head.split(b"=")[0]
         head = base64.b64decode(digits + b"=" * (-len(digits) % 4))
     kind = f"{'>' if root.get('byte_order') == 'BigEndian' else '<'}u{width}"
     size, full, last = np.frombuffer(head.ljust(3 * width, b"\0"), kind, 3).tolist()
     if root.get("compressor"):
-        # all blocks are full, but perhaps the last one
+        # all compressed blocks are full, except perhaps the last one
         size = size * full - (full - last if size and last else 0)
     return int(size) // np.dtype(array.attrib["type"].lower()).itemsize
 
@@ -328,25 +329,26 @@ def _numpy(array: Any) -> AnyArray:
 
 
 def _arrays(attributes: Any, rows: int | None) -> Columns:
-    """The arrays of points, cells or the file that have a name; None: any number of rows."""
-    found: Columns = {}
+    """The named arrays of points, cells or the file; they must have ``rows`` rows unless None."""
+    arrays: Columns = {}
     for place in range(attributes.GetNumberOfArrays()):
-        one = attributes.GetAbstractArray(place)
-        name = one.GetName()
-        if one.IsA("vtkStringArray"):
-            values = np.array([one.GetValue(k) for k in range(one.GetNumberOfValues())], dtype=str)
+        array = attributes.GetAbstractArray(place)
+        name = array.GetName()
+        if array.IsA("vtkStringArray"):
+            count = array.GetNumberOfValues()
+            values = np.array([array.GetValue(k) for k in range(count)], dtype=str)
         else:
-            values = _numpy(one)
+            values = _numpy(array)
         if rows is not None and len(values) != rows:
             raise damaged(f"{name} has {len(values)} of {rows} rows")
-        # VTK gives bytes if they are no UTF-8
+        # the name is bytes if it is not valid UTF-8
         if name and isinstance(name, str):
-            found[name] = values
-    return found
+            arrays[name] = values
+    return arrays
 
 
 def _cells(cells: Any, points: int) -> tuple[IntArray, IntArray]:
-    """Where the points of each cell begin and the last end, and the points of all cells."""
+    """The offsets of the cells (one more than cells), and the points of all cells."""
     if not cells.IsValid():
         raise damaged("the offsets of the cells are wrong")
     offsets = _numpy(cells.GetOffsetsArray()).astype(np.int64)
@@ -357,7 +359,7 @@ def _cells(cells: Any, points: int) -> tuple[IntArray, IntArray]:
 
 
 def _mesh_of(data: Any) -> Mesh:
-    """The mesh of one of VTK's data sets."""
+    """The mesh of a data set of VTK."""
     count = data.GetNumberOfPoints() if data.IsA("vtkDataSet") else 0
     if data.IsA("vtkRectilinearGrid") and count:
         return Mesh(np.array(data.GetBounds()).reshape(3, 2).T, {}, NO_LINES, {}, False, {})
@@ -367,27 +369,27 @@ def _mesh_of(data: Any) -> Mesh:
     arrays = _arrays(data.GetPointData(), count)
     cell_arrays = _arrays(data.GetCellData(), data.GetNumberOfCells())
     if data.IsA("vtkPolyData"):
-        # the arrays of cells begin with the rows of vertices
+        # arrays of cells begin with the rows of the vertices
         cells, start = data.GetLines(), data.GetNumberOfVerts()
         types = np.full(data.GetNumberOfLines(), POLY_LINE)
         has_faces = data.GetNumberOfPolys() + data.GetNumberOfStrips() > 0
     else:
         cells, start, one_by_one = data.GetCells(), 0, data.GetCellTypesArray()
-        # since VTK 9.6, cells that are all of one type have no such array
+        # since VTK 9.6 this array does not exist if all cells have one type
         types = np.array(data.GetCellTypes()) if one_by_one is None else _numpy(one_by_one)
         has_faces = not np.all(np.isin(types, (VERTEX, POLY_VERTEX, LINE, POLY_LINE)))
     offsets, named = _cells(cells, count)
     if len(types) == count and not has_faces and np.array_equal(named, np.arange(count)):
-        # one vertex for each point: YADE's VTKRecorder writes some arrays of the points there
+        # one vertex for each point: YADE's VTKRecorder stores some point arrays with the vertices
         arrays.update(cell_arrays)
     rows = np.flatnonzero(np.isin(types, (LINE, POLY_LINE)))
     if len(types) != len(offsets) - 1 or np.any(np.diff(offsets)[rows] < 2):
-        raise damaged("types and points of the cells do not fit")
+        raise damaged("the types and the points of the cells do not match")
     lines = np.column_stack([named[offsets[rows]], named[offsets[rows + 1] - 1]])
     line_arrays = {name: values[start + rows] for name, values in cell_arrays.items()}
-    own = (arrays.get("vtkGhostType", np.zeros(count, np.uint8)) & DUPLICATE) == 0
-    if not own.all():
+    is_own = (arrays.get("vtkGhostType", np.zeros(count, np.uint8)) & DUPLICATE) == 0
+    if not is_own.all():
         if len(lines):
-            raise ValueError("points of other pieces (vtkGhostType) and lines between points")
-        points, arrays = points[own], {name: values[own] for name, values in arrays.items()}
+            raise ValueError("a file with ghost points (vtkGhostType) and lines cannot be read")
+        points, arrays = points[is_own], {name: values[is_own] for name, values in arrays.items()}
     return Mesh(points, arrays, lines, line_arrays, has_faces, _arrays(data.GetFieldData(), None))

@@ -1,4 +1,4 @@
-"""What users say of a source that it does not say itself: the options of ``read_series``."""
+"""The options of ``read_series``: what users add to the information in the files."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ def _reader_names() -> Iterable[str]:
 
 
 def parse_text(name: str, value: Any) -> str | None:
-    """Words that are checked where they are used."""
+    """A text; its content is checked where it is used."""
     if not isinstance(value, str | None):
         raise unusable(name, "text", value)
     return value
 
 
 def parse_format(name: str, value: Any) -> str | None:
-    """The name of a reader that is installed."""
+    """The name of an installed reader."""
     from scanfab.io.reader import reader_named
 
     given = parse_text(name, value)
@@ -49,34 +49,34 @@ def parse_format(name: str, value: Any) -> str | None:
 
 
 def parse_contacts(name: str, value: Any) -> str | PathLike[str]:
-    """A word or a path; the files are looked for when the series is opened."""
+    """A keyword or a path; the files are looked for when the series is opened."""
     if not isinstance(value, str | PathLike):
         raise unusable(name, "auto, file, geometric or a path", value)
     return value
 
 
 def parse_columns(name: str, value: Any) -> dict[str, str] | None:
-    """Standard names to a file's own, from a mapping or from ``NAME=COLUMN,NAME=COLUMN``."""
+    """A dict of standard name to column, from a mapping or from ``NAME=COLUMN,NAME=COLUMN``."""
     if value is None or isinstance(value, Mapping):
         return None if value is None else dict(value)
     names: dict[str, str] = {}
     for part in str(value).split(","):
-        standard, _, own = map(str.strip, part.partition("="))
-        if not (standard and own):
+        standard, _, column = map(str.strip, part.partition("="))
+        if not (standard and column):
             raise unusable(name, 'NAME=COLUMN such as "radius=c_rad,x=px"', part)
         if standard in names:
-            raise unusable(name, f"one column as {standard}", value)
-        names[standard] = own
+            raise unusable(name, f"one column for {standard}", value)
+        names[standard] = column
     return names
 
 
 def parse_cell(name: str, value: Any) -> tuple[float, ...] | str | PathLike[str] | None:
-    """Three or six numbers, or the name of a file that has those of each frame."""
+    """Three or six numbers, or the path of a file with the numbers of each frame."""
     if value is None or (isinstance(value, str | PathLike) and Path(value).is_file()):
         return value
     expected = (
-        "three lengths LX LY LZ above 0, or six numbers with XY XZ YZ, or a CSV file with those "
-        "of each frame"
+        "three lengths LX LY LZ above 0, or six numbers LX LY LZ XY XZ YZ, or a CSV file with the "
+        "cell of each frame"
     )
     return numbers(expected, lambda cell: len(cell) in (3, 6) and min(cell[:3]) > 0)(name, value)
 
@@ -91,7 +91,7 @@ def parse_frames(text: str | int | slice | None, name: str = "frames") -> slice:
     with suppress(ValueError):
         if len(words) == 1:
             first = int(words[0])
-            # nothing is behind the last frame, which is -1
+            # -1 is the last frame: the slice -1:0 would be empty, so the end is None
             return slice(first, first + 1 or None)
         parts = [int(word) if word.strip() else None for word in words]
         if len(parts) <= 3 and parts[2:] != [0]:
@@ -100,14 +100,14 @@ def parse_frames(text: str | int | slice | None, name: str = "frames") -> slice:
 
 
 def parse_periodic(name: str, value: Any) -> str | None:
-    """Letters out of xyz."""
+    """Some of the letters x, y and z."""
     if value is None or (isinstance(value, str) and len(value) <= 3 and set(value) <= set("xyz")):
         return value
     raise unusable(name, "letters out of xyz", value)
 
 
 def parse_dim(name: str, value: Any) -> str | int:
-    """``auto``, or a number of dimensions."""
+    """``auto``, 2 or 3."""
     word = one_of("auto", "2", "3")(name, str(value))
     return word if word == "auto" else int(word)
 
@@ -120,28 +120,29 @@ class Reading:
     """Reader to use (default: chosen by the content of the file)."""
     columns: dict[str, str] | None = reading(parse_columns, metavar="NAMES")
     """
-    Names of columns that differ from the usual ones: "radius=c_rad,x=px". The columns of a table
-    without names have numbers from 1: "x=1,y=2,z=3,diameter=4".
+    Names of columns that differ from the usual names: "radius=c_rad,x=px". In a table without names
+    use the numbers of the columns, from 1: "x=1,y=2,z=3,diameter=4".
     """
     contact_columns: str | None = reading(parse_text, metavar="KEYWORDS")
     """
-    What the columns of a dump local hold: LIGGGHTS keywords "pos id force", or LAMMPS names
-    "id1=NAME,id2=NAME", which also serve tables of contacts.
+    Meaning of the columns of a dump local: LIGGGHTS keywords "pos id force", or names of columns
+    "id1=NAME,id2=NAME", which also work for tables of contacts.
     """
     skip: int = reading(parse_skip, default=0)
-    """How many lines to skip at the top of a table of text."""
+    """Number of lines to skip at the top of a text table."""
     radius: float | None = reading(parse_positive, metavar="L")
     """Radius of all grains in the dump's units, for dumps without radii."""
     cell: tuple[float, ...] | None = reading(parse_cell, metavar="LX LY LZ [XY XZ YZ]|FILE.csv")
     """
-    The cell, for formats that do not carry it. It is periodic in x, y and z unless `periodic` says
-    otherwise. FILE.csv has the cell of each step or frame: step lx ly lz, and xy xz yz if tilted.
+    Periodic cell, for formats that do not store it. It repeats along x, y and z unless `periodic`
+    says otherwise. FILE.csv lists the cell of each step or frame: columns step lx ly lz, and
+    xy xz yz if it is tilted.
     """
     periodic: str | None = reading(parse_periodic, metavar="xyz")
-    """Periodic directions (default: those of the dump)."""
+    """Periodic directions (default: from the dump)."""
     bodies: str | None = reading(parse_text, metavar="COLUMN")
     """
-    Column that says which clump a sphere belongs to (default: id_multisphere, clumpId, clump_id or
+    Column that numbers the clump of each sphere (default: id_multisphere, clumpId, clump_id or
     clump, if there is one); id: each sphere is a grain of its own.
     """
     max_unpacked: float | None = reading(parse_positive, metavar="TIMES")
@@ -150,13 +151,13 @@ class Reading:
         parse_contacts, default="auto", choices=("file", "geometric"), also="PATH"
     )
     """
-    Where contacts come from. PATH: a file, folder or glob, matched by step; file: the contact files
-    of the dump; geometric: the geometry (default: file if there is one, else geometric).
+    Source of the contacts. PATH: a file, folder or glob, matched by step; file: the contact files
+    of the dump; geometric: positions and radii (default: file if there is one, else geometric).
     """
     dim: str | int = reading(parse_dim, default="auto", choices=("auto", "2", "3"))
     """
     2: discs in a coordinate plane; 3: spheres; auto: 2 if the first frame with grains has at least
-    ten, whose centres all share exactly one coordinate. This decides for the whole series.
+    ten grains and all centres share exactly one coordinate. The first frame decides for all.
     """
 
 
@@ -165,13 +166,14 @@ READING_OPTIONS = options_of(Reading)
 
 def take_reading(options: dict[str, Any]) -> dict[str, Any]:
     """
-    Take the options of ``read_series`` out of others, checked, and the usual ones in their place.
+    Remove the options of ``read_series`` from ``options``, and return them checked, with defaults.
 
     Raises
     ------
     SettingsError
-        If a value cannot be used.
+        If a value is not valid.
     """
     return {
-        one.name: one.parse(one.name, options.pop(one.name, one.default)) for one in READING_OPTIONS
+        option.name: option.parse(option.name, options.pop(option.name, option.default))
+        for option in READING_OPTIONS
     }

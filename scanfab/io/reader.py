@@ -1,4 +1,4 @@
-"""What a reader is asked and what it answers, which readers are installed, and which one fits."""
+"""The interface of readers, the installed readers, and the choice of a reader for a file."""
 
 from __future__ import annotations
 
@@ -16,49 +16,50 @@ from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList, ListedWallForces
 
 GROUP = "scanfab.readers"
-"""The entry point by which packages offer readers."""
+"""The entry point group under which packages register readers."""
 TABLE = "table"
-"""The reader that any text is tried with."""
+"""The reader that is tried with any text that no other reader knows."""
 
 FileKind = Literal["grains", "index", "start", "points", "contacts", "cell", "other"]
 """
-What a file holds. ``index``: names of other files that hold grains; ``start``: grains that a
-simulation starts from, which are no frame beside its dumps; ``points``: grains without a
-radius, unless the user gives one; ``cell``: the periodic cell of grains in another file, whose
-reader finds it; ``other``: neither grains nor contacts (a wall mesh, a box).
+The content of a file. ``index``: a list of other files that hold grains; ``start``: grains from
+which a simulation starts (not a frame if there are dumps); ``points``: grains without a radius,
+which the user may give; ``cell``: the periodic cell of the grains in another file, whose reader
+finds it; ``other``: neither grains nor contacts (a wall mesh, a box).
 """
 
 
 Carries = Literal["cell", "box", "nothing"]
 """
-What a file of grains says of a cell: all; a ``box``, but not whether it repeats; or ``nothing``.
+How much a grain file says about a cell: ``cell``: everything; ``box``: its size, but not whether it
+is periodic; ``nothing``.
 """
 
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """What users tell of a dump that the dump does not tell itself."""
+    """Information about a dump that the user adds because the dump lacks it."""
 
     format: str | None = None
-    """Name of the reader; None: the one that knows the content."""
+    """Name of the reader; None: the reader that recognises the content."""
     columns: Mapping[str, str] = field(default_factory=dict)
-    """Standard name to the file's own, for instance ``{"radius": "c_rad"}``."""
+    """Standard name of a column to its name in the file, for instance ``{"radius": "c_rad"}``."""
     contact_columns: str | None = None
-    """Meaning of a contact file's columns, in the reader's own terms."""
+    """Meaning of the columns of a contact file, in the terms of the reader."""
     radius: float | None = None
     """Radius of all grains, for dumps without one; dump's length unit."""
     cell: tuple[float, ...] | None = None
     """LX LY LZ, or LX LY LZ XY XZ YZ; dump's length unit."""
     periodic: str | None = None
-    """Letters out of xyz."""
+    """The periodic directions, some of the letters x, y and z."""
     bodies: str | None = None
-    """Column that says which clump a sphere belongs to; by default that of the format, if any."""
+    """Column that numbers the clump of each sphere; None: the usual columns, if there are any."""
     skip: int = 0
-    """Lines before a table of text."""
+    """Number of lines before a text table."""
     max_unpacked: float | None = None
-    """Times its size that a packed file may unpack to; None: the usual bound."""
+    """How many times its compressed size a file may grow to; None: the usual limit."""
     beside: Cell | Literal["none"] | None = None
-    """The dump's own cell, where a file beside the dump says which it is, or that it has none."""
+    """The cell that a companion file of the dump states, or ``none`` if it states there is none."""
 
 
 @dataclass(frozen=True)
@@ -69,13 +70,13 @@ class Snapshot:
     step: int | None = None
     time: float | None = None
     start: int = 0
-    """Where it starts in the (decompressed) file, in bytes."""
+    """Offset of its first byte in the decompressed file."""
     stop: int | None = None
-    """Where it ends; None: the end of the file."""
+    """Offset behind its last byte; None: the end of the file."""
     stepless: bool = False
-    """Whether the file says that there is no step, so that a number in its name is none."""
+    """Whether the file states that there is no step; then a number in its name is not a step."""
     parts: tuple[Path, ...] = ()
-    """Other files, with the rest of its grains."""
+    """Other files with further grains of the frame."""
 
 
 class GrainTable(NamedTuple):
@@ -88,16 +89,16 @@ class GrainTable(NamedTuple):
     id: IntArray | None
     """Shape (N,); None if the dump has none."""
     columns: Mapping[str, AnyArray]
-    """What else the dump says of each grain, by its own names."""
+    """All other columns of the dump, N rows each, by the names in the dump."""
     cell: Cell | None
     contacts: ContactList | None = None
-    """Contacts that the grain file itself lists."""
+    """Contacts, if the grain file itself lists them."""
     wall_contacts: IntArray | None = None
     """Number of contacts with walls of each grain, shape (N,), if the grain file lists them."""
     bodies: IntArray | None = None
-    """Number of each sphere's body, shape (N,), if the file says so beyond all doubt."""
+    """Number of each sphere's body, shape (N,), if the format defines it."""
     wall_forces: ListedWallForces | None = None
-    """The forces of all contacts with walls that the grain file lists, if it says them."""
+    """The forces of all contacts with walls, if the grain file lists them."""
 
 
 class JoinedContacts(NamedTuple):
@@ -108,36 +109,39 @@ class JoinedContacts(NamedTuple):
     wall_contacts: IntArray
     """Number of contacts with walls of each grain, shape (N,)."""
     wall_forces: ListedWallForces | None = None
-    """The forces of all these contacts with walls, if the file says them."""
+    """The forces of all these contacts with walls, if the file lists them."""
 
 
 class Reader(Protocol):
     """
     A reader plugin: an object registered under the entry point group ``scanfab.readers``.
 
-    All methods raise ReadError, with the file and what was expected, and nothing else. A reader of
-    a format that any program may write can say so with an attribute ``generic = True``: it is asked
-    after the others. One whose grain files may list contacts says ``lists_contacts = True``. One
-    whose grain files do not all carry their cell has a method ``carries(path)`` that answers with
-    one of :data:`Carries`. One that reads other files together with a file of grains, such as that
-    of its cell, has a method ``beside(path)`` that answers with a list of their paths: they are
-    inputs too. It is asked for each file of a series, so it should not open them. If these are
-    called like files of grains, a method ``listed_by(path)`` answers, by its name alone, which file
-    lists a file, or None: in a folder the listed ones are no frames. One that cannot
-    know what a file holds without what users tell of it (the columns of a table) has a method
-    ``told(options)`` that answers with a reader that does know. One of tables that may hold
-    anything says ``is_table = True``: in a folder they count only where there are no dumps.
+    All methods raise only ReadError, with the file and what was expected. A reader may also have
+    these attributes and methods:
+
+    - ``generic = True``: any program may write the format; the reader is asked after the others.
+    - ``lists_contacts = True``: grain files of the format may list contacts.
+    - ``is_table = True``: the files are tables that may hold anything; in a folder they count only
+      if there are no dumps.
+    - ``carries(path)``, one of :data:`Carries`: needed if not all grain files store their cell.
+    - ``beside(path)``, a list of paths: the files that are read together with a grain file, for
+      instance its cell. They are inputs too. Called for each file of a series, it should not open
+      them.
+    - ``listed_by(path)``, a path or None: which file lists this file as one of its parts, judged by
+      the name alone. Needed if parts are named like grain files; in a folder they are no frames.
+    - ``told(options)``, a reader: a reader with the user's options, which it needs to know what a
+      file holds (the columns of a table).
     """
 
     name: str
-    """As in ``--format NAME``."""
+    """The NAME in ``--format NAME``."""
     description: str
     """One line for ``scanfab formats``."""
     extensions: tuple[str, ...]
-    """Usual file name extensions, the first the most usual."""
+    """Usual file name extensions, the most common first."""
 
     def recognises(self, path: Path) -> bool:
-        """Whether the content is surely of this format."""
+        """Whether the content is certainly of this format."""
         ...
 
     def kind(self, path: Path) -> FileKind:
@@ -162,9 +166,9 @@ class Reader(Protocol):
 @cache
 def installed_readers() -> dict[str, Offer]:
     """
-    All readers by name, with the package of each.
+    All readers by name, with the package that offers each.
 
-    A plugin that cannot be loaded is one warning with its name.
+    A warning names each plugin that cannot be loaded.
 
     Raises
     ------
@@ -175,7 +179,7 @@ def installed_readers() -> dict[str, Offer]:
 
 
 def installed(group: str, what: str, *methods: str) -> dict[str, Offer]:
-    """The readers or writers that packages offer, each an object of the class that is offered."""
+    """The readers or writers that packages register; each plugin is an instance of its class."""
     make = having(
         f"a class of objects with the members of scanfab.io.{what.title()}",
         **dict.fromkeys(("name", "description"), str),
@@ -186,7 +190,7 @@ def installed(group: str, what: str, *methods: str) -> dict[str, Offer]:
 
 
 def lacking(plugin: object) -> str | None:
-    """What to install for a plugin whose package is not there; None if nothing lacks."""
+    """The pip command for a plugin's missing package; None if nothing is missing."""
     module, words = getattr(plugin, "requires", (None, ""))
     return None if module is None or find_spec(module) is not None else f"pip install {words}"
 
@@ -194,8 +198,8 @@ def lacking(plugin: object) -> str | None:
 def plugin_named(offers: Mapping[str, Offer], what: str, name: str) -> Any:
     """The ``reader`` or ``writer`` that a user names; UnknownFormatError lists those that exist."""
     if name not in offers:
-        there = f"the {what}s are {', '.join(offers)}"
-        raise UnknownFormatError(f"there is no {what} called {name!r}; {there}")
+        listed = f"the {what}s are {', '.join(offers)}"
+        raise UnknownFormatError(f"there is no {what} called {name!r}; {listed}")
     advice = lacking(offers[name].plugin)
     if advice is not None:
         raise UnknownFormatError(f"{name} needs another package: {advice}")
@@ -208,25 +212,25 @@ def reader_named(name: str, options: ReadOptions | None = None) -> Reader:
 
 
 def _told(reader: Reader, options: ReadOptions | None) -> Reader:
-    """The reader, with what users say of its files if it needs that to know what they hold."""
+    """The reader; with the user's options if it needs them to know what a file holds."""
     tell = getattr(reader, "told", None)
-    told: Reader = reader if tell is None or options is None else tell(options)
-    return told
+    informed: Reader = reader if tell is None or options is None else tell(options)
+    return informed
 
 
 def reader_for(path: Path, options: ReadOptions | None = None) -> Reader | None:
-    """The reader that a user names, or that knows the file; any text may be a table."""
+    """The reader that the user names, else the first that recognises the file, else tables."""
     if options is not None and options.format is not None:
         return reader_named(options.format, options)
-    # formats that any program may write are asked last
+    # generic formats, which any program may write, come last
     offers = installed_readers().values()
-    for one in sorted(offers, key=lambda one: getattr(one.plugin, "generic", False)):
-        reader = _told(one.plugin, options)
+    for offer in sorted(offers, key=lambda offer: getattr(offer.plugin, "generic", False)):
+        reader = _told(offer.plugin, options)
         try:
             is_known = reader.recognises(path)
         except ReadError:
             raise
-        # a plugin may raise anything
+        # a plugin may raise errors of any type
         except Exception as error:
             reason = f"the reader {reader.name!r} failed: {type(error).__name__}: {error}"
             raise ReadError(f"{path}: {reason}") from error
@@ -238,7 +242,7 @@ def reader_for(path: Path, options: ReadOptions | None = None) -> Reader | None:
 
 
 def why_no_table(path: Path, options: ReadOptions | None) -> str:
-    """Why a file cannot be read as a table of text; empty if it can."""
+    """Why a file cannot be read as a text table; empty if it can."""
     try:
         reader_named(TABLE, options).kind(path)
     except ReadError as error:

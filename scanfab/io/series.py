@@ -1,4 +1,4 @@
-"""A series of frames, read one at a time; pairs the grain file and contact file of a step."""
+"""A series of frames, read one at a time; it finds the contact file for each grain file."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ from scanfab.io.layout import FrameFile
 from scanfab.io.reader import ReadOptions, Snapshot
 from scanfab.packing.packing import flat_space, space_of, spelt_plane
 
-# more frames than there can be: where a slice ends while its frames are not counted
+# the end of a range of frames that are not counted yet: more than any series has
 ENDLESS = 2**62
-# relative difference of two times that are the same: programs write them with six digits or more
+# relative difference below which two times are equal: programs write six digits or more
 ROUNDING = 2e-6
 
 ContactsFrom = Literal["auto", "beside", "geometric", "path", "grains"]
 """
-``auto``: from what the source holds; ``beside``: from what lies beside single grain files;
-``path``: from what the user names; ``grains``: from the grain files themselves.
+``auto``: the files of the source; ``beside``: other files in the folders of single grain files;
+``path``: files that the user names; ``grains``: the grain files; ``geometric``: no file.
 """
 
 
 @dataclass
 class Known:
-    """What has been found out of the files of a series and all its parts."""
+    """What is known about the files of a series; the series and its slices share it."""
 
     snapshots: dict[Path, tuple[Stamp | None, list[Snapshot]]] = field(default_factory=dict)
-    """The snapshots of each file that was looked into, and the state of the file then."""
+    """The snapshots of each file that was searched, and the stamp of the file at that time."""
     space: Space | None = None
-    """The space in which the particles of the first frame that has any lie."""
+    """The plane or space in which the particles of the first frame with particles lie."""
 
 
 @dataclass
@@ -51,33 +51,33 @@ class Series:
     Frames in the order of their steps, read one at a time.
 
     Iterating gives :class:`Frame` objects; ``frame.read()`` gives the packing. ``series[-1]`` is a
-    frame, ``series[2:5]`` the same series with fewer frames: they keep their numbers, and RV,
-    ``rmin`` and the initial length stay those of the whole.
+    frame, and ``series[2:5]`` is the same series with fewer frames. These keep their numbers, and
+    the RV, ``rmin`` and the initial length are still those of the whole series.
 
     Attributes
     ----------
     name : str
-        As the user named it.
+        The name that the user gave.
     grains : Family
-        The files of grains, by step.
+        The grain files, by step.
     contacts : tuple of Family
         The families of contact files, by step.
     contacts_from : str
         Where contacts come from.
     options : ReadOptions
-        What the user tells of the dump.
+        The user's options for reading the dumps.
     cells : FrameFile or None
-        A file with the cell of each frame, if the options hold no cell for all frames.
+        A file with the cell of each frame, if the user named one.
     sources : tuple of str
-        The sources that :func:`scanfab.read_series` was given.
+        The sources that were passed to :func:`scanfab.read_series`.
     reading : mapping
-        The options of :func:`scanfab.read_series`, as a manifest lists them.
+        The options of :func:`scanfab.read_series`, as manifests list them.
     numbers : range
-        Which frames of the whole series these are; the series may have fewer.
+        The numbers of the frames in the whole series; it may end behind the last frame.
     dim : str or int
-        2 for discs, 3 for spheres, or ``auto``: the first frame that has particles decides.
+        2 for discs, 3 for spheres, or ``auto``: the first frame with particles decides.
     known : Known
-        What has been found out about the files, shared with all parts of the series.
+        What is known about the files; shared with all slices of the series.
 
     Examples
     --------
@@ -107,7 +107,7 @@ class Series:
         frames = "" if self.is_whole else f"frames {self.numbers.start}:{stop}{step} of "
         files = f"{counted(len(self.grains.files), 'file')} {Path(self.grains.pattern).name}"
         reader = "" if self.grains.reader is None else f" ({self.grains.reader.name})"
-        contacts = ", ".join(Path(one.pattern).name for one in self.contacts)
+        contacts = ", ".join(Path(family.pattern).name for family in self.contacts)
         more = f", contacts of {contacts}" if contacts else ""
         return f"Series {self.name}: {frames}{files}{reader}{more}"
 
@@ -118,7 +118,7 @@ class Series:
         return sum(1 for _ in self)
 
     def __bool__(self) -> bool:
-        # without counting them
+        # without counting the frames
         return next(iter(self), None) is not None
 
     @overload
@@ -129,33 +129,33 @@ class Series:
         if isinstance(key, slice):
             numbers = self.numbers_of(key)
             if numbers.step < 0:
-                told = "frames stay in the order of their steps: list(series)[::-1] goes backwards"
-                raise SettingsError(told)
+                order = "frames stay in the order of their steps: list(series)[::-1] goes backwards"
+                raise SettingsError(order)
             return self._with(numbers)
         place = index(key)
-        found = list(islice(self, place, place + 1) if place >= 0 else deque(self, -place))
-        if not found or len(found) < -place:
+        frames = list(islice(self, place, place + 1) if place >= 0 else deque(self, -place))
+        if not frames or len(frames) < -place:
             raise NoFrameError(f"{self.name}: has {len(self)} frames, there is no frame {place}")
-        return found[0]
+        return frames[0]
 
     def _with(self, numbers: range) -> Series:
-        """The same series with other frames."""
-        own = {one.name: getattr(self, one.name) for one in fields(Series)}
-        return Series(**{**own, "numbers": numbers})
+        """The same series with other numbers of frames."""
+        attributes = {attribute.name: getattr(self, attribute.name) for attribute in fields(Series)}
+        return Series(**{**attributes, "numbers": numbers})
 
     def numbers_of(self, frames: slice) -> range:
         """
-        The numbers, in the whole series, of some of these frames.
+        The numbers, in the whole series, of a slice of these frames.
 
         Parameters
         ----------
         frames : slice
-            As of a list of these frames. They are counted only where it counts from their end.
+            A slice as of a list. The frames are counted only if it counts from their end.
 
         Returns
         -------
         range
-            There may be fewer frames than that.
+            It may be longer than the series.
         """
         bounds = (frames.start, frames.stop, frames.step)
         if any(bound is not None and bound < 0 for bound in bounds):
@@ -164,25 +164,26 @@ class Series:
 
     def space_of(self, number: int, position: FloatArray) -> Space:
         """
-        The space in which the particles of all frames lie; one frame is known.
+        The plane or space in which the particles of the series lie, when one frame has been read.
 
         Parameters
         ----------
         number : int
-            Of that frame, in the whole series.
+            The number of the frame that has been read, in the whole series.
         position : ndarray, shape (N, 3)
             Its centres, dump's length unit.
 
         Returns
         -------
         Space
-            That of the first frame that has particles. If it is a plane that nobody has asked for,
-            a note says so.
+            The space of the first frame with particles. If it is a plane that the user did not ask
+            for, a note says so.
 
         Raises
         ------
         PackingError
-            If discs are asked for, and these are none; or these are, and the first frame is not.
+            If ``dim`` is 2 and the centres do not lie in a plane, or if they do and those of the
+            first frame do not.
         """
         if self.dim == 3:
             return SPACE
@@ -190,12 +191,12 @@ class Series:
             first = next(filter(len, self._centres_before(number)), position)
             if not len(first):
                 return SPACE
-            found = flat_space(first) if self.dim == 2 else space_of(first)
-            if found.is_plane and self.dim == "auto":
-                told = "they are read as discs, in 2D; `dim=3` reads them as spheres"
-                where = spelt_plane(first, found)
-                note(f"{self.name}: all centres lie in {found} ({where}): {told}")
-            self.known.space = found
+            first_space = flat_space(first) if self.dim == 2 else space_of(first)
+            if first_space.is_plane and self.dim == "auto":
+                advice = "they are read as discs, in 2D; `dim=3` reads them as spheres"
+                where = spelt_plane(first, first_space)
+                note(f"{self.name}: all centres lie in {first_space} ({where}): {advice}")
+            self.known.space = first_space
         own, decided = space_of(position), self.known.space
         if own.is_plane and not decided.is_plane:
             all_one = "`dim=2` reads all as discs, `dim=3` all as spheres"
@@ -203,38 +204,38 @@ class Series:
         return decided
 
     def _centres_before(self, number: int) -> Iterator[FloatArray]:
-        """The centres of each frame before one; frames that cannot be read are passed over."""
+        """The centres in each frame before a given one; frames that cannot be read are skipped."""
         for frame in islice(self._every(), number):
             with suppress(ReadError):
                 yield frame.read_grains().position
 
     @property
     def whole(self) -> Series:
-        """All frames of the series that these are some of."""
+        """The whole series, of which this may be a slice."""
         return self._with(range(ENDLESS))
 
     @property
     def is_whole(self) -> bool:
-        """Whether these are all frames of the series."""
+        """Whether this is the whole series, not a slice."""
         return self.numbers == range(ENDLESS)
 
     def _every(self) -> Iterator[Frame]:
-        """All frames of the whole series; one in the place of those of a damaged file."""
+        """All frames of the whole series; a damaged file counts as one frame."""
         number = 0
         for name_step, path in self.grains.files.items():
-            problem, told = None, None
+            problem, frame_data = None, None
             try:
                 snapshots = self._snapshots_of(self.grains, path)
-                if len(snapshots) == 1 and (told := read_frame(path)) is not None:
-                    snapshots = [told.moment_of(snapshots[0])]
+                if len(snapshots) == 1 and (frame_data := read_frame(path)) is not None:
+                    snapshots = [frame_data.moment_of(snapshots[0])]
             except ReadError as error:
                 snapshots, problem = [Snapshot(path)], error
             for snapshot in snapshots:
-                yield Frame(self, snapshot, name_step, number, told, problem)
+                yield Frame(self, snapshot, name_step, number, frame_data, problem)
                 number += 1
 
     def _snapshots_of(self, family: Family, path: Path) -> list[Snapshot]:
-        """The snapshots of a file; it is looked through again if it has changed."""
+        """The snapshots of a file; the file is searched again if it has changed."""
         assert family.reader is not None
         stamp = stamp_of(path) if path.exists() else None
         if stamp is None or self.known.snapshots.get(path, (None, []))[0] != stamp:
@@ -244,34 +245,34 @@ class Series:
 
     def frames_expected(self) -> int:
         """
-        About how many frames there are, without searching the files for them.
+        Estimate the number of frames without searching the files for them.
 
-        A file that was not looked into yet is taken to hold as many frames as the last one that
-        was; before the first one, one frame.
+        A file that was not searched yet counts as many frames as the last file that was; if none
+        was, it counts one.
 
         Returns
         -------
         int
         """
         files, known = self.grains.files.values(), self.known.snapshots
-        met = [len(known[path][1]) for path in files if path in known]
-        every = sum(met) + (len(files) - len(met)) * (met[-1] if met else 1)
-        return len(range(self.numbers.start, min(self.numbers.stop, every), self.numbers.step))
+        counts = [len(known[path][1]) for path in files if path in known]
+        total = sum(counts) + (len(files) - len(counts)) * (counts[-1] if counts else 1)
+        return len(range(self.numbers.start, min(self.numbers.stop, total), self.numbers.step))
 
     def contacts_of(self, frame: Frame, family: Family) -> Snapshot | None:
         """
-        The contacts of a frame in a family of contact files; None if there are none.
+        Find the contacts of a frame in a family of contact files; None if there are none.
 
-        Steps inside the files decide, or times if there are no steps; where a file has none, the
-        number in its name does. A single contact file that is named for a single grain file needs
-        no number.
+        Grains and contacts are matched by the steps inside the files, or by times if there are no
+        steps, or by the numbers in the names of the files. If the user names a single contact file
+        for a single grain file, it needs no number.
 
         Parameters
         ----------
         frame : Frame
-            One of this series.
+            A frame of this series.
         family : Family
-            One of ``contacts``.
+            A family of ``contacts``.
 
         Returns
         -------
@@ -292,12 +293,12 @@ class Series:
 
     def beside(self, path: Path) -> list[Path]:
         """
-        The files that are read together with a file of grains: its cell, or dumps that it lists.
+        The files that are read together with a grain file: companions, its cell, dumps it lists.
 
         Parameters
         ----------
         path : Path
-            A file of grains.
+            A grain file.
 
         Returns
         -------
@@ -305,28 +306,28 @@ class Series:
         """
         dumps: list[Path] = []
         if self.grains.kind == "index" and self.grains.reader is not None:
-            # a missing dump was reported when its frame was read
+            # a missing dump is reported when its frame is read
             with suppress(ReadError):
-                listed = [(one.path, *one.parts) for one in self.grains.reader.snapshots(path)]
+                listed = [(dump.path, *dump.parts) for dump in self.grains.reader.snapshots(path)]
                 dumps = [file for file in dict.fromkeys(chain(*listed)) if file.is_file()]
         companions = [companion_file(path, kind) for kind in ("frame", "columns")]
-        found = [*dumps, *(file for file in companions if file.is_file())]
+        files = [*dumps, *(file for file in companions if file.is_file())]
         ask = getattr(self.grains.reader, "beside", None)
         if ask is not None and self.cells is None and self.options.cell is None:
-            found += [file for dump in dumps or [path] for file in ask(dump)]
-        return found
+            files += [file for dump in dumps or [path] for file in ask(dump)]
+        return files
 
     def files(self, number: int = ENDLESS, known: Container[Path] = ()) -> Iterator[Path]:
         """
-        The files of the frames up to one, and what is read with them.
+        The files of all frames up to a given one, and the files that are read with them.
 
         Parameters
         ----------
         number : int, optional
-            The last frame, in the whole series; all frames up to it have been looked for, as one
-            file may hold many. By default every file, also those of contacts without grains.
+            The last frame, in the whole series; the files up to it must have been searched for
+            frames. By default all files are given, even contact files without grains.
         known : container of Path, optional
-            Files that are left out, with what is read with them.
+            Files to leave out, with the files that are read with them.
 
         Yields
         ------
@@ -334,39 +335,39 @@ class Series:
         """
         if self.cells is not None:
             yield self.cells.path
-        last, met = -1, 0
+        last, count = -1, 0
         for step, path in self.grains.files.items():
-            if met > number:
+            if count > number:
                 break
             last = max(last, ENDLESS if step is None else step)
             if path not in known:
                 yield path
                 yield from self.beside(path)
-            met += len(self.known.snapshots[path][1]) if path in self.known.snapshots else 1
-        for step, path in ((s, p) for one in self.contacts for s, p in one.files.items()):
+            count += len(self.known.snapshots[path][1]) if path in self.known.snapshots else 1
+        for step, path in ((s, p) for family in self.contacts for s, p in family.files.items()):
             if (step is None or step <= last or number == ENDLESS) and path not in known:
                 yield path
 
 
 def _of_moment(snapshots: Sequence[Snapshot], grains: Snapshot, sure: bool) -> Snapshot | None:
     """
-    The snapshot of contacts at the step of some grains, or at their time where there are no steps.
+    The snapshot of contacts at the step of the grains, or at their time if there are no steps.
 
-    A single snapshot needs neither if it is ``sure`` by the names that the files belong together.
+    A single snapshot needs neither if the names make it ``sure`` that the files belong together.
     """
-    timed = [(one.time, one) for one in snapshots if one.step is None and one.time is not None]
+    timed = [(s.time, s) for s in snapshots if s.step is None and s.time is not None]
     if grains.step is None and grains.time is not None and timed:
         wanted = grains.time
         time, nearest = min(timed, key=lambda pair: abs(pair[0] - wanted))
         return nearest if abs(time - wanted) <= ROUNDING * abs(wanted) else None
     if len(snapshots) == 1 and None in (snapshots[0].step, grains.step):
         return snapshots[0] if sure else None
-    same = [one for one in snapshots if one.step is not None and one.step == grains.step]
+    same = [s for s in snapshots if s.step is not None and s.step == grains.step]
     return same[0] if same else None
 
 
 def other_space(found: Space, decided: Space) -> str:
-    """What is said of a frame that lies in another space than its series."""
+    """The message about a frame that lies in another plane or space than its series."""
     return (
         f"all its centres lie in {found}, but the first frame that has grains lies in {decided}: "
         f"the frames of a series are all discs in one plane, or all spheres"

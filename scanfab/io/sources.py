@@ -1,4 +1,4 @@
-"""From folders and files, as users name them, to series of frames."""
+"""Make series of frames from the folders and files that users name."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from scanfab.io.reader import FileKind, ReadOptions, why_no_table
 from scanfab.io.series import ContactsFrom, Series
 from scanfab.packing.packing import Packing
 
-READING = tuple(one.name for one in READING_OPTIONS)
-"""The options of :func:`read_series`, by which commands and manifests know them too."""
-# how a fabric table begins, in whatever format
+READING = tuple(option.name for option in READING_OPTIONS)
+"""The names of the options of :func:`read_series`, also used by commands and manifests."""
+# words near the beginning of every fabric table, in any format
 TABLE_WORDS = (b"source", b"frame", b"variant", b"alpha_vs")
 GRAINS: tuple[FileKind, ...] = ("grains", "index", "start", "points")
-"""Kinds of files that may be frames; a kind counts only where there is none of the kinds before."""
+"""Kinds of files that may be frames, best first; a source uses only the first kind it has."""
 HOLDS: dict[FileKind, str] = {
     "grains": "grains",
     "index": "grains",
     "start": "grains that a simulation starts from",
-    "points": "points without a radius (give it by `radius`)",
+    "points": "points without a radius (give it with `radius`)",
     "contacts": "contacts",
     "cell": "a cell",
     "other": "neither grains nor contacts",
@@ -45,9 +45,9 @@ def read(path: PathLike, *, frame: int = 0, **options: Any) -> Packing:
     Parameters
     ----------
     path : path
-        A particle file; its contact file beside it is read too, as by :func:`read_series`.
+        A particle file; a contact file in its folder is read too, as by :func:`read_series`.
     frame : int, optional
-        Which snapshot, if the file holds several; negative from the end.
+        Number of the frame from 0, if the file holds several; negative numbers count from the end.
     **options
         See :func:`read_series`.
 
@@ -96,38 +96,40 @@ def read_series(
     Parameters
     ----------
     source : path or sequence of paths
-        A folder with one series, or its files; globs too. A file that is named twice is read once,
-        with a warning. Contact files beside single grain files are taken if their names say by a
-        step, or by how they begin, that they are theirs.
+        A folder with one series, or its files, or globs. A file that is named twice is read once,
+        with a warning. Contact files in the folders of single grain files are read if the step or
+        the first words of their names match.
     format : str, optional
-        Name of the reader; by content if not given.
+        Name of the reader; by default the content of the file decides.
     contacts : str or path, optional
-        ``auto``: from contact files if there are any, else by geometry; ``file``; ``geometric``; or
-        a file, folder or glob, matched by step.
+        Source of the contacts. ``auto``: contact files if there are any, else geometry; ``file``:
+        contact files; ``geometric``: geometry; or a file, folder or glob, matched by step.
     columns : dict, optional
-        Standard names to the file's own, such as ``{"radius": "c_rad"}``; of tables without names
-        their numbers from 1, such as ``{"x": 1, "y": 2, "z": 3, "diameter": 4}``.
+        Standard names to names in the file, for instance ``{"radius": "c_rad"}``. In tables without
+        names the numbers of columns from 1: ``{"x": 1, "y": 2, "z": 3, "diameter": 4}``.
     contact_columns : str, optional
-        Keywords of LIGGGHTS' ``compute pair/gran/local``, or LAMMPS' columns by their meaning:
-        ``"id1=c_ids[1],id2=c_ids[2]"``, which serves tables too.
+        Meaning of the columns of a contact file: keywords of LIGGGHTS' ``compute pair/gran/local``,
+        or names of columns, ``"id1=c_ids[1],id2=c_ids[2]"``, which also work for tables.
     skip : int, optional
-        Lines before the table, of tables of text.
+        Number of lines before a text table.
     radius : float, optional
-        Radius for dumps without one, dump's length unit.
+        Radius of all grains, for dumps without radii; dump's length unit.
     cell : tuple of float or path, optional
-        LX LY LZ or LX LY LZ XY XZ YZ, for formats that do not carry it; or a CSV file with the cell
-        of each frame: columns ``step`` or ``frame``, ``lx ly lz``, and ``xy xz yz`` if tilted.
+        LX LY LZ or LX LY LZ XY XZ YZ in the dump's length unit, for formats without a cell; or a
+        CSV file with the cell of each frame: columns ``step`` or ``frame``, ``lx ly lz``, and
+        ``xy xz yz`` if the cell is tilted.
     periodic : str, optional
-        Letters out of xyz.
+        The periodic directions, some of the letters x, y and z.
     bodies : str, optional
-        Column that says which clump a sphere belongs to: whole numbers, negative for a sphere that
-        is a grain of its own. By default ``id_multisphere``, ``clumpId``, ``clump_id`` or
-        ``clump``, if there is one; ``id`` makes each sphere a grain.
+        Column that numbers the clump of each sphere: whole numbers, negative for a sphere that is a
+        grain of its own. By default ``id_multisphere``, ``clumpId``, ``clump_id`` or ``clump``, if
+        there is one; ``id`` makes each sphere a grain.
     dim : {"auto", 2, 3}, optional
-        2: discs, whose centres share one coordinate. ``auto``: 2 if those of the first frame that
-        has any do so, at least ten, and share no second one; with a note. One for all frames.
+        2: discs, whose centres share one coordinate; 3: spheres. ``auto``: 2, with a note, if the
+        first frame with grains has at least ten grains whose centres share exactly one coordinate.
+        The choice holds for all frames.
     max_unpacked : float, optional
-        How many times its compressed size a file may grow to, 1000 by default.
+        How many times its compressed size a file may grow to; 1000 by default.
 
     Returns
     -------
@@ -140,7 +142,7 @@ def read_series(
     ReadError
         If there is no series, or more than one.
     SettingsError, TypeError
-        If an option has a value that cannot be used, or if there is no such option.
+        If an option has an invalid value, or if there is no such option.
 
     Examples
     --------
@@ -152,13 +154,13 @@ def read_series(
     """
     arguments = locals()
     reading = {name: arguments[name] for name in READING}
-    told = take_reading(dict(reading))
-    contacts, dim, frame_cell = told.pop("contacts"), told.pop("dim"), told["cell"]
+    values = take_reading(dict(reading))
+    contacts, dim, frame_cell = values.pop("contacts"), values.pop("dim"), values["cell"]
     cells = None
     if isinstance(frame_cell, str | os.PathLike):
         cells = FrameFile(Path(frame_cell), ["lx", "ly", "lz"], ["xy", "xz", "yz"], positive=3)
-    told |= {"columns": told["columns"] or {}, "cell": None if cells else frame_cell}
-    options = ReadOptions(**told)
+    values |= {"columns": values["columns"] or {}, "cell": None if cells else frame_cell}
+    options = ReadOptions(**values)
     if isinstance(source, str | os.PathLike) or not isinstance(source, Iterable):
         source = [source]
     given = list(source)
@@ -171,7 +173,7 @@ def read_series(
 
 
 def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
-    """The series of a command line: one for each folder, and one for all single files together."""
+    """Open the series of a command line: one for each folder, and one for all single files."""
     groups: dict[PathLike, list[PathLike]] = defaultdict(list)
     for source in named_once(sources):
         groups[source if Path(source).is_dir() else ""].append(source)
@@ -179,8 +181,8 @@ def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
 
 
 def _series(given: Sequence[PathLike], contacts: PathLike, options: ReadOptions) -> Series:
-    """The series of what is named: its files sorted out."""
-    paths = [Path(one) for one in given]
+    """Sort the files of the sources, and make a series of their grains and contacts."""
+    paths = [Path(path) for path in given]
     files = [file for path in paths for file in sorting.files_of(path)]
     around = [] if any(path.is_dir() for path in paths) else sorting.files_around(files)
     groups = sorting.group_by_name(files, around)
@@ -205,7 +207,7 @@ def _series(given: Sequence[PathLike], contacts: PathLike, options: ReadOptions)
 def _choose_grains(
     paths: Sequence[Path], families: Sequence[Family], options: ReadOptions
 ) -> Family:
-    """The one family of grain files among all; ReadError if there are none, or several."""
+    """The only family of grain files; ReadError if there is none, or more than one."""
     where = ", ".join(map(str, paths[:3])) + (", ..." if len(paths) > 3 else "")
     for kind in GRAINS if options.radius is None else ("points", *GRAINS):
         grains = [family for family in families if family.kind == kind]
@@ -213,8 +215,8 @@ def _choose_grains(
             return grains[0]
         if grains:
             ends = dict.fromkeys(GRAINS, "") | {"points": "; it has no radius: `radius=L`"}
-            every = [one for kind in GRAINS for one in families if one.kind == kind]
-            listed = "".join(f"\n  {one.pattern}{ends[one.kind]}" for one in every)
+            candidates = [family for kind in GRAINS for family in families if family.kind == kind]
+            listed = "".join(f"\n  {family.pattern}{ends[family.kind]}" for family in candidates)
             raise ReadError(f"{where}: several series of grains: choose one of{listed}")
     raise _no_grains(where, paths, families, options)
 
@@ -226,45 +228,45 @@ def _no_grains(
     problem = next((family.problem for family in families if family.problem), None)
     if problem is not None:
         return ReadError(problem)
-    known = [one for one in families if one.reader is not None]
-    if known:
-        held = ", ".join(f"{HOLDS[one.kind]} ({Path(one.pattern).name})" for one in known[:5])
+    readable = [family for family in families if family.reader is not None]
+    if readable:
+        held = ", ".join(f"{HOLDS[f.kind]} ({Path(f.pattern).name})" for f in readable[:5])
         return ReadError(f"{where}: no grains: expected points with a radius, found {held}")
     folders = [path for path in paths if path.is_dir()]
-    below = [f"{one}" for path in folders for one in sorted(path.glob("[!.]*")) if one.is_dir()]
+    below = [f"{sub}" for path in folders for sub in sorted(path.glob("[!.]*")) if sub.is_dir()]
     if below:
-        return ReadError(f"{where}: the folder holds no dumps, but folders: name {some(below)}")
+        return ReadError(f"{where}: the folder holds no dumps, only folders: name {some(below)}")
     if not families:
         return ReadError(f"{where}: the folder holds no files")
     for table in set(paths).difference(folders):
         with suppress(OSError, ReadError):
             data = table.read_bytes() if table.suffix == ".parquet" else first_bytes(table, 1 << 14)
             if all(word in data for word in TABLE_WORDS):
-                advice = "scanfab compare or scanfab report take it"
+                advice = "scanfab compare and scanfab report read it"
                 return ReadError(f"{table}: this is a fabric table, not a dump: {advice}")
     reason = why_no_table(paths[0], options) if len(paths) == 1 and not folders else ""
     return UnknownFormatError(
-        f"{where}: no reader knows the format; scanfab formats lists those that exist"
-        + (f"; as a table it cannot be read: {reason}" if reason else "")
+        f"{where}: no reader knows this format; the command scanfab formats lists the known ones"
+        + (f"; it cannot be read as a table either: {reason}" if reason else "")
     )
 
 
 def _tell_skipped(families: Sequence[Family]) -> None:
-    """One note on the files that do not enter, and a warning on those that are damaged."""
+    """Write one note about skipped files, and a warning about damaged files."""
     skipped: dict[str, list[str]] = defaultdict(list)
     damaged: dict[str, list[str]] = defaultdict(list)
-    for one in families:
-        name = Path(one.pattern).name
-        if one.problem is not None:
-            damaged[one.problem.removeprefix(f"{one.largest}").lstrip(":, ")].append(name)
-        elif one.kind != "cell":
-            held = "results, or something else in a table" if one.is_table else HOLDS[one.kind]
+    for family in families:
+        name = Path(family.pattern).name
+        if family.problem is not None:
+            damaged[family.problem.removeprefix(f"{family.largest}").lstrip(":, ")].append(name)
+        elif family.kind != "cell":
+            held = "results or other tables" if family.is_table else HOLDS[family.kind]
             skipped[held].append(name)
-    told = []
+    parts = []
     for held, names in skipped.items():
-        told.append(f"{some(names)}: {'it holds' if len(names) == 1 else 'they hold'} {held}")
-    if told:
-        note(f"skipped {'; '.join(told)}")
+        parts.append(f"{some(names)}: {'it holds' if len(names) == 1 else 'they hold'} {held}")
+    if parts:
+        note(f"skipped {'; '.join(parts)}")
     for problem, names in damaged.items():
         warn(f"skipped {some(names)}: {problem}")
 
@@ -276,7 +278,7 @@ def _choose_contacts(
     contacts: PathLike,
     options: ReadOptions,
 ) -> tuple[Sequence[Family], ContactsFrom]:
-    """The families of contact files, and where the contacts of the series come from."""
+    """The families of contact files, and how they were chosen."""
     if contacts == "geometric":
         return [], "geometric"
     if contacts not in ("auto", "file"):
@@ -293,32 +295,34 @@ def _choose_contacts(
         return own, "path" if own else "grains"
     if own:
         return own, "beside" if is_beside else "auto"
-    # a file that cannot be read is an error if, by name and number, it may be the contact file
+    # an unreadable file becomes an error if its name and number fit the contact file of the grains
     damaged = [
-        replace(one, kind="contacts", files=dict.fromkeys(grains.files, one.largest), clash=None)
-        for one in families
-        if one.problem is not None
-        and len(one.files) == len(grains.files)
-        and sorting.are_tied(grains, one)
+        replace(
+            family, kind="contacts", files=dict.fromkeys(grains.files, family.largest), clash=None
+        )
+        for family in families
+        if family.problem is not None
+        and len(family.files) == len(grains.files)
+        and sorting.are_tied(grains, family)
     ]
     if options.contact_columns and not (damaged or in_grains):
-        missing = "there is no file of contacts with such columns"
-        warn(f"`contact_columns` are named, but {missing}: contacts are found by geometry")
+        missing = "no contact file has these columns"
+        warn(f"`contact_columns` is given, but {missing}: contacts are found by geometry")
     return damaged, "beside"
 
 
 def _named_contacts(contacts: PathLike, options: ReadOptions) -> list[Family]:
-    """Contact files from a file, a folder or a glob."""
-    files = [file for one in sorting.expanded(contacts) for file in sorting.files_of(Path(one))]
+    """The families of contact files that a file, folder or glob names."""
+    files = [file for path in sorting.expanded(contacts) for file in sorting.files_of(Path(path))]
     families = sorting.sort_into_families(files, options)
-    found = [family for family in families if family.kind == "contacts"]
-    if not found:
+    contact_families = [family for family in families if family.kind == "contacts"]
+    if not contact_families:
         problem = next((family.problem for family in families if family.problem), None)
-        held = " and ".join(sorted({HOLDS[one.kind] for one in families})) or "no files"
+        held = " and ".join(sorted({HOLDS[family.kind] for family in families})) or "no files"
         raise ReadError(problem or f"{contacts}: expected contacts, found {held}")
-    return found
+    return contact_families
 
 
 def as_text(name: str) -> str:
-    """A name as a table can hold it: those of files need be no text."""
+    """A file name as valid text for a table; bytes that are not UTF-8 are escaped."""
     return name.encode("utf-8", "backslashreplace").decode()

@@ -1,9 +1,9 @@
 """
-One table of text: polars makes columns of its rows, and a search by line finds what is wrong.
+Read the rows of a text table by polars; if that fails, check line by line to name the fault.
 
-A format reads its own header, says how the rows below it are written (:class:`Layout`) and asks
-:func:`read_rows` for the columns. Every number is the double nearest to its text, and whole numbers
-are exact.
+A format reads its own header, describes the rows below it (:class:`Layout`) and calls
+:func:`read_rows` for the columns. Every number becomes the nearest double, and whole numbers are
+exact.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ NUMBER = re.compile(
     r"\s*[-+]?(?:(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?|(?:nan|inf|infinity))\s*\Z",
     re.IGNORECASE,
 )
-# polars would decompress a text that begins with one of these
+# polars would try to decompress a text that begins with these bytes
 LIKE_COMPRESSED = (b"\x1f\x8b", b"x\x01", b"x^", b"x\x9c", b"x\xda", b"(\xb5")
-# how many times its size a text takes in memory: the text, its numbers, and the packing's columns
+# how many times its size a text needs in memory: the text, its numbers, the packing's columns
 IN_MEMORY = 6.0
-# bytes of a word or line that a message shows
+# most bytes of a word or line that a message quotes
 SHOWN = 80
-# in a process that was forked behind polars, the threads of polars are gone, and it would wait for
-# them without end: only the worker, a new process, can use it there
+# a process that was forked after polars was imported lacks the threads of polars, and polars would
+# wait for them forever; such a process lets the worker, a new process, read its tables
 _forked_behind_polars: list[bool] = []
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(
@@ -45,7 +45,7 @@ if hasattr(os, "register_at_fork"):
 
 
 class CutError(ReadError):
-    """A frame ends before all that its header promises, as if the file was cut."""
+    """A frame ends before the end that its header announces, as if the file was truncated."""
 
 
 class Layout(NamedTuple):
@@ -56,18 +56,18 @@ class Layout(NamedTuple):
     """
 
     names: tuple[str, ...]
-    """Of all columns; of two with the same name the first is returned."""
+    """The names of all columns; of two columns with the same name, the first is returned."""
     separator: str = " "
-    """One character. A blank stands for any run of blanks and tabs, also around the row."""
+    """One character. A blank means any run of blanks and tabs, also around the row."""
     line: int = 1
-    """Number of the first row's line, counted from the start of the snapshot."""
+    """Line number of the first row, counted from the start of the snapshot."""
     whole: Collection[str] = ()
-    """Columns of whole numbers: int64. Float64 if some are written as decimals (``1e5``, ``7.0``),
-    which :func:`~scanfab.io.columns.whole_numbers` then checks."""
+    """Columns of whole numbers, as int64; as float64 if some are written as decimals (``1e5``,
+    ``7.0``), which :func:`~scanfab.io.columns.whole_numbers` then checks."""
     text: Collection[str] = ()
     """Columns of words."""
     optional: Collection[str] = ()
-    """Columns that may have gaps (NaN) or, if a word in them is no number, are read as words."""
+    """Columns that may have gaps (NaN); if a word is not a number, the column is read as words."""
     comma: bool = False
     """Whether the decimal sign is a comma."""
 
@@ -76,35 +76,35 @@ def read_rows(
     snapshot: Snapshot, rows: bytes, layout: Layout, *, count: int | None = None, what: str = "rows"
 ) -> Columns:
     """
-    The columns of a table of text, by name.
+    Read the columns of a text table.
 
     Parameters
     ----------
     snapshot : Snapshot
         Where the rows come from, for messages (``Snapshot(path)`` for a whole file).
     rows : bytes
-        The rows alone: no header, no comments, no other section. Empty lines around them are left
-        out, empty lines between them are an error. A format that allows comments removes them
-        first (``re.sub(rb"[ \\t]*#[^\\n]*", b"", rows)``), and one with brackets replaces these by
-        blanks (YAML: ``rows.replace(b"- [", b"").translate(None, b"],")``); line numbers stay.
-        Fortran's ``1.5D-3`` is read, too, but faster after ``rows.replace(b"D", b"E")``.
+        The rows alone, without header, comments and other sections. Empty lines around the rows are
+        ignored, empty lines between rows are an error. A format with comments removes them first
+        (``re.sub(rb"[ \\t]*#[^\\n]*", b"", rows)``), and a format with brackets removes these
+        (YAML: ``rows.replace(b"- [", b"").translate(None, b"],")``), so that line numbers stay.
+        Fortran's ``1.5D-3`` is read too, but faster after ``rows.replace(b"D", b"E")``.
     layout : Layout
-        How they are written.
+        How the rows are written.
     count : int, optional
-        How many rows the header says there are.
+        The number of rows that the header states.
     what : str, optional
-        What stands in the rows, for messages.
+        What the rows are, for messages: ``"atoms"``.
 
     Returns
     -------
     dict of str to ndarray
-        A column each, shape (N,): float64, int64 or str.
+        The columns by name, shape (N,): float64, int64 or str.
 
     Raises
     ------
     ReadError
         If there are not ``count`` rows, a row has more or fewer words than there are names, or a
-        word is no number; names the line. :class:`CutError` if the end of the rows is missing.
+        word is not a number. The message names the line. :class:`CutError` if the end is missing.
 
     Warns
     -----
@@ -121,7 +121,7 @@ def read_rows(
     >>> found["id"].tolist(), found["r"].tolist()
     ([1, 2], [0.5, 0.25])
     """
-    # tabs may be separators, and empty words stand between them
+    # if tabs separate words, tabs at the edges stand for empty words: keep them
     edge = None if layout.separator == " " else b" \n"
     rows = rows.replace(b"\r\n", b"\n")
     body = rows.lstrip(edge)
@@ -130,12 +130,13 @@ def read_rows(
     # as a rule there is nothing to strip, and no copy to be made
     is_clean = body.endswith(b"\n") and not body[-2:-1].isspace()
     rows = body if is_clean or not body else body.rstrip(edge) + b"\n"
-    found = rows.count(b"\n")
-    if count is not None and found != count:
+    rows_found = rows.count(b"\n")
+    if count is not None and rows_found != count:
         step = "" if snapshot.step is None else f", step {snapshot.step}"
-        told = f"the header counts {count} {what}, found {found}: the file is incomplete or damaged"
-        error = CutError if found < count or not has_end else ReadError
-        raise error(f"{snapshot.path}{step}: {told}")
+        problem = f"the header counts {count} {what}, found {rows_found}: "
+        problem += "the file is incomplete or damaged"
+        error = CutError if rows_found < count or not has_end else ReadError
+        raise error(f"{snapshot.path}{step}: {problem}")
     if not rows:
         kinds = {name: np.int64 if name in layout.whole else np.float64 for name in layout.names}
         return {name: np.zeros(0, kind) for name, kind in kinds.items()}
@@ -146,28 +147,28 @@ def read_rows(
     if columns is None:
         raise (ReadError if has_end else CutError)(_bad_line(snapshot, rows, layout))
     if not has_end:
-        told = f"{snapshot.path}: the last line has no end"
+        problem = f"{snapshot.path}: the last line has no end"
         if grows():
-            raise CutError(f"{told}: the file is still being written")
-        warn(f"{told}: if the file was cut, rows or digits may be missing")
+            raise CutError(f"{problem}: the file is still being written")
+        warn(f"{problem}: if the file was cut, rows or digits may be missing")
     return columns
 
 
 def columns_of(_path: str, rows: bytes, layout: Layout) -> Columns | None:
-    """The columns of sound rows; None if a row is not as it should be. Runs in the worker, too."""
-    # polars would skip a carriage return that ends no line, and decompress what looks compressed
+    """The columns of the rows; None if a row is wrong. May run in the worker process."""
+    # polars would skip a carriage return inside a line, and decompress bytes that look compressed
     if b"\r" in rows or rows.startswith(LIKE_COMPRESSED):
         return None
     rows = _regular(rows, layout)
-    # beside a decimal comma a point may be a sign of thousands, which only the words show
-    found = None if layout.comma else _parsed(rows, layout, by_words=False)
-    if found is not None:
-        return found
+    # with decimal commas, a point may separate thousands: only a check of the words finds that
+    columns = None if layout.comma else _parsed(rows, layout, by_words=False)
+    if columns is not None:
+        return columns
     return _parsed(_stripped(rows) if layout.separator == " " else rows, layout, by_words=True)
 
 
 def _regular(rows: bytes, layout: Layout) -> bytes:
-    """The rows with one separator between words, and none around a row if the first has any."""
+    """The rows with single separators between words, and without separators around rows."""
     first = rows[: rows.find(b"\n")]
     if layout.separator != " ":
         words = words_of(first.decode("utf-8", "replace"), layout.separator)
@@ -178,12 +179,12 @@ def _regular(rows: bytes, layout: Layout) -> bytes:
         kept: npt.NDArray[np.bool_] = text != ord(" ")
         kept[1:] |= kept[:-1].copy()
         return _stripped(text[kept].tobytes())
-    # only the first row is checked for blanks around it: to check all would take too long
+    # blanks around the first row show whether rows have any; checking all rows would be slow
     return rows if first == first.strip() else _stripped(rows)
 
 
 def _stripped(rows: bytes) -> bytes:
-    """The rows without the single blank that may stand before or behind each."""
+    """The rows without the single blank before or after each."""
     return rows.replace(b" \n", b"\n").replace(b"\n ", b"\n").lstrip(b" ")
 
 
@@ -191,12 +192,12 @@ def _parsed(rows: bytes, layout: Layout, by_words: bool) -> Columns | None:
     """
     The columns as polars reads them; None unless every row has all its words.
 
-    If ``by_words``, polars reads words, of which numbers are made afterwards: by more spellings.
+    With ``by_words`` polars reads words, and `_numbers` converts them: it knows more spellings.
     """
     import polars
 
-    known: dict[str, Any] = dict.fromkeys(layout.whole, polars.Int64)
-    known |= dict.fromkeys(layout.names if by_words else layout.text, polars.String)
+    kinds: dict[str, Any] = dict.fromkeys(layout.whole, polars.Int64)
+    kinds |= dict.fromkeys(layout.names if by_words else layout.text, polars.String)
     places = enumerate(layout.names)
     try:
         frame = polars.read_csv(
@@ -204,32 +205,32 @@ def _parsed(rows: bytes, layout: Layout, by_words: bool) -> Columns | None:
             has_header=False,
             separator=layout.separator,
             quote_char='"' if layout.separator != " " and b'"' in rows else None,
-            schema={f"{place}": known.get(name, polars.Float64) for place, name in places},
+            schema={f"{place}": kinds.get(name, polars.Float64) for place, name in places},
             encoding="utf8-lossy",
         )
     except (polars.exceptions.PolarsError, OSError):
         return None
     if any(frame.null_count().row(0)):
-        # a word that lacks looks like one that is empty
+        # polars reads a missing word as an empty word: count the separators
         bare = re.sub(rb'"[^"\n]*"', b"", rows) if b'"' in rows else rows
         signs = bare.count(layout.separator.encode())
         if layout.separator == " " or signs != frame.height * (frame.width - 1):
             return None
-    found: Columns = {}
+    columns: Columns = {}
     for column, name in zip(frame, layout.names, strict=True):
         if by_words and name not in layout.text:
             column = _numbers(column, layout.comma, name in layout.whole)
         numeric = column.dtype.is_numeric()
         if name not in (*layout.text, *layout.optional) and (column.has_nulls() or not numeric):
             return None
-        if name not in found:
+        if name not in columns:
             texts = None if numeric else column.fill_null("").str.strip_chars().to_list()
-            found[name] = column.to_numpy() if texts is None else np.array(texts, dtype=np.str_)
-    return found
+            columns[name] = column.to_numpy() if texts is None else np.array(texts, dtype=np.str_)
+    return columns
 
 
 def _numbers(words: Any, comma: bool, is_whole: bool) -> Any:
-    """A column of words as numbers, with gaps; as it is if a word is no number."""
+    """A column of words as numbers, with gaps; unchanged if a word is not a number."""
     import polars
 
     words = words.str.strip_chars().replace("", None)
@@ -245,7 +246,7 @@ def _numbers(words: Any, comma: bool, is_whole: bool) -> Any:
 
 
 def _bad_line(snapshot: Snapshot, rows: bytes, layout: Layout) -> str:
-    """What is wrong with the first row that is not as it should be: each word is looked at."""
+    """The message about the first wrong row, found by checking every word."""
     width, above = len(layout.names), 0
     with open(plain(snapshot.path), "rb") if snapshot.start else BytesIO() as stream:
         while stream.tell() < snapshot.start and stream.readline():
@@ -267,27 +268,27 @@ def _bad_line(snapshot: Snapshot, rows: bytes, layout: Layout) -> str:
 
 
 def words_of(line: str, separator: str) -> list[str]:
-    """The words of a row; between blanks none is empty, beside others quotation marks count."""
+    """The words of a row; with separators other than blanks, words may be empty or in quotes."""
     if separator == " ":
         return line.split()
     try:
         return next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
-    except csv.Error:  # a word that is longer than any name or number
+    except csv.Error:  # a word is longer than csv allows
         return line.split(separator)
 
 
 def is_number(word: str, comma: bool = False) -> bool:
-    """Whether a word is a number; not-a-number and Fortran's D exponents are among them."""
+    """Whether a word is a number, including nan, inf and Fortran's D exponents."""
     return NUMBER.match(word.replace(",", ".", 1) if comma else word) is not None
 
 
 def spelt(text: bytes) -> str:
-    """A word or a line as messages show it."""
+    """A word or line as messages quote it."""
     return repr(text[:SHOWN].decode("utf-8", "replace").strip())
 
 
 def text_of(snapshot: Snapshot) -> bytes:
-    """The bytes of a snapshot (or a whole file) without a byte order mark; checks their size."""
+    """The bytes of a snapshot or file, without a byte order mark; ReadError if memory lacks."""
     path, file = snapshot.path, plain(snapshot.path)
     stop = file.stat().st_size if snapshot.stop is None else snapshot.stop
     check_memory(path, IN_MEMORY * (stop - snapshot.start))

@@ -1,5 +1,5 @@
 """
-What a writer plugin offers and answers, the writers that are installed, and a packing as arrays.
+The interface of writers, the installed writers, and the arrays of a packing for writers.
 
 All writers take the arrays from here, so that readers find the same names in every format.
 """
@@ -26,25 +26,25 @@ from scanfab.packing.contacts import ContactList
 from scanfab.packing.packing import Packing
 
 GROUP = "scanfab.writers"
-# columns of a source may not have these names, in any spelling
+# names that a column of the source must not have, in any spelling
 TAKEN = {"id", "x", "y", "z", "radius", "position"}
 
 
 class Left(NamedTuple):
-    """What a file of grains does not hold of its packing: it is written beside the file."""
+    """The data of a packing that the grain file does not hold; companion files get them."""
 
     contacts: bool = False
-    """Whether pairs, images and forces go into ``STEM.contacts.csv``."""
+    """Whether contacts (pairs, images and forces) go into ``STEM.contacts.csv``."""
     frame: bool = False
     """Whether cell, step and time go into ``STEM.frame.csv``."""
     columns: tuple[str, ...] = ()
-    """Columns of the grains for ``STEM.columns.csv``, by the names of :func:`more_columns`."""
+    """Columns that go into ``STEM.columns.csv``, by the names of :func:`more_columns`."""
     notes: tuple[str, ...] = ()
-    """What is lost or changed, in sentences."""
+    """Sentences that say what is lost or changed."""
     no_step: bool = True
     """
-    Whether the file cannot say that the packing has no step. ``STEM.frame.csv`` says it then, if
-    the name of the file has a number that would be taken for a step.
+    Whether the format cannot state that a packing has no step. If the file name then has a number,
+    which would be taken for a step, ``STEM.frame.csv`` states it.
     """
 
 
@@ -52,19 +52,19 @@ class Writer(Protocol):
     """
     A writer plugin: an object registered under the entry point group ``scanfab.writers``.
 
-    An object may be a reader as well. One that needs a package which scanfab does not bring says so
-    with an attribute ``requires``: the name to import and the words behind ``pip install``.
+    An object may be both reader and writer. If it needs a package that scanfab does not install, it
+    has an attribute ``requires``: the name to import, and the words that follow ``pip install``.
     """
 
     name: str
-    """As in ``--to NAME``."""
+    """The NAME in ``--to NAME``."""
     description: str
     """One line for ``scanfab formats``."""
     extensions: tuple[str, ...]
-    """File name extensions, the first for the files of a series."""
+    """File name extensions; the files of a series get the first."""
 
     def write(self, packing: Packing, path: Path) -> Left:
-        """Write one frame to a file; OSError if the disk does not take it."""
+        """Write one frame to a file; OSError if the file cannot be written."""
         ...
 
 
@@ -81,37 +81,37 @@ def writer_named(name: str) -> Writer:
 
 
 def writer_for(path: Path) -> Writer:
-    """The writer of a suffix; UnknownFormatError lists those that exist."""
-    every = {name: offer.plugin.extensions for name, offer in installed_writers().items()}
-    for name, endings in every.items():
+    """The writer for the suffix of a path; UnknownFormatError lists the known suffixes."""
+    endings_of = {name: offer.plugin.extensions for name, offer in installed_writers().items()}
+    for name, endings in endings_of.items():
         if path.name.lower().endswith(endings):
             return writer_named(name)
-    known = " ".join(dict.fromkeys(chain(*every.values())))
+    known = " ".join(dict.fromkeys(chain(*endings_of.values())))
     expected = f"expected one of {known}, or the name of a format as `to`"
     raise UnknownFormatError(f"{path}: no format has this suffix: {expected}")
 
 
 class Arrays(NamedTuple):
-    """A packing as arrays, under the names by which readers know them; positions are not here."""
+    """The arrays of a packing except positions, under the names that readers look for."""
 
     grains: Columns
-    """``id``, ``radius``, and the numbers of bodies and of contacts with walls if there are any."""
+    """``id``, ``radius``, and, if there are any, body numbers and numbers of wall contacts."""
     own: Columns
-    """The other columns of the source, as numbers and texts; (N, K) arrays stay what they are."""
+    """The other columns of the source, numbers and texts, shape (N,) or (N, K)."""
     notes: list[str]
-    """Which columns of the source got another name or were left out."""
+    """Sentences about columns of the source that were renamed or left out."""
     frame: dict[str, Any]
-    """What is known of ``step`` and ``time``, and the cell: ``cell``, ``origin``, ``periodic``."""
+    """``step``, ``time``, and of the cell ``cell``, ``origin``, ``periodic``, if they are known."""
     contacts: Columns
-    """``id1``, ``id2``, ``image``, and ``force`` on the second grain or else ``force_n``."""
+    """``id1``, ``id2``, ``image``, and ``force`` on the second grain, or else ``force_n``."""
 
 
 def as_arrays(packing: Packing) -> Arrays:
-    """The arrays of a packing that is to be written."""
+    """The arrays of a packing, for a writer."""
     bodies, cell, listed = packing.bodies, packing.cell, packing.contacts
     numbers = None if bodies is None else bodies.number
     if bodies is None and first_of(CLUMP_COLUMNS, packing.columns) is not None:
-        # otherwise a reader would join the spheres that another column numbers
+        # or a reader would join spheres by another column that usually numbers clumps
         numbers = np.full(len(packing), -1)
     walls = packing.wall_contacts if packing.wall_contacts.any() else None
     grains = {"id": packing.id, "radius": packing.radius, BODIES: numbers, WALLS: walls}
@@ -132,11 +132,11 @@ def _known(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def _own_columns(packing: Packing) -> tuple[Columns, list[str]]:
     """
-    The columns of the source, and notes on those that were changed.
+    The columns of the source, and notes about changed columns.
 
-    A column that a reader would take for something else gets another name.
+    A column is renamed if a reader would mistake it for another quantity.
     """
-    found: Columns = {}
+    columns: Columns = {}
     notes: list[str] = []
     for name, values in packing.columns.items():
         if values.dtype.kind == "S":
@@ -153,16 +153,16 @@ def _own_columns(packing: Packing) -> tuple[Columns, list[str]]:
         free = name
         if is_size or plain in TAKEN or name in (BODIES, WALLS):
             free = f"{name}_of_dump"
-            while free in found or free in packing.columns:
+            while free in columns or free in packing.columns:
                 free += "_"
-            notes.append(f"the column {name} is called {free}: {name} is what grains are read from")
-        found[free] = values
-    return found, notes
+            notes.append(f"the column {name} is renamed to {free}: {name} has another meaning")
+        columns[free] = values
+    return columns, notes
 
 
 def flat(columns: Mapping[str, AnyArray]) -> Columns:
-    """Columns of one value for each grain: ``v_x v_y v_z`` for vectors, 0 and 1 for truths."""
-    found: Columns = {}
+    """Columns with one value per grain: vectors become ``v_x v_y v_z``, truth values 0 and 1."""
+    parts: Columns = {}
     for name, values in columns.items():
         table = values.astype(np.int64) if values.dtype.kind == "b" else values
         names = [name]
@@ -170,16 +170,16 @@ def flat(columns: Mapping[str, AnyArray]) -> Columns:
             table = table.reshape(len(table), int(np.prod(table.shape[1:])))
             axes = "xyz" if table.shape[1] == 3 else range(table.shape[1])
             names = [f"{name}_{axis}" for axis in axes]
-        found |= zip(names, np.atleast_2d(table.T), strict=True)
-    return found
+        parts |= zip(names, np.atleast_2d(table.T), strict=True)
+    return parts
 
 
 def table_columns(packing: Packing) -> tuple[Columns, Columns, list[str]]:
-    """The columns of a table that readers know, those of the source, and notes on the latter."""
+    """The standard columns of a table, those of the source, and notes about the latter."""
     arrays = as_arrays(packing)
     place = dict(zip("xyz", packing.position.T, strict=True))
     split = [
-        f"the column {name} stands as {', '.join(flat({name: values}))}"
+        f"the column {name} is split into {', '.join(flat({name: values}))}"
         for name, values in arrays.own.items()
         if values.ndim > 1
     ]
@@ -188,17 +188,17 @@ def table_columns(packing: Packing) -> tuple[Columns, Columns, list[str]]:
 
 def more_columns(packing: Packing) -> Columns:
     """
-    All that there is of the grains but id, position and radius, in columns of one value a grain.
+    The columns of the grains besides id, position and radius, with one value per grain.
 
     Parameters
     ----------
     packing : Packing
-        To be written.
+        The packing to be written.
 
     Returns
     -------
     dict of str to ndarray, shape (N,)
-        By names that a reader takes for what they are.
+        The columns, under names that no reader mistakes for another quantity.
     """
     known, own, _ = table_columns(packing)
     return {name: known[name] for name in known if name not in TAKEN} | own
@@ -207,7 +207,7 @@ def more_columns(packing: Packing) -> Columns:
 def csv_bytes(
     columns: Mapping[str, Any], separator: str = ",", *, with_names: bool = True
 ) -> bytes:
-    """A table as text, with all digits; texts are in quotes where need be if it has names."""
+    """A table as text, with all digits; a table with names puts texts into quotes if necessary."""
     import polars
 
     quotes: Any = "necessary" if with_names else "never"
@@ -217,19 +217,19 @@ def csv_bytes(
 
 
 def cell_of(path: Path, arrays: Mapping[str, Any]) -> Cell | None:
-    """The cell among the arrays of a frame; ReadError if it is none."""
+    """The cell in the arrays of a frame, or None; ReadError if the arrays are no valid cell."""
     if "cell" not in arrays:
         return None
     try:
         vectors, origin = (np.asarray(arrays[name], np.float64) for name in ("cell", "origin"))
-        x, y, z = (bool(one) for one in np.ravel(arrays["periodic"]))
+        x, y, z = (bool(repeats) for repeats in np.ravel(arrays["periodic"]))
         return Cell(vectors.reshape(3, 3), (x, y, z), origin.reshape(3))
     except (KeyError, TypeError, ValueError, PackingError) as error:
-        raise ReadError(f"{path}: cell, origin and periodic are no cell: {error}") from None
+        raise ReadError(f"{path}: cell, origin and periodic do not form a cell: {error}") from None
 
 
 def contacts_of(pairs: AnyArray, arrays: Mapping[str, Any]) -> ContactList:
-    """The contacts among the arrays of a file; the packing checks them."""
+    """The contacts in the arrays of a file; Packing checks them later."""
     return ContactList(
         pairs, arrays.get("image"), arrays.get("force"), force_n=arrays.get("force_n")
     )

@@ -1,4 +1,4 @@
-"""Checks for readers and writers of packings of any package."""
+"""Checks that packages can run on their own readers and writers of packings."""
 
 from scanfab.testing.readers import check_reader
 from scanfab.testing.writers import check_writer, differences, made_up_packings

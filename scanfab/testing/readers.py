@@ -1,4 +1,4 @@
-"""The check of readers of packings, on sound and damaged files of their format."""
+"""The check of a reader, on sound and damaged files of its format."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from scanfab.io.reader import FileKind, GrainTable, Reader, ReadOptions, Snapsho
 from scanfab.packing.packing import Packing
 from scanfab.testing.writers import differences
 
-# seconds in which a small file must be read
+# a small file must be read within this many seconds
 LONGEST = 10.0
-# how many cut and how many otherwise damaged files are made of each file
+# number of truncated and of otherwise damaged copies made of each file
 CUTS, DAMAGES = 40, 150
 FOREIGN = {
     "empty": b"",
@@ -46,26 +46,26 @@ def check_reader(
     counts: bool = False,
 ) -> None:
     """
-    Try a reader on files of its format.
+    Check a reader on files of its format.
 
     Parameters
     ----------
     reader : Reader
         The plugin.
     files : sequence of Path
-        Small sound files with grains, of all kinds that the format has.
+        Small sound files with grains, one for each kind of file of the format.
     folder : Path
         An empty folder for damaged files, such as pytest's ``tmp_path``.
     options : ReadOptions, optional
-        Options that are needed to read the files.
+        Options that the reader needs to read the files.
     counts : bool, optional
-        Whether the format says how many grains there are, or where they end. A file that is cut
-        off must then be an error, not fewer grains.
+        Whether the format states how many grains there are, or where they end. Then a truncated
+        file must be an error, not a file with fewer grains.
 
     Raises
     ------
     AssertionError
-        That says what the reader should have done.
+        If the reader fails a check; the message says what it should have done.
 
     Examples
     --------
@@ -81,15 +81,15 @@ def check_reader(
     options = ReadOptions() if options is None else options
     folder.mkdir(exist_ok=True)
     assert re.fullmatch(r"[a-z0-9][a-z0-9-]*", reader.name), (
-        f"the name {reader.name!r} is typed behind --format: small letters, digits and -"
+        f"the name {reader.name!r} must consist of small letters, digits and -, as in --format NAME"
     )
-    assert len(reader.description.splitlines()) == 1, "the description is one line"
-    assert isinstance(reader.extensions, tuple), "the extensions are a tuple"
-    assert all(one.startswith(".") for one in reader.extensions), "extensions begin with a dot"
+    assert len(reader.description.splitlines()) == 1, "the description must be one line"
+    assert isinstance(reader.extensions, tuple), "the extensions must be a tuple"
+    assert all(end.startswith(".") for end in reader.extensions), "extensions begin with a dot"
     for name, data in FOREIGN.items():
         path = _put(folder, f"{name}.bin", data)
-        known = _asked("recognises", reader.recognises, path)
-        assert not known, f"{path.name}: recognises() takes it for its own, which it is not"
+        is_known = _asked("recognises", reader.recognises, path)
+        assert not is_known, f"{path.name}: recognises() must be False for other formats"
         _try_all(reader, path, options)
     assert files, "expected at least one file to try the reader on"
     for file in files:
@@ -98,7 +98,7 @@ def check_reader(
 
 
 def _check_sound(reader: Reader, file: Path, folder: Path, options: ReadOptions) -> int:
-    """Read a sound file twice, and once compressed; the number of its grains."""
+    """Read a sound file twice, and once compressed; return the number of its grains."""
     before = file.read_bytes()
     packed = _put(folder, f"packed_{bare_name(file)}.gz", gzip.compress(plain(file).read_bytes()))
     with _quiet(file):
@@ -106,42 +106,42 @@ def _check_sound(reader: Reader, file: Path, folder: Path, options: ReadOptions)
             assert reader.recognises(file) is True, f"{file.name}: recognises() must be True"
         kind = reader.kind(file)
         assert kind in get_args(FileKind), f"{file.name}: kind() is {kind!r}"
-        first, again, unpacked = (_packings(reader, one, options) for one in (file, file, packed))
+        first, again, unpacked = (_packings(reader, path, options) for path in (file, file, packed))
     assert first, f"{file.name}: snapshots() found no frame"
     for one, two, three in zip(first, again, unpacked, strict=True):
         changed = differences(one, two)
-        assert not changed, f"{file.name}: read twice, it gives different grains: {changed}"
-        # files beside it may tell the cell
+        assert not changed, f"{file.name}: reading it twice gives different grains: {changed}"
+        # the compressed copy lacks companion files, which may hold the cell
         other = [text for text in differences(one, three) if not text.startswith("cell")]
-        assert not other, f"{packed.name}: gives other grains (use scanfab.io.plain): {other}"
-    assert file.read_bytes() == before, f"{file.name}: was changed by reading it"
+        assert not other, f"{packed.name}: its grains differ (use scanfab.io.plain): {other}"
+    assert file.read_bytes() == before, f"{file.name}: reading must not change the file"
     return sum(map(len, first))
 
 
 def _packings(reader: Reader, path: Path, options: ReadOptions) -> list[Packing]:
-    """The packing of each frame."""
-    found = []
+    """The packings of all frames in a file."""
+    packings = []
     for snapshot in reader.snapshots(path):
         assert isinstance(snapshot, Snapshot), f"{path.name}: snapshots() gives Snapshot objects"
         assert snapshot.step is None or isinstance(snapshot.step, int), "a step is an int or None"
         table = reader.read_grains(snapshot, options)
-        assert isinstance(table, GrainTable), f"{path.name}: read_grains() gives a GrainTable"
+        assert isinstance(table, GrainTable), f"{path.name}: read_grains() must return a GrainTable"
         names = ("id", "columns", "contacts", "wall_contacts", "wall_forces", "cell")
         more = {name: getattr(table, name) for name in names}
-        found.append(Packing(table.position, table.radius, **more))
-    return found
+        packings.append(Packing(table.position, table.radius, **more))
+    return packings
 
 
 def _check_damaged(
     reader: Reader, file: Path, folder: Path, options: ReadOptions, least: int
 ) -> None:
-    """Cut the file anywhere, which may not leave fewer grains than ``least``, and change it."""
+    """Truncate the file, which must not leave fewer grains than ``least``, and damage it."""
     data, random = file.read_bytes(), Random(0)
     for place in sorted({random.randrange(len(data)) for _ in range(CUTS)}):
-        found = _try_all(reader, _put(folder, f"cut_{file.name}", data[:place]), options)
-        # only blanks may be missing without harm
-        assert found is None or found >= least or not data[place:].strip(), (
-            f"{file.name} cut off after {place} bytes is read as {found} of {least} grains: a part "
+        count = _try_all(reader, _put(folder, f"cut_{file.name}", data[:place]), options)
+        # a file that lacks only blanks at its end may be read
+        assert count is None or count >= least or not data[place:].strip(), (
+            f"{file.name} cut off after {place} bytes is read as {count} of {least} grains: a part "
             f"of a file must be an error"
         )
     for _ in range(DAMAGES):
@@ -149,7 +149,7 @@ def _check_damaged(
 
 
 def _damaged(data: bytes, random: Random) -> bytes:
-    """The data with one bit, byte or word changed, or a part left out."""
+    """The data with one bit or word changed, a word inserted, or some bytes left out."""
     kind, place = random.randrange(4), random.randrange(len(data))
     if kind == 0:
         changed = bytearray(data)
@@ -165,7 +165,7 @@ def _damaged(data: bytes, random: Random) -> bytes:
 
 
 def _try_all(reader: Reader, path: Path, options: ReadOptions) -> int | None:
-    """Ask a reader all that the package asks it; the number of grains if it reads the file."""
+    """Call all methods of a reader; return the number of grains if it reads the file."""
 
     def count(path: Path) -> int:
         tables = (reader.read_grains(snapshot, options) for snapshot in reader.snapshots(path))
@@ -174,32 +174,32 @@ def _try_all(reader: Reader, path: Path, options: ReadOptions) -> int | None:
     began = time.monotonic()
     _asked("recognises", reader.recognises, path)
     _asked("kind", reader.kind, path)
-    found = _asked("read_grains", count, path)
+    total = _asked("read_grains", count, path)
     took = time.monotonic() - began
-    assert took < LONGEST, f"{path.name}: took {took:.0f} s"
-    return found
+    assert took < LONGEST, f"{path.name}: took {took:.0f} s, expected at most {LONGEST:.0f} s"
+    return total
 
 
 def _asked(what: str, call: Callable[[Path], T], path: Path) -> T | None:
-    """The answer of a call; None if it raises a ScanfabError. Other errors fail the check."""
+    """The result of a call, or None if it raises a ScanfabError; other errors fail the check."""
     with _quiet(path):
         try:
             return call(path)
         except ScanfabError as error:
-            told = error
+            caught = error
         except BaseException as error:
             raise AssertionError(
-                f"{path}: {what}() raises {type(error).__name__}: {error}; whatever a file holds, "
+                f"{path}: {what}() raises {type(error).__name__}: {error}; for any damaged file "
                 f"it must raise ReadError and nothing else"
             ) from error
-    is_named = path.name in str(told) or not isinstance(told, ReadError)
-    assert is_named, f"{what}(): the error does not name the file: {told}"
+    is_named = path.name in str(caught) or not isinstance(caught, ReadError)
+    assert is_named, f"{what}(): the error must name the file: {caught}"
     return None
 
 
 @contextlib.contextmanager
 def _quiet(path: Path) -> Iterator[None]:
-    """Fails if anything is printed, or if a warning is not scanfab's."""
+    """Fail if the reader prints anything, or gives a warning that is not a ScanfabWarning."""
     out = io.StringIO()
     with (
         warnings.catch_warnings(record=True) as caught,
@@ -209,9 +209,9 @@ def _quiet(path: Path) -> Iterator[None]:
         warnings.simplefilter("always")
         yield
     assert not out.getvalue(), f"{path.name}: the reader prints {out.getvalue()[:100]!r}"
-    for one in caught:
-        assert issubclass(one.category, (ScanfabWarning, ScanfabNote)), (
-            f"{path.name}: draws a {one.category.__name__}: {one.message}"
+    for warning in caught:
+        assert issubclass(warning.category, (ScanfabWarning, ScanfabNote)), (
+            f"{path.name}: gives a {warning.category.__name__}: {warning.message}"
         )
 
 

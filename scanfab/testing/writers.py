@@ -1,7 +1,7 @@
 """
-The check of writers of packings: what they write must be read back to the last bit.
+The check of a writer: packings that it writes must be read back without any change.
 
-Also packings that need everything of a format, and the differences of two packings.
+This module also makes packings that use every feature of a format, and compares two packings.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from scanfab.packing.contacts import ContactList
 from scanfab.packing.packing import Packing
 from scanfab.packing.search import find_contacts
 
-# ids that no float can hold
+# an id that no float can represent
 LARGE = 2**60 + 1
 
 
@@ -30,7 +30,7 @@ def check_writer(
     writer: Writer, folder: Path, *, format: str | None = None, leave: Iterable[str] = ()
 ) -> None:
     """
-    Write packings of all kinds, and read them back.
+    Check a writer: write packings of all kinds, and read them back.
 
     Parameters
     ----------
@@ -39,14 +39,14 @@ def check_writer(
     folder : Path
         An empty folder, such as pytest's ``tmp_path``.
     format : str, optional
-        Name of that reader; by content if not given.
+        Name of the reader; by default the content of the file decides.
     leave : iterable of str, optional
-        Which of :func:`made_up_packings` to leave out.
+        Names of :func:`made_up_packings` to leave out.
 
     Raises
     ------
     AssertionError
-        If something was lost; the message says what.
+        If data were lost or changed; the message says which.
 
     Examples
     --------
@@ -61,26 +61,26 @@ def check_writer(
     for number, (name, packing) in enumerate(made_up_packings().items()):
         if name in left_out:
             continue
-        own = folder / f"{number}"
-        own.mkdir()
-        path = own / f"packing_7{writer.extensions[0]}"
+        own_folder = folder / f"{number}"
+        own_folder.mkdir()
+        path = own_folder / f"packing_7{writer.extensions[0]}"
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ScanfabNote)
             save_packing(packing, path, writer)
             again = read(path, format=format)
-        found = differences(packing, again)
-        assert not found, f"{writer.name}: of the packing {name!r} is lost: {'; '.join(found)}"
+        changes = differences(packing, again)
+        assert not changes, f"{writer.name}: changes the packing {name!r}: {'; '.join(changes)}"
 
 
 def made_up_packings() -> dict[str, Packing]:
     """
-    Small packings by what is special in them.
+    Small packings, each with special features; the name says which.
 
     Returns
     -------
     dict of str to Packing
-        Open and periodic ones, tilted cells, forces, bodies, contacts with walls, columns of
-        texts and vectors, ids above 2^53, no contacts, no grains.
+        Open and periodic packings, tilted cells, forces, bodies, contacts with walls, columns of
+        texts and vectors, ids above 2^53; packings without contacts and without grains.
 
     Examples
     --------
@@ -98,9 +98,9 @@ def made_up_packings() -> dict[str, Packing]:
     rows = np.arange(40)
     plain = Packing(position, radius)
     tilted = Packing(position, radius, cell=cell, id=random.permutation(40) + LARGE)
-    found = find_contacts(tilted).contacts
-    assert found is not None
-    contacts = ContactList(found.pairs, found.image, random.normal(size=(len(found), 3)))
+    touching = find_contacts(tilted).contacts
+    assert touching is not None
+    contacts = ContactList(touching.pairs, touching.image, random.normal(size=(len(touching), 3)))
     columns = {
         "type": rows % 3 + 1,
         "velocity": random.normal(size=(40, 3)),
@@ -121,8 +121,8 @@ def made_up_packings() -> dict[str, Packing]:
         step=123456789012,
         time=0.1 + 0.2,
     )
-    normal = contacts._replace(force=None, force_n=random.normal(size=len(found)))
-    # a turn about all axes
+    normal = contacts._replace(force=None, force_n=random.normal(size=len(touching)))
+    # a rotation about all axes
     turn, _ = np.linalg.qr(np.array([[1.0, 2, 3], [-1, 1, 0.5], [2, 0, 1]]))
     turned = Cell(cell.vectors @ turn * np.sign(np.linalg.det(turn)))
     return {
@@ -138,28 +138,28 @@ def made_up_packings() -> dict[str, Packing]:
 
 def differences(one: Packing, two: Packing) -> list[str]:
     """
-    In what two packings differ, to the last bit; columns of several values are compared one by one.
+    List the differences of two packings, to the last bit; vector columns are compared by component.
 
     Parameters
     ----------
     one, two : Packing
-        For instance a packing and what was read back; ``two`` may have more columns.
+        For instance a packing, and the packing read back; ``two`` may have more columns.
 
     Returns
     -------
     list of str
-        Sentences; empty if they agree.
+        A sentence for each difference; empty if the packings agree.
     """
     first, second = _values_of(one), _values_of(two)
-    found = []
+    changes = []
     for name, value in first.items():
         other = second.get(name)
         if value is None or other is None:
-            found += [] if value is other else [f"{name}: {value!r} and {other!r}"]
+            changes += [] if value is other else [f"{name}: {value!r} and {other!r}"]
             continue
         mine, theirs = np.asarray(value), np.asarray(other)
         if mine.shape != theirs.shape:
-            found.append(f"{name}: shapes {mine.shape} and {theirs.shape}")
+            changes.append(f"{name}: shapes {mine.shape} and {theirs.shape}")
             continue
         if "U" in (mine.dtype.kind, theirs.dtype.kind) and mine.size:
             mine, theirs = mine.astype(str), theirs.astype(str)
@@ -167,12 +167,12 @@ def differences(one: Packing, two: Packing) -> list[str]:
         if not np.all(same):
             place = np.unravel_index(int(np.argmin(same)), mine.shape) if mine.shape else ()
             where = tuple(map(int, place))
-            found.append(f"{name}: {mine[place]!r} and {theirs[place]!r} at {where}")
-    return found
+            changes.append(f"{name}: {mine[place]!r} and {theirs[place]!r} at {where}")
+    return changes
 
 
 def _values_of(packing: Packing) -> dict[str, Any]:
-    """All that a packing holds, by names for messages; None for what it does not have."""
+    """All data of a packing, by names for messages; None for data that it does not have."""
     parts = {
         "": ("position", "radius", "id", "wall_contacts", "step", "time"),
         "cell": ("vectors", "origin", "periodic"),

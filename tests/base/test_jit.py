@@ -18,7 +18,7 @@ from tests.helpers.dumps import cubic_rows, dump_text, write
 
 # the contacts need a kernel, and only a small one
 PROGRAM = "import sys; from scanfab.cli.main import main; main(['inspect', *sys.argv[1:]])"
-SAID = "scanfab: compiling what no earlier run has needed"
+SAID = "scanfab: compiling for first use"
 NOWHERE = "/proc/none"
 only_linux = pytest.mark.skipif(sys.platform != "linux", reason="needs XDG_CACHE_HOME and /proc")
 only_posix = pytest.mark.skipif(os.name != "posix", reason="needs permissions")
@@ -54,7 +54,7 @@ def test_only_the_first_run_compiles_until_a_kernel_changes(dump, tmp_path):
     shutil.copytree(ROOT / "scanfab", package / "scanfab", ignore=ignored)
     first = words_of(dump, home, package=package)
     assert first.count(SAID) == 1
-    assert "; it is kept for later runs" in first
+    assert "; later runs start at once" in first
     assert len(kept_in(home)) >= 2
     assert SAID not in words_of(dump, home, package=package)
     # nothing is kept beside the package, where users often may not write

@@ -71,7 +71,7 @@ def test_several_tables_stand_side_by_side_under_their_labels(compare, table):
     assert "by --label NAME" in compare(*given, code=1).err
     rows = compare(*given, "--summary", "--label", "coarse", "--label", "fine").rows
     assert [row["source"] for row in rows] == ["coarse", "fine"]
-    assert "expected one a table: 2, found 1" in compare(*given, "--label", "coarse", code=2).err
+    assert "expected one per table: 2, found 1" in compare(*given, "--label", "coarse", code=2).err
 
 
 def test_the_rows_of_one_cutoff_are_chosen(compare, table):

@@ -127,7 +127,7 @@ def test_the_first_signal_ends_it_in_order(process, folder, finished, sent):
     process.send_signal(sent)
     said = process.stderr.read()
     assert process.wait(60) == 0, said
-    assert "frames under way are finished" in said
+    assert "finishing frames under way" in said
     assert not Path("t.csv.part").exists()
     (folder / files[2].name).unlink()
     assert Path("t.csv").read_bytes() == finished_run()
@@ -200,11 +200,11 @@ def test_files_that_change_before_the_next_frame_are_an_error(folder, finished):
         assert [next(frames).number, next(frames).number] == [0, 1]
     with open(folder / files[2].name, "a") as stream:
         stream.write("\n")
-    with pytest.raises(ReadError, match=f"{files[2].name}: was taken as frame 1, but since then"):
+    with pytest.raises(ReadError, match=f"{files[2].name}: was read as frame 1, but since then"):
         next(growing)
     shutil.copy(files[2], folder)
     shutil.copy(files[0], folder)
-    with pytest.raises(ReadError, match=f"{files[1].name}: was taken as frame 0, but since then"):
+    with pytest.raises(ReadError, match=f"{files[1].name}: was read as frame 0, but since then"):
         next(other)
 
 

@@ -43,7 +43,7 @@ def test_unreadable_source_is_exit_code_1_and_debug_shows_why(tmp_path: Path) ->
     answer = scanfab("compute", tmp_path)
     assert answer.returncode == 1
     assert answer.stderr.startswith("scanfab: error: ")
-    assert "no reader knows the format" in answer.stderr
+    assert "no reader knows this format" in answer.stderr
     assert answer.stdout == ""
     assert "Traceback" in scanfab("--debug", "compute", tmp_path).stderr
 

@@ -19,7 +19,7 @@ from scanfab.pipeline.record import asked_for
 from scanfab.pipeline.settings import Settings
 
 DOCS = Path(__file__).parents[2] / "docs"
-TITLES = ["What most need", *(group.capitalize() for group in GROUPS)]
+TITLES = ["Most used options", *(group.capitalize() for group in GROUPS)]
 
 
 def help_of(command, width=80):
@@ -34,7 +34,7 @@ def test_every_option_of_compute_is_declared_and_stands_in_a_group():
     assert re.findall(r"^([A-Z][\w ]+):$", text, re.M) == TITLES
     for one in OPTIONS.values():
         assert len(re.findall(rf"^  {one.flag}(?![\w-])", text, re.M)) == 1
-    most = text.split("\nReading:")[0].split("What most need:")[1]
+    most = text.split("\nReading:")[0].split("Most used options:")[1]
     assert re.findall(r"^  (-[\w-]+)", most, re.M) == [
         "-o", "--variants", "--boundary", "--frames", "--rv", "--tolerance", "--workers",
     ]  # fmt: skip

@@ -138,7 +138,7 @@ def test_without_a_part_everything_is_computed(compute, is_whole, capsys):
     assert compute("table.csv") == (0, 4)
     assert "table.csv: the table that is there will be replaced" in capsys.readouterr().err
     assert run(["compute", "dumps", "--resume"]) == 2
-    assert "--resume goes with -o FILE" in capsys.readouterr().err
+    assert "--resume needs -o FILE" in capsys.readouterr().err
 
 
 def test_without_resume_the_part_is_kept_under_another_name(compute, stop, is_whole, capsys):

@@ -47,15 +47,15 @@ def test_options_are_those_of_the_file_but_for_those_of_the_line(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[view]\ncolour = 1\n", "'view' has no meaning: options stand in the section [compute]"),
-        ("rv = 0.6\n[compute]\n", "'rv' has no meaning"),
+        ("[view]\ncolour = 1\n", "'view' is not known: put options into the section [compute]"),
+        ("rv = 0.6\n[compute]\n", "'rv' is not known"),
         ('[compute]\nvariant = "a"\n', "'variant' cannot be set in a settings file: did you mean"),
         ("[compute]\nresume = true\n", "'resume' cannot be set"),
         ('[compute]\nvtk = "v"\n', "'vtk' cannot be set"),
         ('[compute]\noutput = "t.csv"\n', "'output' cannot be set"),
         ("[compute\n", "Expected"),
         ("[compute]\nrv = 0.6\nboundary = mask=3\n", "Invalid value (at line 3"),
-        ("[compute]\ncutoff = 1rmin # one\n", "text stands in quotes"),
+        ("[compute]\ncutoff = 1rmin # one\n", "text needs quotes"),
         ("[compute]\nrv-center = [1, 2]\n", "rv-center: expected three finite numbers"),
         ("[compute]\nrv-center = [[1, 2], 2, 3]\n", "rv-center: expected numbers or text in quo"),
         ("[compute]\nrv = false\n", "rv: expected numbers or text in quotes"),

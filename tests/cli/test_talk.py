@@ -66,7 +66,7 @@ def test_verbose_says_what_is_used_and_how_long_each_frame_takes(said, series):
 @pytest.mark.parametrize("command", ["compute", "inspect", "calibrate"])
 def test_quiet_and_verbose_exclude_one_another(said, command):
     _, lines = said(command, "--quiet", "--verbose", code=2)
-    assert "--quiet and --verbose exclude one another" in lines[-1]
+    assert "--quiet and --verbose contradict each other" in lines[-1]
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,12 @@ LONG = packed(zeros=600)
     ("count", "points", "more", "told"),
     [
         (100, SOME_POINTS, [array("radius", LONG)], "radius has 78643200 of 100 values"),
-        (100, SOME_POINTS, [array("a", LONG, 600 * BLOCK // 800)], "its library crashed"),
+        (
+            100,
+            SOME_POINTS,
+            [array("a", LONG, 600 * BLOCK // 800)],
+            "its library crashed",
+        ),
         (600 * BLOCK, LONG, [], "Points has 78643200 of|its library crashed"),
     ],
 )
@@ -80,7 +85,7 @@ def test_an_array_of_one_value_is_no_bomb(tmp_path):
 def test_what_does_not_fit_into_memory_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(files, "free_memory", lambda: 1_000)
     path = polydata(tmp_path / "a.vtp", 100, SOME_POINTS)
-    with pytest.raises(ReadError, match=r"takes about 0.0 GB of memory, and 0.0 GB are free"):
+    with pytest.raises(ReadError, match=r"takes about 0.0 GB of memory, but only 0.0 GB are free"):
         scanfab.read(path)
 
 
@@ -89,7 +94,7 @@ def test_endless_xml_is_left_early(tmp_path, unit):
     path = tmp_path / "save.xml.bz2"
     # streams one behind the other are one file
     path.write_bytes(bz2.compress(HEAD) + 1000 * bz2.compress(unit * (BLOCK // len(unit))))
-    with pytest.raises(ReadError, match=r"save\.xml\.bz2: .* unpack to more than 1000 times"):
+    with pytest.raises(ReadError, match=r"save\.xml\.bz2: .* decompress to more than 1000 times"):
         scanfab.read(path)
 
 

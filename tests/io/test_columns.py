@@ -156,7 +156,7 @@ def test_periodic_letters_say_which_axes_repeat(letters):
     assert cell_of(BOX, periodic=letters).periodic == periodic
     assert cell_of(periodic=letters, cell=(1.0, 1.0, 1.0)).periodic == periodic
     with pytest.raises(
-        ReadError, match=rf'`periodic="{letters}"` needs a cell, .* not name: give it with'
+        ReadError, match=rf'`periodic="{letters}"` needs a cell, .* the dump has none: give it with'
     ):
         cell_of(periodic=letters)
 

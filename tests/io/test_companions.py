@@ -55,7 +55,7 @@ def test_a_series_without_steps_stays_one_in_its_order(tmp_path, name):
 def test_contacts_that_were_cut_or_left_behind_are_an_error(tmp_path, name):
     path, file = written(EVERYTHING, tmp_path, name), tmp_path / "a.contacts.csv"
     without_last_row(file)
-    words = rf"a\.contacts\.csv: holds {COUNT - 1} contacts, expected {COUNT} by a\.frame\.csv"
+    words = rf"a\.contacts\.csv: holds {COUNT - 1} contacts, but a\.frame\.csv counts {COUNT}"
     for contacts in ("auto", "file", file):
         with pytest.raises(scanfab.ReadError, match=words):
             scanfab.read(path, contacts=contacts)
@@ -72,7 +72,7 @@ def test_contacts_that_were_cut_or_left_behind_are_an_error(tmp_path, name):
 def test_grains_cut_behind_a_line_are_an_error_unless_the_user_says_so(tmp_path, packing):
     path, frame = written(PACKINGS[packing], tmp_path, "csv"), tmp_path / "a.frame.csv"
     without_last_row(path)
-    with pytest.raises(scanfab.ReadError, match=r"holds 39 grains, expected 40 by a\.frame\.csv"):
+    with pytest.raises(scanfab.ReadError, match=r"holds 39 grains, but a\.frame\.csv counts 40"):
         scanfab.read(path)
     frame.write_text(frame.read_text().replace(",40,", ",,"))
     assert len(scanfab.read(path)) == 39
@@ -96,7 +96,7 @@ def test_a_companion_file_is_read_whole_or_not_at_all(tmp_path, suffix, share):
     [
         ("contacts", "0,0,0,", ",0,0,", "incomplete"),
         ("contacts", "0,0,0,", "0.5,0,0,", "whole numbers"),
-        ("contacts", "0,0,0,", "x,0,0,", "other words"),
+        ("contacts", "0,0,0,", "x,0,0,", "found text"),
         ("contacts", "0,0,0,", "0,0,0,0,", "cannot be read"),
         ("frame", ",xy,", ",xq,", "expected the line"),
         ("frame", ",xy,", ",", "expected the line"),
@@ -104,7 +104,12 @@ def test_a_companion_file_is_read_whole_or_not_at_all(tmp_path, suffix, share):
         ("frame", ",1.1,", ",soon,", "soon"),
         ("frame", ",1.1,", ",0.0,", "no volume"),
         ("columns", "a b", "", "incomplete"),
-        ("columns", "scanfab_id,.*\n[0-9]+", "scanfab_id,w\n7", r"other grains than a\.xyz"),
+        (
+            "columns",
+            "scanfab_id,.*\n[0-9]+",
+            "scanfab_id,w\n7",
+            r"its ids are not those of the grains in a\.xyz",
+        ),
     ],
 )
 def test_a_damaged_word_is_an_error(tmp_path, kind, old, new, words):

@@ -65,5 +65,5 @@ def test_ends_outside_a_periodic_cell_are_wrapped_and_rounding_does_no_harm(erro
 
 
 def test_without_a_cell_the_image_of_a_grain_is_no_wall():
-    with pytest.raises(ReadError, match=r"1 contacts end at periodic images of grains.*`cell="):
+    with pytest.raises(ReadError, match=r"1 contacts end at periodic images.*`cell="):
         by_places([[POSITION[3], [7.6, 0, 0]]])

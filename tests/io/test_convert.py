@@ -128,7 +128,7 @@ def test_what_cannot_be_written_leaves_what_was_there(
 def test_a_name_that_means_something_else_is_told(tmp_path):
     columns = {"Radius": [2.0], "x": [3.0], "diameter": [5.0]}
     packing = scanfab.Packing(np.zeros((1, 3)), 1.0, columns=columns)
-    with pytest.warns(ScanfabNote, match="the column Radius is called Radius_of_dump"):
+    with pytest.warns(ScanfabNote, match="the column Radius is renamed to Radius_of_dump"):
         scanfab.convert(packing, tmp_path / "a.npz")
     again = scanfab.read(tmp_path / "a.npz")
     assert again.radius == [1.0]
@@ -199,16 +199,17 @@ def test_lammps_reads_the_data_file_and_the_dump(tmp_path, tilt):
 def test_that_columns_of_contacts_have_no_place_is_told_once(tmp_path):
     # of our own files nothing is lost
     for source, told in (
-        (series(tmp_path / "dumps"), "pairs_*.txt: of contacts"),
+        (series(tmp_path / "dumps"), "pairs_*.txt: only pairs"),
         (tmp_path / "out", ""),
     ):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             scanfab.convert(source, tmp_path / "out", to="csv")
-        found = [str(one.message) for one in caught if "of contacts" in str(one.message)]
-        assert [one.endswith("only pairs, images and forces are written") for one in found] == [
-            True
-        ] * bool(told)
+        found = [str(one.message) for one in caught if "of the contacts" in str(one.message)]
+        assert [
+            one.endswith("only pairs, images and forces of the contacts are written")
+            for one in found
+        ] == [True] * bool(told)
         assert all(told in one for one in found)
 
 

@@ -49,7 +49,11 @@ def path(tmp_path):
 
 @pytest.mark.parametrize(
     ("function", "told"),
-    [(leave, "cannot read it"), (crash, "its library crashed, or took"), (hang, "its library")],
+    [
+        (leave, "cannot read it"),
+        (crash, "its library crashed, or took"),
+        (hang, "its library"),
+    ],
 )
 def test_a_file_that_ends_the_worker_is_an_error_and_the_next_is_read(
     path, monkeypatch, function, told

@@ -90,12 +90,12 @@ def test_a_fabric_table_is_known(tmp_path, ending, capsys):
     path = tmp_path / f"fabric.{ending}"
     scanfab.compute(scanfab.Packing(grid, 0.4), **lines).save(path)
     assert run(["compute", str(path)]) == 1
-    assert "fabric table, not a dump: scanfab compare or scanfab report" in capsys.readouterr().err
+    assert "fabric table, not a dump: scanfab compare and scanfab report" in capsys.readouterr().err
 
 
 def test_folders_below_are_named_where_there_is_no_dump(folder):
     for _ in range(2):
-        with pytest.raises(ReadError, match=r"holds no dumps, but folders: name .*dumps"):
+        with pytest.raises(ReadError, match=r"holds no dumps, only folders: name .*dumps"):
             scanfab.read_series(folder.parent)
         write(folder.parent / "notes.txt", "hello\n")
 
@@ -114,7 +114,7 @@ def test_globs_in_quotes_are_expanded(folder, capsys):
 @pytest.mark.parametrize("beside", [True, False])
 def test_contacts_that_cannot_be_read_say_how_to_leave_them_alone(folder, beside):
     write(folder / "contacts_9.txt", pairs_text([(1, 77)], step=9))
-    message = r'contacts_9.txt: no two columns.*`contacts="geometric"` leaves it alone'
+    message = r'contacts_9.txt: no two columns.*`contacts="geometric"` ignores it'
     with pytest.raises(ReadError, match=message):
         scanfab.read(folder / "dump_9.txt" if beside else folder)
 
@@ -134,7 +134,7 @@ def test_the_command_line_takes_a_file_of_cells(tmp_path, capsys):
     assert run([*words, "--cell", str(strained / "truth.csv")]) == 0
     assert "0.0035473249830325487" in capsys.readouterr().out
     assert run([*words, "--cell", str(tmp_path / "nowhere.csv")]) == 2
-    assert "CSV file with those of each frame" in capsys.readouterr().err
+    assert "CSV file with the cell of each frame" in capsys.readouterr().err
 
 
 STEPLESS = "x,y,z,radius\n0,0,0,1\n1.9,0,0,1\n"
@@ -167,7 +167,7 @@ def test_a_cut_file_that_may_be_the_contacts_is_an_error(tmp_path, beside):
         text = gzip.decompress(file.read_bytes())
         (tmp_path / f"rec-{name}-0.vtk").write_bytes(text[: 300 if name == "intrs" else None])
     source = tmp_path / "rec-spheres-0.vtk" if beside else tmp_path
-    with pytest.raises(ReadError, match=r'rec-intrs-0.vtk.*`contacts="geometric"` leaves it alone'):
+    with pytest.raises(ReadError, match=r'rec-intrs-0.vtk.*`contacts="geometric"` ignores it'):
         scanfab.read(source)
     assert scanfab.read(source, contacts="geometric").contacts is None
 

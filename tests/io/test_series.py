@@ -135,7 +135,7 @@ def test_a_series_is_named_as_the_user_named_it(folder, monkeypatch):
 
 WRONG = [
     ({}, None, "the folder holds no files"),
-    ({"log.txt": "hello\n"}, None, "no reader knows the format; scanfab formats"),
+    ({"log.txt": "hello\n"}, None, "no reader knows this format; the command scanfab formats"),
     ({"pairs_1.txt": pairs_text()}, None, r"no grains: .* found contacts \(pairs_1.txt\)"),
     ({}, "nothing", "there is no such file, folder or glob"),
     ({}, "dump_*.txt", "matches nothing"),

@@ -72,7 +72,7 @@ def test_a_folder_that_is_named_twice_is_read_once(tmp_path, monkeypatch, capsys
     assert run(["inspect", "dumps", again, "--json"]) == 0
     printed = capsys.readouterr()
     assert [json.loads(line)["source"] for line in printed.out.splitlines()] == ["dumps"]
-    said = f"{again.replace('*', 'ps')}: named twice among the sources, and read once"
+    said = f"{again.replace('*', 'ps')}: named twice among the sources, but read once"
     assert printed.err.count(said) == 1
 
 

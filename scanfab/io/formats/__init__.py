@@ -1,1 +1,1 @@
-"""Readers: what the columns and files of each program mean; each is a plugin."""
+"""Reader plugins: one module for the files of each program."""

@@ -1,9 +1,8 @@
 """
-Dumps that are no text: LAMMPS' binary ones, new and old, LIGGGHTS' (the old layout), and NetCDF.
+Binary dumps of LAMMPS (new and old layout), of LIGGGHTS (old layout), and NetCDF dumps.
 
-The new layout names its columns, the old one does not. The bytes of all numbers are in the order of
-today's processors (little endian). ``dump netcdf`` is AMBER's convention, read by netCDF4: all
-frames have one number of atoms.
+The new layout has names of columns, the old layout has none. All numbers are little endian. ``dump
+netcdf`` follows AMBER's convention and is read by netCDF4; all its frames have as many atoms.
 """
 
 from __future__ import annotations
@@ -27,58 +26,58 @@ from scanfab.io.formats import shared
 from scanfab.io.reader import FileKind, Snapshot
 from scanfab.packing.cell import Cell
 
-# minus the length of the word, the word, the number 1, and the revision of the layout
+# minus the length of the word, the word itself, the number 1, and the revision of the layout
 NEW_LAYOUT = re.compile(rb".{8}DUMP(?:CUSTOM|ATOM)\x01\0\0\0.{4}", re.DOTALL)
-# more stand in damaged files only
+# a larger number means that the file is damaged
 MOST_COLUMNS = 1000
-# NetCDF: classic, with long offsets, with long data; HDF5 is told apart by its content
+# first bytes of the three kinds of NetCDF: classic, 64-bit offsets, 64-bit data
 NETCDF = (b"CDF\x01", b"CDF\x02", b"CDF\x05")
-# AMBER's name of the centres, and what dumps of text add to x, y and z
+# AMBER's names of centres, and the letter that text dumps put behind x, y and z for them
 POSITIONS = {"coordinates": "", "unwrapped_coordinates": "u", "scaled_coordinates": "s"}
 CELL = ("cell_origin", "cell_lengths", "cell_angles")
 
 
 class Header(NamedTuple):
-    """What stands above the blocks of rows, of which each process wrote one."""
+    """The header of a snapshot; the blocks of rows below it were written by one process each."""
 
     step: int
     time: float | None
     rows: int
     periodic: list[bool]
     bounds: FloatArray
-    """Shape (3, 2), or (3, 3) with the tilt."""
+    """Lower and upper bound of each axis, shape (3, 2); shape (3, 3) with the tilt."""
     names: list[str]
-    """Of the columns; their numbers from 1 in the old layout."""
+    """The names of the columns; in the old layout their numbers from 1."""
     blocks: int
 
 
 class BinaryDump(shared.GrainsOnly):
-    """What DumpReader needs of binary dumps."""
+    """Reads binary dumps, for DumpReader."""
 
     def recognises(self, path: Path) -> bool:
-        """By the header of a snapshot."""
+        """Whether the file begins with the header of a snapshot."""
         return bool(self.names(path))
 
     def names(self, path: Path) -> list[str]:
-        """Those of the first snapshot, numbers in the old layout; none in another file."""
+        """The columns of the first snapshot; numbers in the old layout; empty for other files."""
         try:
             return _header(BytesIO(first_bytes(path, shared.HEADER_BYTES))).names
         except (ValueError, struct.error):
             return []
 
     def kind(self, path: Path) -> FileKind:
-        """Grains, unless the columns have names and none is a radius."""
+        """Grains; points if the columns have names and none is a radius."""
         return "grains" if self.names(path)[:1] == ["1"] else super().kind(path)
 
     def snapshots(self, path: Path) -> list[Snapshot]:
-        """In the order of their steps; an incomplete last one is left out."""
-        return sorted((found for found, *_ in _frames(path)), key=lambda one: one.step or 0)
+        """The snapshots in the order of their steps; an incomplete last one is left out."""
+        return sorted((found for found, *_ in _frames(path)), key=lambda frame: frame.step or 0)
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
-        """ReadError if the file is not as it was when its snapshots were found."""
+        """The columns of a snapshot and its cell; ReadError if the file has changed meanwhile."""
         path = snapshot.path
-        found, header, blocks = next(_frames(path, snapshot.start))
-        check_memory(path, 2.0 * ((found.stop or 0) - found.start))
+        current, header, blocks = next(_frames(path, snapshot.start))
+        check_memory(path, 2.0 * ((current.stop or 0) - current.start))
         parts = [np.fromfile(plain(path), "<f8", length, "", at) for at, length in blocks]
         values = np.concatenate(parts).reshape(-1, len(header.names))
         columns = {name: values[:, header.names.index(name)] for name in header.names}
@@ -86,7 +85,7 @@ class BinaryDump(shared.GrainsOnly):
 
 
 def _frames(path: Path, start: int = 0) -> Iterator[tuple[Snapshot, Header, list[tuple[int, int]]]]:
-    """From a byte on: each snapshot, its header, and where its blocks are and how many numbers."""
+    """From byte ``start``: snapshots with their header and the (offset, length) of their blocks."""
     with open(plain(path), "rb") as stream:
         size, count = stream.seek(0, 2), 0
         while start < size or not count:
@@ -110,7 +109,7 @@ def _frames(path: Path, start: int = 0) -> Iterator[tuple[Snapshot, Header, list
 
 
 def _header(stream: IO[bytes]) -> Header:
-    """The header that begins where the stream is; ValueError or struct.error if there is none."""
+    """Read a header from the stream; ValueError or struct.error if there is none."""
     start, time = stream.tell(), None
     new = NEW_LAYOUT.match(stream.read(26))
     stream.seek(start + (new.end() if new else 0))
@@ -126,36 +125,36 @@ def _header(stream: IO[bytes]) -> Header:
             (time,) = _take(stream, "<d")
         names = _text(stream).split()
     (blocks,) = _take(stream, "<i")
-    # the old layout has no mark: it is recognised by the ranges of its numbers
+    # the old layout has no magic number: check that its numbers are in range
     is_box = np.all(bounds[:, 0] <= bounds[:, 1]) and np.all(np.abs(bounds) <= MOST)
     is_sound = min(step, rows) >= 0 and tilted in (0, 1) and {*faces} <= {0, 1, 2, 3}
     if not (is_sound and is_box and 0 < width == len(names) <= MOST_COLUMNS and blocks > 0):
-        raise ValueError("step, box or columns cannot be right")
-    # of the lower and the upper face of each axis; 0 is periodic
+        raise ValueError("step, box or number of columns is out of range")
+    # flags of the lower and the upper face of each axis; 0 means periodic
     periodic = [faces[axis : axis + 2] == [0, 0] for axis in (0, 2, 4)]
     return Header(step, time, rows, periodic, bounds, names, blocks)
 
 
 def _take(stream: IO[bytes], kinds: str) -> tuple[Any, ...]:
-    """The next numbers, of the kinds that :mod:`struct` knows."""
+    """The next numbers of the stream, in a format of :mod:`struct`."""
     return struct.unpack(kinds, stream.read(struct.calcsize(kinds)))
 
 
 def _text(stream: IO[bytes]) -> str:
-    """The next text, which stands behind its length."""
+    """The next text of the stream: its length, then its bytes."""
     (length,) = _take(stream, "<i")
     return stream.read(max(length, 0)).decode("utf-8", "replace")
 
 
 class NetcdfDump(shared.GrainsOnly):
-    """What DumpReader needs of NetCDF."""
+    """Reads NetCDF dumps, for DumpReader."""
 
     def recognises(self, path: Path) -> bool:
-        """By the first bytes of the kinds that LAMMPS writes."""
+        """Whether the first bytes are of a kind of NetCDF that LAMMPS writes."""
         return first_bytes(path).startswith(NETCDF)
 
     def names(self, path: Path) -> list[str]:
-        """Of all variables."""
+        """The names of all variables."""
         return [*_read_netcdf(path, None)[0]]
 
     def snapshots(self, path: Path) -> list[Snapshot]:
@@ -163,7 +162,7 @@ class NetcdfDump(shared.GrainsOnly):
         return shared.numbered_frames(path, _read_netcdf(path, None)[1])
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
-        """The variables of the atoms; ReadError if a value was never written."""
+        """The variables of the atoms, and the cell; ReadError if a value was never written."""
         columns, box = _read_netcdf(snapshot.path, snapshot.start)
         for name, letter in POSITIONS.items():
             if name in columns and columns[name].shape[1:] == (3,):
@@ -180,20 +179,20 @@ def _read_netcdf(path: Path, frame: int | None) -> tuple[Any, Any]:
 
 def read_in_worker(path: str, frame: int | None) -> tuple[Any, Any]:
     """
-    The columns of the atoms in a frame, and its other variables.
+    Read the columns of the atoms in a frame, and the other variables of the frame.
 
-    If ``frame`` is None: the names of all variables, and the step and the time of each frame.
-    ValueError says what is wrong.
+    If ``frame`` is None, return the names of all variables, and the step and the time of each
+    frame. ValueError says what is wrong.
     """
     import netCDF4
 
     with netCDF4.Dataset(path, "r") as file:
         if getattr(file, "program", "") != "LAMMPS" or "time" not in file.variables:
-            raise ValueError("expected what LAMMPS writes by dump netcdf")
-        # values that were never written are masked
+            raise ValueError("expected a file that LAMMPS wrote by dump netcdf")
+        # keep raw values; netCDF4 masks values that were never written
         file.set_auto_scale(False)
         if frame is None:
-            # LAMMPS writes the step as time, and the length of a step as its scale
+            # LAMMPS stores the step as time, and the time step as its scale factor
             time = file.variables["time"]
             steps, scale = np.asarray(time[:], np.float64), float(time.scale_factor)
             if not np.all((np.abs(steps) < 2.0**53) & (steps == np.rint(steps))):
@@ -207,30 +206,30 @@ def read_in_worker(path: str, frame: int | None) -> tuple[Any, Any]:
                 values = np.ma.asarray(variable[frame])
                 group = atoms if dimensions[1:2] == ("atom",) else others
                 group[name] = values.astype(values.dtype.newbyteorder("="))
-    # some atoms were lost, or left their group
-    gaps = [np.ma.getmaskarray(one).reshape(len(one), -1).any(axis=1) for one in atoms.values()]
+    # rows without any value: atoms that were lost or left their group
+    gaps = [np.ma.getmaskarray(a).reshape(len(a), -1).any(axis=1) for a in atoms.values()]
     lost = np.logical_and.reduce(gaps)
     for name, gap in zip(atoms, gaps, strict=True):
         if np.any(gap & ~lost):
-            told = "dump all three of x y z, and close the file before it is read"
-            raise ValueError(f"{name} was not written for all atoms: {told}")
+            advice = "dump all three of x y z, and close the file before it is read"
+            raise ValueError(f"{name} was not written for all atoms: {advice}")
     return {name: np.ma.getdata(values)[~lost] for name, values in atoms.items()}, others
 
 
 @np.errstate(invalid="ignore", over="ignore", divide="ignore")
 def _netcdf_cell(path: Path, arrays: Columns) -> Cell | None:
-    """Three edges and angles; along an edge of length 0 the sample is not periodic."""
+    """The cell from three edges and angles; along an edge of length 0 it is not periodic."""
     if not all(name in arrays and arrays[name].shape == (3,) for name in CELL):
         return None
     origin, edges, angles = (doubles(arrays[name]) for name in CELL)
     periodic = edges > 0
-    # any length will do along an axis that is not periodic
+    # along an axis that is not periodic, any length will do
     edges = np.where(periodic, edges, edges.max())
-    # cos 90° is zero, which rounding would make a tilt
+    # the cosine of 90° must be exactly 0: rounding would tilt the cell
     alpha, beta, gamma = np.where(angles == 90.0, 0.0, np.cos(np.radians(angles)))
     sine = np.sqrt(1.0 - gamma**2)
     xy = (alpha - beta * gamma) / sine
-    # the first vector along x, the second in the plane x-y
+    # the first vector is along x, the second in the plane x-y
     rows = [[1, 0, 0], [gamma, sine, 0], [beta, xy, np.sqrt(1.0 - beta**2 - xy**2)]]
     where, vectors = f"{path}: {', '.join(CELL)}", np.array(rows) * edges[:, None]
     return shared.cell_of(where, vectors, periodic, origin)

@@ -1,4 +1,4 @@
-"""Contacts in a text dump: which columns are ids and forces, as their names say nothing."""
+"""Contacts in a text dump whose columns have meaningless names: find ids and forces."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ from scanfab.io.columns import refuse_named_twice, whole_numbers
 from scanfab.io.contacts import branches, join_ids, rows_of_ids
 from scanfab.io.reader import GrainTable, JoinedContacts
 
-# values of LIGGGHTS' compute pair/gran/local in the order in which they are written, and how many
+# keywords of LIGGGHTS' compute pair/gran/local in the order of output, and how many values each has
 PAIR_VALUES = {"pos": 6, "vel": 6, "id": 3, "force": 3, "force_normal": 3, "force_tangential": 3}
 PAIR_VALUES |= {"torque": 3, "torque_normal": 3, "torque_tangential": 3, "history": 3}
 PAIR_VALUES |= {"contactArea": 1, "delta": 1, "contactPoint": 3, "ms_id": 2, "heatFlux": 1}
-# names that users give columns: ids, force on the first grain, a part of it that is apart
+# keys of contact_columns: ids, force on the first grain, and a second part of this force
 IDS, FORCE, TANGENTIAL = ("id1", "id2"), ("fx", "fy", "fz"), ("tx", "ty", "tz")
-# in r1 + r2: where no gap is wider, the list is one of contacts, and the rest is rounding
+# if no gap is wider than this, in units of r1 + r2, all listed pairs touch, up to rounding
 ROUNDING = 1e-3
-# a rule that holds for more than this share of the rows tells what a column is
+# a column has a meaning if the rule for it holds in more than this share of the rows
 MOST_ROWS = 0.5
-# LAMMPS lists pairs up to this distance, in r1 + r2, for nearly all rows
+# of the pairs that LAMMPS lists, this share is closer than NEIGHBOURS, in units of r1 + r2
 NEIGHBOURS, NEARLY_ALL = 2.0, 0.98
 
 
 class Places(NamedTuple):
-    """Which columns of a list of contacts are what, counted from 0."""
+    """The columns of a contact list by their meaning, counted from 0."""
 
     ids: list[int]
     force: list[list[int]] = []  # noqa: RUF012
-    """Triples of columns, which add up to the force on the first grain."""
+    """Triples of columns; their sum is the force on the first grain."""
     normal: list[int] | None = None
-    """The triple that is the normal part of that force."""
+    """The triple that holds the normal part of this force."""
     touch: bool = True
-    """Whether all pairs in the list touch; LAMMPS lists all within a cut-off."""
+    """Whether all listed pairs touch; LAMMPS lists all pairs within a cut-off."""
 
 
 @np.errstate(all="ignore")
@@ -45,10 +45,10 @@ def join_places(
     path: Path, values: FloatArray, places: Places, grains: GrainTable
 ) -> JoinedContacts:
     """
-    The pairs that touch, and the force on the second grain of each.
+    Join the pairs that touch, with the force on the second grain of each.
 
-    Of a list within a cut-off the pairs with a force touch, or if none is known those that overlap;
-    all touch if no gap is wide.
+    In a list of all pairs within a cut-off, pairs with a force touch; if no force is known, pairs
+    that overlap. If no gap is wide, all pairs touch.
     """
     first, second = places.ids
     where = f", columns {first + 1} and {second + 1}"
@@ -58,38 +58,39 @@ def join_places(
     normal = None if places.normal is None else -values[:, places.normal]
     if not places.touch:
         rows = rows_of_ids(grains, ids)
-        known, gap = (rows >= 0).all(axis=1), np.zeros(len(rows))
-        gap[known] = _gaps(grains, rows[known])
+        are_known, gap = (rows >= 0).all(axis=1), np.zeros(len(rows))
+        gap[are_known] = _gaps(grains, rows[are_known])
         if np.any(gap > ROUNDING):
-            # ids that no grain has stay, for the error that names them
-            touches = ~known | (gap < 0 if force is None else force.any(axis=1))
+            # keep ids that no grain has: join_ids raises the error that names them
+            touches = ~are_known | (gap < 0 if force is None else force.any(axis=1))
             ids, force = ids[touches], None if force is None else force[touches]
     return join_ids(path, grains, ids, force, walls=False, force_n=normal)
 
 
-def named_places(path: Path, told: str, names: list[str]) -> Places:
+def named_places(path: Path, option: str, names: list[str]) -> Places:
     """
-    Columns as users name them.
+    The meaning of the columns, from the option ``contact_columns``.
 
     Parameters
     ----------
     path : Path
-        For messages.
-    told : str
+        The file, for messages.
+    option : str
         Names of columns, ``id1=c_ids[1],id2=c_ids[2],...``; or the keywords of LIGGGHTS' compute
-        pair/gran/local, ``pos id force ...``, whose values have an order of their own.
+        pair/gran/local, ``pos id force ...``, in any order (LIGGGHTS has an order of its own).
     names : list of str
-        Of all columns.
+        The names of all columns.
     """
-    if "=" not in told:
-        return _keyword_places(path, told, len(names))
-    pairs = [part.partition("=") for part in told.split(",")]
-    named = {key.strip(): own.strip() for key, _, own in pairs}
-    known = ({*IDS}, {*IDS, *FORCE}, {*IDS, *FORCE, *TANGENTIAL})
-    if set(named) not in known or len(named) < len(pairs) or not {*named.values()} <= {*names}:
+    if "=" not in option:
+        return _keyword_places(path, option, len(names))
+    pairs = [part.partition("=") for part in option.split(",")]
+    named = {key.strip(): column.strip() for key, _, column in pairs}
+    allowed = ({*IDS}, {*IDS, *FORCE}, {*IDS, *FORCE, *TANGENTIAL})
+    if set(named) not in allowed or len(named) < len(pairs) or not {*named.values()} <= {*names}:
         raise ReadError(
             f"{path}: `contact_columns`: expected id1=NAME,id2=NAME, and fx, fy, fz (tx, ty, tz) "
-            f"for the force on the first grain, found {told!r}; the columns are {', '.join(names)}"
+            f"for the force on the first grain, found {option!r}; "
+            f"the columns are {', '.join(names)}"
         )
     refuse_named_twice(path, {key: named[key] for key in IDS}, "contact_columns")
     triples = [triple for triple in (FORCE, TANGENTIAL) if triple[0] in named]
@@ -97,17 +98,17 @@ def named_places(path: Path, told: str, names: list[str]) -> Places:
     return Places(ids, force, touch=False)
 
 
-def _keyword_places(path: Path, told: str, width: int) -> Places:
-    """Columns by the keywords of compute pair/gran/local; history:N says how many values it has."""
-    asked = dict(word.partition(":")[::2] for word in told.split())
-    sizes = {name: size for name, size in PAIR_VALUES.items() if name in asked}
-    if asked.get("history", "").isdecimal():
-        sizes["history"] = int(asked["history"])
+def _keyword_places(path: Path, option: str, width: int) -> Places:
+    """The columns for keywords of compute pair/gran/local; history:N has N values."""
+    keywords = dict(word.partition(":")[::2] for word in option.split())
+    sizes = {name: size for name, size in PAIR_VALUES.items() if name in keywords}
+    if keywords.get("history", "").isdecimal():
+        sizes["history"] = int(keywords["history"])
     count = sum(sizes.values())
-    if len(sizes) < len(asked) or "id" not in asked or count != width:
+    if len(sizes) < len(keywords) or "id" not in keywords or count != width:
         raise ReadError(
             f"{path}: `contact_columns`: expected id1=NAME,id2=NAME, or keywords, id among them "
-            f"({', '.join(PAIR_VALUES)}), for {width} columns; {told!r} is for {count}"
+            f"({', '.join(PAIR_VALUES)}), for {width} columns; {option!r} is for {count}"
         )
     starts = dict(zip(sizes, accumulate(sizes.values(), initial=0), strict=False))
     triple = {name: [start, start + 1, start + 2] for name, start in starts.items()}
@@ -117,32 +118,32 @@ def _keyword_places(path: Path, told: str, width: int) -> Places:
 
 
 def are_whole(values: FloatArray) -> bool:
-    """Whether all are whole numbers."""
+    """Whether all values are whole numbers."""
     return bool(np.all(values == np.rint(values)))
 
 
 def are_ids(values: FloatArray, grains: GrainTable) -> bool:
-    """Whether nearly all are ids of grains: a wrong one among them is reported by its name."""
+    """Whether most values are ids of grains; a wrong id among them is reported later."""
     return are_whole(values) and bool(np.mean(rows_of_ids(grains, values) >= 0) > MOST_ROWS)
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def id_column(values: FloatArray, grains: GrainTable, *, is_flagged: bool) -> int | None:
     """
-    The first of two neighbouring columns of ids; None unless there is one choice.
+    Find two neighbouring columns of ids; the number of the first, None unless it is unique.
 
     Parameters
     ----------
     values : ndarray, shape (M, columns)
         The rows of contacts.
     grains : GrainTable
-        With ids.
+        The grains, with ids.
     is_flagged : bool
-        Whether a flag 0 or 1 stands behind the ids, as LIGGGHTS writes it. Else the two ids must
-        name grains that lie side by side, and hardly any pair may occur twice: the types of two
-        grains do so all the time, a pair that touches through several images does not.
+        Whether a flag 0 or 1 follows the ids, as LIGGGHTS writes it. If not, the ids must name
+        grains that are close, and at least half of the pairs must be distinct: columns with the
+        types of two grains repeat the same few pairs.
     """
-    found = []
+    places = []
     for place in range(values.shape[1] - 1 - is_flagged):
         pairs = values[:, place : place + 2]
         if not all(are_ids(column, grains) for column in pairs.T):
@@ -157,12 +158,12 @@ def id_column(values: FloatArray, grains: GrainTable, *, is_flagged: bool) -> in
             is_near = bool(np.mean(gaps < NEIGHBOURS - 1) > NEARLY_ALL)
             fits = is_near and single >= 0.5 * len(pairs)
         if fits:
-            found.append(place)
-    return found[0] if len(found) == 1 else None
+            places.append(place)
+    return places[0] if len(places) == 1 else None
 
 
 def refuse_rounded_ids(path: Path, values: FloatArray, grains: GrainTable) -> None:
-    """ReadError for ids of a million or more that %g has rounded to six digits."""
+    """ReadError if ids of a million or more were rounded to six digits by the format %g."""
     assert grains.id is not None
     longer = grains.id[grains.id >= 1_000_000]
     digits = 10 ** (np.floor(np.log10(np.maximum(longer, 1))).astype(np.int64) - 5)
@@ -170,11 +171,11 @@ def refuse_rounded_ids(path: Path, values: FloatArray, grains: GrainTable) -> No
     large = np.any(values >= 1e6, axis=0) & np.all(values == np.rint(values), axis=0)
     if longer.size and large.any() and not np.isin(values[:, large], longer).any():
         advice = 'write them with dump_modify ... format "%.0f ..."'
-        raise ReadError(f"{path}: its ids above 999999 are rounded to six digits: {advice}")
+        raise ReadError(f"{path}: ids above 999999 are rounded to six digits: {advice}")
 
 
 def _gaps(grains: GrainTable, rows: IntArray) -> FloatArray:
-    """Gaps between the surfaces of pairs of grains, nearest image, in r1 + r2."""
+    """Gaps between the surfaces of pairs of grains (nearest image), in units of r1 + r2."""
     length = np.linalg.norm(branches(grains, rows), axis=1)
     gaps: FloatArray = length / grains.radius[rows].sum(axis=1) - 1.0
     return gaps

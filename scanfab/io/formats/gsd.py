@@ -1,8 +1,8 @@
 """
-GSD, the files of HOOMD-blue.
+GSD, the file format of HOOMD-blue.
 
-A property that was never written has HOOMD's default value. The default diameter is 1, which nobody
-means, so a file without diameters has no radii.
+A property that was never written has HOOMD's default value. The default diameter is 1, which is
+hardly ever meant; therefore a file without diameters counts as having no radii.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from scanfab.io.formats.shared import GrainsOnly, cell_of, numbered_frames
 from scanfab.io.reader import Snapshot
 from scanfab.packing.cell import Cell
 
-# the first eight bytes of a file
+# the first eight bytes of each file
 MAGIC = (0x65DF65DF65DF65DF).to_bytes(8, "little")
 STEP, PARTICLES = "configuration/step", "particles/"
 GROUPS = (PARTICLES, "configuration/", "log/particles/")
@@ -38,7 +38,7 @@ class GsdReader(GrainsOnly):
         return first_bytes(path, len(MAGIC)) == MAGIC
 
     def names(self, path: Path) -> list[str]:
-        """Those of all frames: without diameters there are no radii."""
+        """The names of all arrays in all frames; without diameters the file holds points."""
         return [name.rpartition("/")[2] for name in fenced(read_in_worker, path, None)[1]]
 
     def snapshots(self, path: Path) -> list[Snapshot]:
@@ -47,7 +47,7 @@ class GsdReader(GrainsOnly):
         return numbered_frames(path, ((step, None) for step in steps))
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
-        """What the frame, or else the first one, has of each particle."""
+        """The arrays of the particles in the frame, or in the first frame, and the cell."""
         path, where = snapshot.path, f"{snapshot.path}, frame {snapshot.start}"
         arrays = fenced(read_in_worker, path, snapshot.start)[2]
         position = arrays.pop("particles/position", np.zeros((0, 3), np.float32))
@@ -56,7 +56,7 @@ class GsdReader(GrainsOnly):
         if position.shape != (*count, 3) or len(box) not in (0, 6):
             expected = f"positions of shape {(*count, 3)} and six numbers as box"
             raise ReadError(f"{where}: expected {expected}, found {position.shape} and {box}")
-        # the first frame may have had another number of particles; types are texts
+        # not an array of the first frame with another number of particles; not the names of types
         columns: Columns = {
             name.removeprefix("log/").removeprefix(PARTICLES): values
             for name, values in arrays.items()
@@ -65,11 +65,11 @@ class GsdReader(GrainsOnly):
         columns["position"] = position.astype(np.float64)
         if not box:
             return columns, None
-        # edges and tilt factors (of the second and third edge), about the origin
+        # edges and tilt factors (of the second and third edge); the box is centred at the origin
         lx, ly, lz, xy, xz, yz = box
         flat = arrays.get("configuration/dimensions", np.array([3])).tolist() == [2]
         if flat:
-            # the edge across the plane means nothing, and may be 0
+            # in 2D the edge along z has no meaning, and may be 0
             lz, xz, yz = max(lx, ly), 0.0, 0.0
         vectors = np.array([[lx, 0, 0], [xy * ly, ly, 0], [xz * lz, yz * lz, lz]])
         origin = -0.5 * vectors.sum(axis=0)
@@ -78,7 +78,7 @@ class GsdReader(GrainsOnly):
 
 def read_in_worker(path: str, frame: int | None) -> tuple[list[int], list[str], Columns]:
     """
-    The steps of all frames and the names of all arrays; the arrays of a frame if one is given.
+    Read the steps of all frames and the names of all arrays, or the arrays of one frame.
 
     ValueError says why a file cannot be read.
     """
@@ -90,9 +90,9 @@ def read_in_worker(path: str, frame: int | None) -> tuple[list[int], list[str], 
         names = [name for name in file.find_matching_chunk_names("") if name.startswith(GROUPS)]
 
         def array(number: int, name: str) -> AnyArray:
-            """What does not change is written in the first frame only; texts if not even there."""
-            own = [one for one in (number, 0) if file.chunk_exists(frame=one, name=name)]
-            return np.asarray(file.read_chunk(frame=own[0], name=name) if own else "")
+            """The array of a frame; if it is constant, of the first frame; else an empty text."""
+            frames = [k for k in (number, 0) if file.chunk_exists(frame=k, name=name)]
+            return np.asarray(file.read_chunk(frame=frames[0], name=name) if frames else "")
 
         if frame is None:
             return [int(array(k, STEP).item() or 0) for k in range(file.nframes)], names, {}

@@ -20,19 +20,19 @@ from scanfab.packing.cell import Cell
 START = re.compile(rb"^[ \t]*Begin[ \t]+(?:ModelPartData|Properties|Nodes|Table)\b", re.MULTILINE)
 COMMENT = re.compile(rb"//[^\n]*")
 BORDER = re.compile(rb"^[ \t]*(Begin|End)\b", re.MULTILINE)
-# what a block holds, which elements these are, and its rows
+# a block: its kind, the rest of its first line, and its rows
 BLOCK = re.compile(
     rb"^[ \t]*Begin[ \t]+(Nodes|NodalData[ \t]+RADIUS|Elements)\b([^\n]*)\n(.*?)^[ \t]*End\b",
     re.MULTILINE | re.DOTALL,
 )
-# the columns of these blocks; the second one of radii says whether the value is fixed
+# the columns of these blocks; `fixed` says whether Kratos may change the value
 COLUMNS = {
     "Nodes": ("id", "x", "y", "z"),
     "NodalData RADIUS": ("id", "fixed", "radius"),
     "Elements": ("element", "properties", "id"),
 }
 RADII = re.compile(rb"^[ \t]*Begin[ \t]+NodalData[ \t]+RADIUS\b", re.MULTILINE)
-# of a group in HDF5
+# the datasets that a group of grains in HDF5 must have
 DATASETS = {"id", "x", "y", "z", "radius"}
 
 
@@ -52,27 +52,27 @@ class KratosReader(GrainsOnly):
         return START.search(COMMENT.sub(b"", head)) is not None and b"\x00" not in head
 
     def kind(self, path: Path) -> FileKind:
-        """Grains if nodes have radii; meshes of walls have none."""
+        """Grains if nodes have radii; the meshes of walls have none."""
         if not self.recognises(path):
             return "other"
         is_grains = is_hdf(first_bytes(path)) or RADII.search(_text(path))
         return "grains" if is_grains else "other"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
-        """One, or the groups with their times; ``start`` is then the number of the group."""
+        """One snapshot, or in HDF5 one for each group; ``start`` is the number of the group."""
         if not is_hdf(first_bytes(path)):
             return [Snapshot(path)]
         return numbered_frames(path, ((None, time) for time in _groups(path).values()))
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
-        """Nodes with a radius, in the order of the radii; or the arrays of a group."""
+        """The nodes with a radius, in the order of the radii; in HDF5 the arrays of the group."""
         path = snapshot.path
         if is_hdf(first_bytes(path)):
             name = [*_groups(path)][snapshot.start]
-            own = read_hdf_file(path).below(name)
-            if any(values.shape != own["id"].shape for values in own.values()):
+            arrays = read_hdf_file(path).below(name)
+            if any(values.shape != arrays["id"].shape for values in arrays.values()):
                 raise ReadError(f"{path}: group {name}: expected columns of one length")
-            return own, None
+            return arrays, None
         data = _text(path)
         parts: dict[str, list[Columns]] = {kind: [] for kind in COLUMNS}
         for block in BLOCK.finditer(data):
@@ -90,24 +90,26 @@ class KratosReader(GrainsOnly):
         lost = {id for part in parts["Elements"] for id in part["id"].tolist()} - {*ids}
         lost |= {*ids} - place.keys()
         if lost:
-            raise ReadError(f"{path}: no place or RADIUS for {len(lost)} nodes, one is {min(lost)}")
+            raise ReadError(
+                f"{path}: no place or RADIUS for {len(lost)} nodes, such as {min(lost)}"
+            )
         rows = np.array([place[id] for id in ids], dtype=int)
         places = {axis: nodes[axis][rows] for axis in "xyz"}
         return {"id": radii["id"], **places, "radius": radii["radius"]}, None
 
 
 def _groups(path: Path) -> dict[str, float | None]:
-    """The times of the groups at the top that hold grains, in the order of their numbers."""
-    file, found = read_hdf_file(path, with_data=False), {}
+    """The top groups that hold grains, in the order of their numbers, and their times."""
+    file, times = read_hdf_file(path, with_data=False), {}
     for name in sorted(filter(str.isdecimal, file.attributes), key=int):
         if file.below(name).keys() >= DATASETS:
             time = file.attributes[name].get("time")
-            found[name] = float(time) if isinstance(time, int | float) else None
-    return found
+            times[name] = float(time) if isinstance(time, int | float) else None
+    return times
 
 
 def _text(path: Path) -> bytes:
-    """The text without comments; each block that begins must end."""
+    """The text without comments; ReadError if a block has no end."""
     data = COMMENT.sub(b"", text_of(Snapshot(path)))
     borders = BORDER.findall(data)
     if borders.count(b"Begin") != borders.count(b"End"):

@@ -19,44 +19,44 @@ from scanfab.io.formats.text_dump import TextDump
 from scanfab.io.formats.vtk import FormsReader, VtkReader
 from scanfab.io.reader import GrainTable, JoinedContacts, ReadOptions, Snapshot
 
-# LIGGGHTS writes neither of these items, and its bounds with six digits
+# only LAMMPS writes these items, and bounds with 16 digits (LIGGGHTS: six digits)
 LAMMPS_ITEMS = re.compile(
     rb"^ITEM: (?:(?:UNITS|TIME)\s|BOX BOUNDS(?: abc|[^\n]*\n-?\d\.\d{16}e))", re.MULTILINE
 )
-# LIGGGHTS begins a restart with a flag, the length of its version, and the version
+# a restart of LIGGGHTS begins with a flag, the length of the version, and the version
 RESTART = re.compile(rb"LammpS RestartT|\0{4}.{2}\0\0[^\0]{0,100}LIGGGHTS", re.DOTALL)
 FORMS: tuple[GrainsOnly, ...] = (TextDump(), DataFile(), NetcdfDump(), BinaryDump())
 
 
 class DumpReader(FormsReader):
-    """What the readers of LAMMPS' and LIGGGHTS' dumps have in common."""
+    """Base class of the readers of LAMMPS' and LIGGGHTS' dumps."""
 
     lists_contacts = False
     lists_walls = False
-    """Whether there are lists of contacts with walls, which are known by their values."""
+    """Whether the program lists contacts with walls, which are recognised by their values."""
     forms = FORMS
 
     def recognises(self, path: Path) -> bool:
-        """By what only one of both programs writes."""
+        """By marks that only one of both programs writes."""
         return _program(path) == self.name
 
     def form(self, path: Path) -> GrainsOnly | VtkReader:
-        """The reader of the form that a file has, by its first bytes; VTK's for all others."""
+        """The reader for the form of a file, VTK's if no other fits; ReadError for a restart."""
         if RESTART.match(first_bytes(path)):
             advice = "let its program read it, and dump custom ... id type x y z radius"
-            raise ReadError(f"{path}: a binary restart, which only its program reads: {advice}")
+            raise ReadError(f"{path}: only its own program can read a binary restart: {advice}")
         return super().form(path)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
         """
-        Pairs of a ``dump local``, with their force if it is known which columns are the force.
+        The pairs of a ``dump local``, with forces if the columns of the force are known.
 
-        Which column is what follows from ``contact_columns``, or from the values if these leave no
-        doubt.
+        The meaning of the columns comes from ``contact_columns``, or from the values if these leave
+        no doubt.
         """
-        path, told, form = snapshot.path, options.contact_columns, self.form(snapshot.path)
+        path, option, form = snapshot.path, options.contact_columns, self.form(snapshot.path)
         if not isinstance(form, TextDump):
             return form.read_contacts(snapshot, options, grains)
         columns, _ = form.table(snapshot)
@@ -64,36 +64,36 @@ class DumpReader(FormsReader):
         if not len(values) or grains.id is None:
             return join_ids(path, grains, np.zeros((0, 2), np.int64), None, walls=False)
         dump_contacts.refuse_rounded_ids(path, values, grains)
-        found = self.found(path, values, grains) if told is None or self.lists_walls else None
-        if isinstance(found, JoinedContacts):
-            return found
-        if told is not None:
-            found = dump_contacts.named_places(path, told, list(columns))
-        if found is None:
+        places = self.found(path, values, grains) if option is None or self.lists_walls else None
+        if isinstance(places, JoinedContacts):
+            return places
+        if option is not None:
+            places = dump_contacts.named_places(path, option, list(columns))
+        if places is None:
             may_be_ids = sum(map(dump_contacts.are_whole, values.T)) > 1
-            told = f"no two columns of {', '.join(columns)} are surely ids of these grains"
+            problem = f"no two columns of {', '.join(columns)} are surely ids of these grains"
             advice = '`contact_columns="id1=NAME,id2=NAME"` or LIGGGHTS\' keywords name them'
             error = OtherGrainsError if may_be_ids else NotContactsError
-            raise error(f"{path}: {told}: {advice}")
-        return dump_contacts.join_places(path, values, found, grains)
+            raise error(f"{path}: {problem}: {advice}")
+        return dump_contacts.join_places(path, values, places, grains)
 
     def found(
         self, path: Path, values: FloatArray, grains: GrainTable
     ) -> dump_contacts.Places | JoinedContacts | None:
-        """Which columns are the ids, if their values leave no doubt; no force is read."""
+        """The columns of ids, if the values leave no doubt; forces cannot be recognised."""
         place = dump_contacts.id_column(values, grains, is_flagged=False)
         return None if place is None else dump_contacts.Places([place, place + 1], touch=False)
 
 
 def _program(path: Path) -> str | None:
-    """Which of both programs wrote a file; None if neither did."""
+    """``lammps`` or ``liggghts``, the program that wrote a file; None if neither did."""
     head = first_bytes(path)
     first, _, rest = head.partition(b"\n")
     if head.startswith(b"# vtk DataFile"):
         return "liggghts" if b"LIGGGHTS" in rest.partition(b"\n")[0] else None
     form = next((form for form in FORMS if form.recognises(path)), None)
     if RESTART.match(head) or isinstance(form, DataFile):
-        # the first line is free, or holds the version of the program
+        # the first line is free text, or holds the version of the program
         is_liggghts = b"LIGGGHTS" in first[:1000].upper()
     elif isinstance(form, BinaryDump):
         # the columns of LIGGGHTS' binary dumps have no names
@@ -106,7 +106,7 @@ def _program(path: Path) -> str | None:
 
 
 class LammpsReader(DumpReader):
-    """Reader plugin for what LAMMPS dumps."""
+    """Reader plugin for the dumps of LAMMPS."""
 
     name = "lammps"
     description = "LAMMPS dump custom (text, binary, yaml, netcdf), dump local (text), write_data"

@@ -1,4 +1,4 @@
-"""LF_DEM: ``par_*.dat`` with grains and ``int_*.dat`` with pairs, sheared by Lees and Edwards."""
+"""LF_DEM: ``par_*.dat`` with grains and ``int_*.dat`` with pairs, in a Lees-Edwards cell."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions,
 from scanfab.io.text import Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
-# what a column holds, or a range of them
+# the title of a column, or of a range of columns
 LEGEND = re.compile(rb"^#(\d{1,3})(?:-(\d{1,3}))?:[ \t]*([^\r\n]*)", re.MULTILINE)
-# number of grains and edges of the cell
+# the number of grains, and the edges of the cell
 SIZES = re.compile(rb"^#[ \t]+(np(?=[ \t]+\d{1,15}\s)|L[xyz])[ \t]+(\S+)", re.MULTILINE)
-# above each frame: strain, shear displacement, rate and more
+# the line above each frame: strain, shear displacement, rate and more
 FRAME = re.compile(rb"#[ \t]+([-+\d.eE]+)[ \t]+([-+\d.eE]+)[ \t]+[-+\d.eE]+[^\r\n]*\r?\n")
 POSITION, PAIR = "position (x, y, z)", ("particle 1 label", "particle 2 label")
 NORMAL = "normal vector, oriented from particle 1 to particle 2"
 PUSH = "norm of the normal part of the contact force"
 TANGENTIAL = "tangential part of the contact force"
-# versions that have this title write the push with its sign, although its own title says norm
+# versions with this title write PUSH with a sign, although its title says norm
 OF_SIGNED_PUSH = "normal part of the lubrication force"
 
 
@@ -41,28 +41,28 @@ class LfDemReader(shared.GrainsOnly):
         return first_bytes(path).startswith(b"# LF_DEM version")
 
     def kind(self, path: Path) -> FileKind:
-        """By the titles of the columns."""
+        """Contacts or grains, by the titles of the columns."""
         titles = _legend(path) if self.recognises(path) else {}
         if PAIR[0] in titles:
             return "contacts"
         return "grains" if {"particle index", "radius"} <= titles.keys() else "other"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
-        """One behind the other; their time is the strain."""
+        """The frames, one after the other; their time is the strain."""
         check = None if self.kind(path) == "contacts" else self.table
         return shared.marked_frames(path, FRAME, check)
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
-        """Columns by their titles; the images above and below are shifted along x."""
+        """The columns by their titles; the third cell vector is sheared along x."""
         path = snapshot.path
-        found = dict(SIZES.findall(first_bytes(path, shared.HEADER_BYTES)))
-        words = b" ".join(found.get(name, b"") for name in (b"np", b"Lx", b"Ly", b"Lz"))
+        sizes = dict(SIZES.findall(first_bytes(path, shared.HEADER_BYTES)))
+        words = b" ".join(sizes.get(name, b"") for name in (b"np", b"Lx", b"Ly", b"Lz"))
         where = f"{path}: lines '# np', '# Lx', '# Ly' and '# Lz'"
         count, x, y, z = shared.numbers(where, words, 4)
         needed = ("particle index", "radius", POSITION)
         columns, shift = _columns(snapshot, needed, int(count))
         columns["id"], columns["position"] = columns.pop("particle index"), columns.pop(POSITION)
-        # the cell lies about the origin; a plane (Ly = 0) does not repeat across
+        # the cell is centred at the origin; a 2D sample (Ly = 0) is not periodic along y
         vectors = np.array([[x, 0, 0], [0, y or z, 0], [shift, 0, z]])
         where, origin = f"{path}: the cell of Lx, Ly, Lz and the shear", -0.5 * vectors.sum(axis=0)
         return columns, shared.cell_of(where, vectors, (True, y != 0.0, True), origin)
@@ -71,10 +71,10 @@ class LfDemReader(shared.GrainsOnly):
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
         """
-        The pairs whose contact state is above zero.
+        The pairs whose contact state is above zero, with contact forces.
 
-        All others are near enough for lubrication, and do not touch. Forces are those of contact
-        alone, without lubrication and repulsion.
+        Other pairs interact by lubrication only and do not touch. Forces of lubrication and
+        repulsion are not included.
         """
         path = snapshot.path
         states = [title for title in _legend(path) if "contact state" in title]
@@ -87,24 +87,24 @@ class LfDemReader(shared.GrainsOnly):
             return shared.join_pairs(path, grains, ends, None)
         push = columns[PUSH][:, None]
         if len(push) and OF_SIGNED_PUSH not in columns and np.all(push >= 0):
-            told = "LF_DEM writes no sign of normal contact forces since August 2016"
-            warn(f"{path}: {told}: all are taken for pushes")
-        # in the program's source contact forces act on particle 1: a push against the normal,
-        # which points to particle 2, and the tangential part as it is
+            problem = "LF_DEM has written normal contact forces without sign since August 2016"
+            warn(f"{path}: {problem}: all are taken as repulsive")
+        # by LF_DEM's source, contact forces act on particle 1; the normal points to particle 2, so
+        # a push on particle 1 is against the normal, while the tangential part needs no sign
         with np.errstate(over="ignore", invalid="ignore"):
             force = push * columns[NORMAL] - columns[TANGENTIAL]
         return shared.join_pairs(path, grains, ends, force)
 
 
 def _legend(path: Path) -> dict[str, range]:
-    """The places of the columns of each title."""
-    found = {}
+    """The range of columns of each title."""
+    legend = {}
     for first, last, words in LEGEND.findall(first_bytes(path, shared.HEADER_BYTES)):
         places = range(max(int(first) - 1, 0), int(last or first))
         title = words.decode("utf-8", "replace").strip()
         if len(places) == 3 or (len(places) and title not in (POSITION, NORMAL, TANGENTIAL)):
-            found[title] = places
-    return found
+            legend[title] = places
+    return legend
 
 
 def _columns(

@@ -1,8 +1,8 @@
 """
 LIGGGHTS: ``dump custom`` and ``dump local`` text, and its VTK files.
 
-In ``dump local`` the column names say nothing. ``compute pair/gran/local`` and ``wall/gran/local``
-write their values in an order of their own, whatever the order of the keywords.
+The column names in ``dump local`` have no meaning. ``compute pair/gran/local`` and
+``wall/gran/local`` write their values in a fixed order, whatever the order of the keywords.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from scanfab.io.formats.lammps import DumpReader
 from scanfab.io.reader import GrainTable, JoinedContacts
 from scanfab.packing.contacts import ListedWallForces
 
-# damping makes the force of a few contacts attractive; the others push
+# at least this share of contact forces is repulsive; damping makes a few attractive
 PUSHES = 0.9
 
 
 class LiggghtsReader(DumpReader):
-    """Reader plugin for what LIGGGHTS dumps."""
+    """Reader plugin for the dumps of LIGGGHTS."""
 
     name = "liggghts"
     description = (
@@ -33,7 +33,7 @@ class LiggghtsReader(DumpReader):
     extensions = (".liggghts", ".dump", ".vtk", ".vtp", ".vtu", ".bin", ".data")
 
     lists_walls = True
-    # in VTK a contact list names grains only, and the force acts on the first grain
+    # in VTK files contacts are between grains only, and the force acts on the first grain
     walls = False
     force_arrays = ("force", "force_normal", "force_tangential")
     sign = -1.0
@@ -43,10 +43,10 @@ class LiggghtsReader(DumpReader):
         self, path: Path, values: FloatArray, grains: GrainTable
     ) -> Places | JoinedContacts | None:
         """
-        Pairs of ``pair/gran/local``: two columns of ids, then the periodic flag 0 or 1.
+        Recognise the columns of ``pair/gran/local``: two ids, then the periodic flag 0 or 1.
 
-        The force stands behind the flag, if that pushes the grains apart. Without pairs there may
-        be grains that touch walls.
+        The next three columns are the force if they push the grains apart. If there are no pairs,
+        the list is tried as contacts with walls.
         """
         place = id_column(values, grains, is_flagged=True)
         if place is None:
@@ -63,11 +63,11 @@ class LiggghtsReader(DumpReader):
 @np.errstate(over="ignore", invalid="ignore")
 def _walls(path: Path, values: FloatArray, grains: GrainTable) -> JoinedContacts | None:
     """
-    Contacts with walls of each grain, and their forces if the file has them; None if no such file.
+    Number of contacts with walls of each grain, and forces if there are any; None for other files.
 
-    The id of the grain stands behind those of wall and triangle, and behind its centre. In front of
-    the centre stands the contact point, and behind the id the force on the grain: these are told by
-    their values, as the point lies on the grain's surface and the force pushes the grain off it.
+    The columns are: contact point, centre of the grain, ids of wall, triangle and grain, force on
+    the grain. Point and force are optional and recognised by their values: the point lies on the
+    surface of the grain, and the force pushes the grain away from it.
     """
     for place in range(5, values.shape[1]):
         if not are_ids(values[:, place], grains) or not are_whole(values[:, place - 2 : place]):

@@ -1,9 +1,9 @@
 """
 MercuryDPM: grains in ``.data`` and contacts in ``.fstat``, or both in ``.restart``.
 
-In ``.fstat`` contacts name grains by their row, from 0, and walls by numbers below 0. Each pair is
-listed from both sides, unless one of them is fixed or an image in a periodic cell. A restart names
-grains by their ids, in rows of words and numbers.
+In ``.fstat`` contacts name grains by their row, counted from 0, and walls by negative numbers. Each
+pair is listed from both sides, unless one grain is fixed or a periodic image. A restart names
+grains by ids, in rows of words and numbers.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, Rea
 from scanfab.io.text import Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
-# the columns of a frame in the plane and in space, by the number of words in the line above it
+# columns of a frame in 2D and 3D; the line above the frame has 6 words in 2D and 8 in 3D
 PLANE = "x y vx vy radius angle omega species"
 SPACE = "x y z vx vy vz radius q1 q2 q3 wx wy wz species"
 LAYOUTS = {6: Layout(tuple(PLANE.split()), line=2), 8: Layout(tuple(SPACE.split()), line=2)}
-# these lines: the number of grains, the time, and bounds
+# the line above a frame: number of grains, time, and bounds
 FRAME = rb"(?m)^\d{1,15}[ \t]+(\S+)(?:[ \t]+[-+.\deEinfa]+){%d}[ \t]*\r?\n"
 FRAMES = {width: re.compile(FRAME % (width - 2)) for width in LAYOUTS}
-# time, both rows, contact point, overlaps, normal and tangential force, normal, tangent
+# time, rows of both grains, contact point, overlaps, normal and tangential force, both directions
 PAIRS = "t i j x y z delta deltat fn ft nx ny nz tx ty tz"
 FSTAT = re.compile(rb"#[ \t]+(\S+)[ \t]+[01][ \t]*\r?\n")
-# two more lines stand above the contacts of a frame
+# the line FSTAT and two more lines above the contacts of a frame
 FSTAT_HEAD = re.compile(FSTAT.pattern + rb"#(?:[ \t]+\S+){6}\s+#(?:[ \t]+\S+){6,7}[ \t]*\r?\n")
 RESTART = re.compile(rb"(?:restart_version|MercuryDPM)[ \t]+[\d.]+")
 TIME = re.compile(rb"^(?:timeStep|dt) \S+ (?:time|t) (\S+)", re.MULTILINE)
 DOMAIN = re.compile(rb"(?im)^xmin (\S+) xmax (\S+) ymin (\S+) ymax (\S+) zmin (\S+) zmax (\S+)")
-# rows of a restart; versions 1 to 3 have centre, velocity and radius without words
+# rows of a restart; versions 1 to 3 list centre, velocity and radius without words between them
 SPHERE = re.compile(
     rb"(?!\w*(?:SuperQuadric|NonSpherical|Clump|Multi))\w*Particle id (?P<id>\S+) indSpecies "
     rb"(?P<species>\S+) position (?P<x>\S+) (?P<y>\S+) (?P<z>\S+) .*\bradius (?P<radius>\S+)"
@@ -51,7 +51,7 @@ PERIOD = re.compile(
     rb"PeriodicBoundary .*?normal (?P<nx>\S+) (?P<ny>\S+) (?P<nz>\S+) .*?"
     rb"(?:position_left|distanceLeft) (?P<left>\S+) .*?shift (?P<x>\S+) (?P<y>\S+) (?P<z>\S+)"
 )
-# boundaries that repeat, most of them in another way than by a shift
+# boundaries that repeat the sample; all but the plain PeriodicBoundary are refused
 PERIODS = re.compile(rb"\w*(?:LeesEdwards|Periodic|Maser|StressStrain|Circular)")
 
 
@@ -67,18 +67,18 @@ class MercuryReader(shared.GrainsOnly):
         """A restart by its first word, contacts by three lines, grains by the line above them."""
         head = first_bytes(path, shared.HEADER_BYTES)
         second = head.partition(b"\n")[2].partition(b"\n")[0].split()
-        # below an empty frame there is another one, or nothing
+        # the second line has no 8 or 14 words after an empty frame: then the name decides
         is_data = len(second) in (8, 14) or ".data" in bare_name(path)
-        known = (RESTART, FSTAT_HEAD, *(FRAMES.values() if is_data else ()))
-        return any(one.match(head) for one in known)
+        marks = (RESTART, FSTAT_HEAD, *(FRAMES.values() if is_data else ()))
+        return any(mark.match(head) for mark in marks)
 
     def kind(self, path: Path) -> FileKind:
-        """Contacts are in ``.fstat`` files."""
+        """Contacts for ``.fstat`` files, else grains."""
         is_list = FSTAT_HEAD.match(first_bytes(path, shared.HEADER_BYTES)) is not None
         return "contacts" if is_list else super().kind(path)
 
     def snapshots(self, path: Path) -> list[Snapshot]:
-        """Frames one behind the other, with their times; a restart is one."""
+        """The frames, one after the other, with their times; a restart is one frame."""
         head = first_bytes(path, shared.HEADER_BYTES)
         if FSTAT_HEAD.match(head):
             return shared.marked_frames(path, FSTAT)
@@ -88,18 +88,18 @@ class MercuryReader(shared.GrainsOnly):
         return [Snapshot(path, time=time and shared.numbers(f"{path}: time", time[1], 1)[0])]
 
     def carries(self, path: Path) -> Carries:
-        """A restart has its periodic boundaries; the bounds in ``.data`` may repeat or not."""
+        """A restart states its periodic boundaries; ``.data`` has only bounds."""
         return "cell" if RESTART.match(first_bytes(path)) else "box"
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """A restart has words in its rows, and contacts."""
+        """The grains of a frame; a restart also has contacts."""
         if RESTART.match(first_bytes(snapshot.path)):
             return _restart(snapshot.path, text_of(snapshot), options)
         return super().read_grains(snapshot, options)
 
     @np.errstate(invalid="ignore")
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
-        """The rows of ``.data``; nothing is known to repeat."""
+        """The rows of ``.data``, and their bounds as a cell that is not periodic."""
         path, (line, _, rows) = snapshot.path, text_of(snapshot).partition(b"\n")
         where = f"{path}: number of grains, time and bounds above a frame"
         width = 6 if len(line.split()) == 6 else 8
@@ -115,10 +115,10 @@ class MercuryReader(shared.GrainsOnly):
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
         """
-        Pairs with their forces; rows with walls are counted.
+        The pairs with their forces; contacts with walls are counted.
 
-        The normal points from the second to the first grain, on which normal and tangential force
-        act. That pairs are listed from both sides does no harm.
+        Normal and tangential force act on the first grain, and the normal points to this grain from
+        the second. Pairs that are listed from both sides are merged later.
         """
         rows = text_of(snapshot).split(b"\n", 3)[-1]
         layout = Layout(tuple(PAIRS.split()), line=4, whole="ij")
@@ -126,13 +126,13 @@ class MercuryReader(shared.GrainsOnly):
         normal, tangent = (np.column_stack([columns[f"{v}{x}"] for x in "xyz"]) for v in "nt")
         with np.errstate(over="ignore", invalid="ignore"):
             force = -(columns["fn"][:, None] * normal + columns["ft"][:, None] * tangent)
-        # rows of the grain file, whatever ids these have
+        # contacts name rows of the grain file, whatever ids the grains have
         numbered = grains._replace(id=np.arange(len(grains.radius)))
         return shared.join_pairs(snapshot.path, numbered, (columns["i"], columns["j"]), force)
 
 
 def _restart(path: Path, data: bytes, options: ReadOptions) -> GrainTable:
-    """The particles, and the interactions, whose force acts on the first grain."""
+    """The particles of a restart with their interactions, whose force acts on the first grain."""
     rows = _section(path, data, b"Particles")
     is_old = any(OLD_SPHERE.match(row) for row in rows[:1])
     columns = _columns(path, rows, OLD_SPHERE if is_old else SPHERE, "spheres")
@@ -142,16 +142,16 @@ def _restart(path: Path, data: bytes, options: ReadOptions) -> GrainTable:
     if is_old or not rows:
         return grains
     rows = _section(path, data, b"Interactions")
-    found = _columns(path, rows, PAIR, "interactions of particleIds with a force")
-    first, second, *force = found.values()
-    # walls have numbers from 0, too
+    values = _columns(path, rows, PAIR, "interactions of particleIds with a force")
+    first, second, *force = values.values()
+    # walls are also numbered from 0
     second[[b" particleWallIds " in row for row in rows]] = -1
     joined = shared.join_pairs(path, grains, (first, second), -np.column_stack(force))
     return grains._replace(contacts=joined.contacts, wall_contacts=joined.wall_contacts)
 
 
 def _section(path: Path, data: bytes, name: bytes) -> list[bytes]:
-    """The rows below the line that counts them."""
+    """The rows of a section, below the line with its name and their number."""
     head = re.search(rb"^" + name + rb"[ \t]+(\d{1,12})[ \t]*\r?\n", data, re.MULTILINE)
     count, below = (int(head[1]), data[head.end() :]) if head else (1, b"")
     *rows, behind = below.split(b"\n", count)
@@ -162,7 +162,7 @@ def _section(path: Path, data: bytes, name: bytes) -> list[bytes]:
 
 
 def _columns(path: Path, rows: list[bytes], pattern: re.Pattern[bytes], what: str) -> Columns:
-    """The numbers that stand in the groups of a pattern, by their names."""
+    """The numbers in the groups of a pattern, by the names of the groups; a row per line."""
     table = np.zeros((len(rows), pattern.groups))
     for place, row in enumerate(rows):
         match = pattern.match(row)
@@ -172,16 +172,16 @@ def _columns(path: Path, rows: list[bytes], pattern: re.Pattern[bytes], what: st
 
 
 def _cell(path: Path, data: bytes) -> Cell | None:
-    """The domain, with the shift of each periodic boundary as the edge along its normal."""
-    words = b" ".join(word for one in DOMAIN.findall(data)[:1] for word in one)
+    """The domain as a cell; along a periodic boundary the edge is the shift of the boundary."""
+    words = b" ".join(word for bounds in DOMAIN.findall(data)[:1] for word in bounds)
     bounds = np.array(shared.numbers(f"{path}: its domain xMin xMax ...", words, 6))
     origin, vectors = bounds[::2], np.diag(bounds[1::2] - bounds[::2])
     rows = [row for row in _section(path, data, b"Boundaries") if PERIODS.match(row)]
     expected = "a PeriodicBoundary (or name the cell: `cell=(LX, LY, LZ)`)"
-    found = np.column_stack([*_columns(path, rows, PERIOD, expected).values()])
-    which, axes = np.nonzero(found[:, :3])
+    boundaries = np.column_stack([*_columns(path, rows, PERIOD, expected).values()])
+    which, axes = np.nonzero(boundaries[:, :3])
     if len({*axes.tolist()}) < len(axes) or len(axes) != len(rows):
         raise ReadError(f"{path}: expected periodic boundaries along the axes, one along each")
-    origin[axes] = found[which, 3] / found[which, axes]
-    vectors[axes] = found[which, 4:]
+    origin[axes] = boundaries[which, 3] / boundaries[which, axes]
+    vectors[axes] = boundaries[which, 4:]
     return shared.cell_of(f"{path}: its boundaries", vectors, np.isin([0, 1, 2], axes), origin)

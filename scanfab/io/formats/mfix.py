@@ -1,4 +1,4 @@
-"""MFiX: ``particle_input.dat``, of rows alone (version 1) or with a header (version 2)."""
+"""MFiX: ``particle_input.dat``, either rows only (version 1) or with a header (version 2)."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from scanfab.packing.cell import Cell
 
 VERSION = re.compile(rb"[ \t]*Version[ \t]+(\d+\.\d+)[ \t]*\r?\n", re.IGNORECASE)
 NAME = re.compile(r"(?i).*particle_input.*\.dat")
-# the columns of version 1 by their number, in the plane and in space
+# columns of version 1, in 2D (six) and in 3D (eight)
 ALONE = {6: "x y radius density u v", 8: "x y z radius density u v w"}
-# lines such as "Particles:  2000" and "Diameter:  F  0.0017": T if a column has the values, F if
-# all grains have this one
+# a line of the header: "Particles:  2000", or "Diameter:  F  0.0017"; T means that a column has the
+# values, F that all grains have the value in this line
 FIELD = re.compile(rb"^[ \t]*(\w+):[ \t]*(\S*)[ \t]*(\S*)", re.MULTILINE)
 ASKED = (b"Dimension", b"Particles", b"Phase_ID", b"Diameter", b"Density", b"Velocity")
 ANSWERS = re.compile(rb"[23] \d{1,15}(?: [TF]){4}")
@@ -37,14 +37,14 @@ class MfixReader(GrainsOnly):
     has_cell: Carries = "nothing"
 
     def recognises(self, path: Path) -> bool:
-        """By the first line; rows alone by the name that MFiX looks for, and their width."""
+        """Version 2 by its header, version 1 by the file name and the number of columns."""
         head = first_bytes(path, HEADER_BYTES)
         if VERSION.match(head):
             return b"Dimension:" in head and b"Particles:" in head
         return bool(NAME.fullmatch(bare_name(path))) and _width(head) in ALONE
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
-        """Rows of numbers, with Fortran's exponents (5d-3) or others."""
+        """The columns of the grains, without a cell. Numbers may be Fortran's (5d-3)."""
         path, data = snapshot.path, text_of(snapshot)
         version = VERSION.match(data)
         if version is None:
@@ -63,7 +63,7 @@ class MfixReader(GrainsOnly):
         for name in ASKED[2:]:
             own = ["u", "v", "w"][:dimension] if name == b"Velocity" else [name.decode().lower()]
             names += own if fields[name][0] == b"T" else []
-        # temperature, species and the like stand behind, and have no names
+        # temperature, species and others follow; they have no names here
         names += [f"{place + 1}" for place in range(len(names), _width(data[begin:]))]
         layout = Layout(tuple(names), line=data.count(b"\n", 0, begin) + 1)
         columns = read_rows(snapshot, data[begin:], layout, count=count, what="particles")

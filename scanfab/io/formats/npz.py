@@ -1,4 +1,4 @@
-"""What scanfab alone writes: packings as ``.npz``, and the companion files of other formats."""
+"""scanfab's own formats: packings as ``.npz``, and the companion files of other formats."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions,
 from scanfab.io.writer import Left, as_arrays, cell_of, contacts_of
 from scanfab.packing.packing import Packing
 
-# the array that makes it a packing; its value is the version of the layout
+# the array that marks a packing; its value is the version of the layout
 MARK = "scanfab_packing"
-# stands before the names of the columns of the grains
+# prefix of the names of arrays that are columns of the grains
 COLUMN = "columns/"
 
 
@@ -34,7 +34,7 @@ class NpzFormat(GrainsOnly):
     lists_contacts = True
 
     def recognises(self, path: Path) -> bool:
-        """By the mark among the arrays, or the first line of a companion file."""
+        """By the array `MARK`, or by the first line of a companion file."""
         if first_bytes(path, 2) != IS_NPZ:
             return companion_kind(path) is not None
         with suppress(ReadError):
@@ -42,25 +42,25 @@ class NpzFormat(GrainsOnly):
         return False
 
     def kind(self, path: Path) -> FileKind:
-        """Grains, or what belongs to grains in another file."""
+        """Grains, or for companion files contacts or ``cell``."""
         if first_bytes(path, 2) == IS_NPZ:
             return "grains"
         return "contacts" if companion_kind(path) == "contacts" else "cell"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
-        """One, whose step and time are those of the packing."""
+        """The only snapshot, with the step and time of the packing."""
         if self.kind(path) != "grains":
             return [Snapshot(path)]
-        found = read_npz(path, ("step", "time"))
+        moment = read_npz(path, ("step", "time"))
         try:
-            step = int(found["step"].item()) if "step" in found else None
-            time = float(found["time"].item()) if "time" in found else None
+            step = int(moment["step"].item()) if "step" in moment else None
+            time = float(moment["time"].item()) if "time" in moment else None
         except (TypeError, ValueError, OverflowError) as error:
             raise ReadError(f"{path}: step and time: expected a number each: {error}") from None
         return [Snapshot(path, step, time, stepless=step is None)]
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """The arrays, with the contacts that they list."""
+        """The grains, with contacts if the file has them."""
         path = snapshot.path
         arrays = read_npz(path)
         given = ("position", "radius", "id", BODIES, WALLS)
@@ -76,20 +76,20 @@ class NpzFormat(GrainsOnly):
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
-        """Those that lie beside a file of grains."""
+        """The contacts in a companion file."""
         return read_contacts(snapshot.path, grains)
 
     def write(self, packing: Packing, path: Path) -> Left:
-        """Write one frame; it holds everything."""
-        found = as_arrays(packing)
+        """Write one frame; the file holds all data of the packing."""
+        parts = as_arrays(packing)
         arrays: dict[str, Any] = {MARK: 1, "position": packing.position}
-        arrays |= found.grains | found.frame
-        arrays |= {f"{COLUMN}{name}": values for name, values in found.own.items()}
+        arrays |= parts.grains | parts.frame
+        arrays |= {f"{COLUMN}{name}": values for name, values in parts.own.items()}
         if packing.contacts is not None:
-            # pairs are rows of the grains here, not ids
-            named = {"pairs": packing.contacts.pairs, **found.contacts}
-            arrays |= {name: one for name, one in named.items() if name not in ("id1", "id2")}
+            # this format stores pairs as rows of grains, not as ids
+            named = {"pairs": packing.contacts.pairs, **parts.contacts}
+            arrays |= {name: values for name, values in named.items() if name not in ("id1", "id2")}
         stream = io.BytesIO()
         np.savez_compressed(stream, **arrays)
         path.write_bytes(stream.getvalue())
-        return Left(no_step=False, notes=tuple(found.notes))
+        return Left(no_step=False, notes=tuple(parts.notes))

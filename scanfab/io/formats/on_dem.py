@@ -1,8 +1,8 @@
 """
 ON-DEM's exchange format (VTKHDF with a group ONDEM).
 
-Drafts 0.1 and 0.2 are read, and 0.1 is written (by `writers.vtk`). They differ in more than names:
-the normal force is positive in compression in the first, and in traction in the second.
+Drafts 0.1 and 0.2 are read, and draft 0.1 is written (by `writers.vtk`). They differ in names and
+in the sign of the normal force: compression is positive in 0.1 and negative in 0.2.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from scanfab.io.reader import Carries, GrainTable, ReadOptions, Snapshot
 from scanfab.io.writer import cell_of
 from scanfab.io.writers.vtk import BODIES, INTERACTIONS, SCENE, SCENE_NAMES, STROKE, write_on_dem
 
-# what a positive normal force means, by draft: +1 compression
+# sign of the normal force in compression, by draft
 SIGNS = {"0.1": 1.0, "0.2": -1.0}
-# the columns of interactions that matter, and the shapes of their values
+# the columns of interactions that are read, and the shape of a value in each
 COLUMNS: dict[str, tuple[int, ...]] = {"id1": (), "id2": (), "virtual": (), "normal_force": ()}
 COLUMNS |= dict.fromkeys(("normal", "shear_force", "force", "image"), (3,))
 NONE: Columns = {"id1": np.zeros(0), "id2": np.zeros(0)}
@@ -49,7 +49,7 @@ class OnDemReader(GrainsOnly):
         return {"ONDEM", "VTKHDF"} <= read_hdf_file(path, with_data=False).attributes.keys()
 
     def snapshots(self, path: Path) -> list[Snapshot]:
-        """One, at the time of the scene."""
+        """The only snapshot, with the step and time of the scene."""
         scene = _scene(path)
         step, time = scene.get("iteration", scene.get("step")), scene.get("time")
         step = step if isinstance(step, int) else None
@@ -57,14 +57,14 @@ class OnDemReader(GrainsOnly):
         return [Snapshot(path, step, time, stepless="scanfab" in scene and step is None)]
 
     def carries(self, path: Path) -> Carries:
-        """The drafts have no cell; what scanfab writes says whether there is one."""
+        """The drafts have no cell; files of scanfab state whether there is one."""
         return "cell" if "scanfab" in _scene(path) else "nothing"
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """The bodies with a radius, and the interactions between them."""
+        """The bodies with a radius as grains, and their interactions as contacts."""
         path, file = snapshot.path, read_hdf_file(snapshot.path)
         scene = file.attributes.get(SCENE, {})
-        arrays = {name: scene[own] for name, own in SCENE_NAMES.items() if own in scene}
+        arrays = {name: scene[key] for name, key in SCENE_NAMES.items() if key in scene}
         grains = grain_table(path, _spheres(path, file), cell_of(path, arrays), options)
         return grains if INTERACTIONS not in file.attributes else _joined(path, file, grains)
 
@@ -74,7 +74,7 @@ def _scene(path: Path) -> dict[str, Any]:
 
 
 def _spheres(path: Path, file: HdfFile) -> Columns:
-    """The columns of the bodies that have a radius: no other body is a sphere."""
+    """The columns of the bodies with a radius; bodies without one are not spheres."""
     parts = []
     for block in ["VTKHDF", *(f"VTKHDF/{name}" for name in file.groups("VTKHDF"))]:
         if f"{block}/Steps" in file.attributes:
@@ -82,38 +82,38 @@ def _spheres(path: Path, file: HdfFile) -> Columns:
         if (points := file.below(block).get("Points")) is not None:
             parts.append({**file.below(f"{block}/PointData"), "position": points})
     columns = joined_arrays(parts or [{}])
-    shapes = {name: one.shape for name, one in columns.items()}
+    shapes = {name: values.shape for name, values in columns.items()}
     radius = columns.get("radius", np.zeros(0, str))
-    if radius.dtype.kind not in "iuf" or {one[:1] for one in shapes.values()} != {radius.shape}:
+    if radius.dtype.kind not in "iuf" or {shape[:1] for shape in shapes.values()} != {radius.shape}:
         raise ReadError(f"{path}: expected Points, and a radius for each in PointData: {shapes}")
     spheres = ~np.isnan(doubles(radius))
     columns = {name.replace(STROKE, "/"): values[spheres] for name, values in columns.items()}
     if "body_id" not in columns:
         return columns
     id = whole_numbers(path, columns.pop("body_id"))
-    # draft 0.2 has more columns in a group of spheres, which has an order of its own
-    own = file.below(BODIES)
-    listed, rows = np.unique(own.pop("body_id", np.zeros(0, np.int64)), return_index=True)
+    # draft 0.2 has further columns in a group of spheres, in another order: match by id
+    more = file.below(BODIES)
+    listed, rows = np.unique(more.pop("body_id", np.zeros(0, np.int64)), return_index=True)
     if len(listed) and np.all(np.isin(id, listed)):
         rows = rows[np.searchsorted(listed, id)]
-        own = {name: one[rows] for name, one in own.items() if len(one) == len(listed)}
-        columns = {**own, **columns}
+        more = {name: values[rows] for name, values in more.items() if len(values) == len(listed)}
+        columns = {**more, **columns}
     return {"id": id, **columns}
 
 
 def _joined(path: Path, file: HdfFile, grains: GrainTable) -> GrainTable:
-    """The grains with their contacts: interactions with bodies that are no spheres are walls'."""
-    # draft 0.2 has a group for each type
-    groups = [INTERACTIONS, *(f"{INTERACTIONS}/{one}" for one in file.groups(INTERACTIONS))]
-    parts = [own for one in groups if "id1" in (own := file.below(one))] or [NONE]
-    parts = [{"virtual": np.zeros(len(one["id1"])), **one} for one in parts]
-    table = {name: one for name, one in joined_arrays(parts).items() if name in COLUMNS}
+    """The grains with contacts; interactions with bodies that are not spheres are with walls."""
+    # draft 0.2 has a group for each type of interaction
+    groups = [INTERACTIONS, *(f"{INTERACTIONS}/{group}" for group in file.groups(INTERACTIONS))]
+    parts = [own for group in groups if "id1" in (own := file.below(group))] or [NONE]
+    parts = [{"virtual": np.zeros(len(part["id1"])), **part} for part in parts]
+    table = {name: values for name, values in joined_arrays(parts).items() if name in COLUMNS}
     for name in {"id2", *table}:
         values, shape = table.get(name, np.zeros(0)), (len(table["id1"]), *COLUMNS[name])
         if values.shape != shape or values.dtype.kind not in "biuf":
             raise ReadError(f"{path}: {INTERACTIONS}: {name}: expected numbers of shape {shape}")
     ids = np.column_stack([whole_numbers(path, table[name]) for name in ("id1", "id2")])
-    # two bodies that are no spheres are none of ours
+    # leave out interactions without any sphere
     ours = np.any(rows_of_ids(grains, ids) >= 0, axis=1) & (table["virtual"] <= 0)
     table = {name: values[ours] for name, values in table.items()}
     image = table.get("image")
@@ -128,14 +128,14 @@ def _joined(path: Path, file: HdfFile, grains: GrainTable) -> GrainTable:
 def _force(
     path: Path, file: HdfFile, table: Columns
 ) -> tuple[FloatArray | None, FloatArray | None]:
-    """The force on the second body, or else its normal part alone."""
+    """The force on the second body and None, or None and its normal part if there is only that."""
     if "force" in table:  # as scanfab writes it
         return doubles(table["force"]), None
     if "normal_force" not in table:
         return None, None
     version = str(file.attributes.get("", {}).get("file_format_version", ""))
     if version[:3] not in SIGNS:
-        expected = "expected 0.1 or 0.2, which tell the sign of the normal force"
+        expected = "expected 0.1 or 0.2, which define the sign of the normal force"
         advice = 'use `contacts="geometric"`'
         raise ReadError(f"{path}: file_format_version is {version!r}, {expected}: {advice}")
     normal = SIGNS[version[:3]] * table["normal_force"]

@@ -1,4 +1,4 @@
-"""What readers share: a base class, frames below one another, numbers in headers, cells."""
+"""Code that readers share: a base class, files with several frames, numbers in headers, cells."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from scanfab.io.reader import (
 from scanfab.io.text import CutError, spelt, text_of
 from scanfab.packing.cell import Cell
 
-# the header of a frame is shorter, even with thousands of columns
+# bytes that hold the header of any frame, even with thousands of columns
 HEADER_BYTES = 1 << 16
-# bytes that are searched at a time
+# bytes that are searched in one piece
 PIECE = 1 << 22
 NO_COMMENT = re.compile(rb"^[ \t]*[^#\s][^\n]*", re.MULTILINE)
 
@@ -38,9 +38,9 @@ class GrainsOnly(Reader):
     """
     Base class of readers whose files hold grains and no contacts.
 
-    A reader says by ``recognises`` which files are of its format, and by ``table`` which
-    columns and which cell a frame has. It overrides ``snapshots`` if a file may hold several
-    frames, and ``names`` if a file may lack radii.
+    A subclass defines ``recognises`` (is a file of this format?) and ``table`` (the columns and the
+    cell of a frame). It overrides ``snapshots`` if a file may hold several frames, and ``names`` if
+    a file may lack radii.
     """
 
     name = description = ""
@@ -52,43 +52,43 @@ class GrainsOnly(Reader):
         raise NotImplementedError
 
     def names(self, path: Path) -> Sequence[str]:
-        """The names of the columns; without a radius among them the file holds points."""
+        """The names of the columns; if none is a radius, the file holds points."""
         return ("radius",)
 
     def kind(self, path: Path) -> FileKind:
-        """Grains or points, if the file is one of this format."""
+        """Grains or points, if the file is of this format."""
         if not self.recognises(path):
             return "other"
         return "grains" if has_radius(self.names(path)) else "points"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
-        """One."""
+        """The only snapshot."""
         return [Snapshot(path)]
 
     def carries(self, path: Path) -> Carries:
-        """The same for all files of the format."""
+        """`has_cell`, the same for all files of the format."""
         return self.has_cell
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """The columns by their names."""
+        """The grains, from the columns of `table`."""
         return grains_of(snapshot, *self.table(snapshot), options)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
-        """There are none."""
+        """ReadError: there are no contacts."""
         raise ReadError(f"{snapshot.path}: {self.name} files hold no contacts of grains")
 
 
 def numbered(width: int) -> list[str]:
-    """The names of columns that have none: their numbers from 1."""
+    """Names for columns without names: their numbers, from 1."""
     return [f"{place + 1}" for place in range(width)]
 
 
 def grains_of(
     snapshot: Snapshot, columns: Columns, cell: Cell | None, options: ReadOptions
 ) -> GrainTable:
-    """The grains in the columns of a frame; ReadError if these have no names and users none."""
+    """The grains in the columns of a frame; ReadError if nobody names the columns."""
     if "1" in columns and not options.columns:
         advice = 'number them as the deck lists them: `columns="id=1,x=3,y=4,z=5,radius=6"`'
         raise ReadError(f"{snapshot.path}: the {len(columns)} columns have no names: {advice}")
@@ -103,10 +103,10 @@ def in_space(columns: Columns) -> Columns:
 
 
 def numbers(where: str, text: bytes, count: int) -> list[float]:
-    """So many numbers in a text; ReadError, which begins with ``where``, if it is anything else."""
+    """The ``count`` numbers in a text; else a ReadError that begins with ``where``."""
     words = text.split()
     try:
-        # float() takes 1_000 for a number
+        # float() would accept 1_000
         if len(words) == count and b"_" not in text:
             return [float(word) for word in words]
     except ValueError:
@@ -118,10 +118,10 @@ def join_pairs(
     path: Path, grains: GrainTable, ends: Iterable[npt.ArrayLike], force: FloatArray | None
 ) -> JoinedContacts:
     """
-    Contacts by the ids of their first and second grains; one below 0 is a wall's.
+    Join contacts by the ids of their first and second grains; a negative id means a wall.
 
-    The force acts on the second grain. ReadError if it, or a normal of which it was made, is no
-    finite number.
+    The force acts on the second grain. ReadError if the force, or a normal from which it was
+    computed, is not finite.
     """
     if force is not None and not np.all(np.isfinite(force)):
         raise ReadError(f"{path}: expected finite numbers as contact forces and normals")
@@ -135,9 +135,9 @@ def cell_of(
     """
     A :class:`Cell`; None if the vectors span no volume and the packing is not periodic.
 
-    A periodic packing may be flat along an axis that does not repeat: any thickness will do there.
+    A periodic packing may have no thickness along an axis that is not periodic; it then gets one.
     """
-    x, y, z = (bool(one) for one in periodic)
+    x, y, z = (bool(repeats) for repeats in periodic)
     edges = np.array(vectors, dtype=np.float64)
     edges = np.diag(edges) if edges.ndim == 1 else edges
     flat = np.flatnonzero(~edges.any(axis=1) & ~np.array([x, y, z]) & (x or y or z))
@@ -155,17 +155,17 @@ def box_cell(
     where: str | Path, bounds: FloatArray, periodic: Iterable[bool], *, is_around: bool = True
 ) -> Cell | None:
     """
-    The cell of a box of LAMMPS; None if the box has no volume and is not periodic.
+    The cell for a box of LAMMPS; None if the box has no volume and is not periodic.
 
     Parameters
     ----------
     where : str or Path
         The beginning of error messages.
     bounds : ndarray, shape (3, 2), (3, 3) or (3, 4)
-        The lower and the upper bound of each axis, then the tilt (xy, xz, yz) if there is one. Or
-        three vectors (rows) with the coordinates of the origin behind them. Dump's length unit.
+        Lower and upper bound of each axis, and in a third column the tilt (xy, xz, yz). Or
+        three vectors (rows), and in a fourth column the origin. Dump's length unit.
     periodic : iterable of bool
-        Along which vectors the box repeats.
+        Whether the box is periodic along each vector.
     is_around : bool, optional
         Whether the bounds are those of the box *around* the tilted box, as in dumps. Data files
         have the bounds of the box before it was tilted.
@@ -194,39 +194,39 @@ def marked_frames(
     moment: Callable[[Path, bytes], tuple[int | None, float | None] | None] | None = None,
 ) -> list[Snapshot]:
     """
-    The frames of a text in the order of their steps.
+    Find the frames of a text file; they are sorted by step.
 
-    If the last frame is incomplete (the program is still writing), it is left out with a warning,
-    unless it is the only one: then reading it says what is wrong.
+    If the last frame is incomplete (the program is still writing), it is left out with a warning.
+    If it is the only frame, it is kept, and reading it raises the error.
 
     Parameters
     ----------
     path : Path
         The file.
     mark : Pattern
-        Matches the beginning of a line with which a frame begins. It is fast if it begins with a
+        Matches at the first line of each frame. The search is fast if the pattern begins with a
         letter, not with ``^`` or a choice.
     check : callable, optional
-        Reads the last of several frames, and raises CutError if it is incomplete. Without it a
+        Reads the last of several frames and raises CutError if it is incomplete. By default a
         frame is incomplete if its last line has no end.
     moment : callable, optional
-        Says step and time of a frame from its first bytes, neither if they were cut. None: the
-        frame goes on behind the next mark. Raises ReadError if the bytes are wrong. By default the
-        time is the first group of ``mark``.
+        Returns step and time of a frame from its first bytes; (None, None) if the bytes are cut
+        off; None if the frame goes on behind the next mark. Raises ReadError if the bytes are
+        wrong. By default there is no step, and the time is the first group of ``mark``.
 
     Raises
     ------
     ReadError
-        If there is no frame, or one has no step or time.
+        If there is no frame, or a frame has no step or time.
     """
     starts: list[int] = []
-    found: list[Snapshot] = []
+    frames: list[Snapshot] = []
     size = 0
-    # the file is not mapped into memory: if it were cut meanwhile, the process would die
+    # not mapped into memory: the process would crash if another program truncated the file
     with open(plain(path), "rb") as stream:
         # pieces of whole lines, so that no mark is cut in two
         while piece := stream.read(PIECE) + stream.readline():
-            here = (one.start() for one in mark.finditer(piece))
+            here = (match.start() for match in mark.finditer(piece))
             starts += [size + at for at in here if piece[at - 1 : at] in (b"", b"\n")]
             size += len(piece)
         start = min(starts, default=size)
@@ -237,20 +237,20 @@ def marked_frames(
             stream.seek(start)
             head = stream.read(min(HEADER_BYTES, stop - start))
             at = moment(path, head) if moment else (None, _time(path, mark.match(head)))
-            # a last frame whose header was cut has no moment
+            # the header of the last frame may be cut off: keep the frame without step and time
             if at or stop == size:
-                found.append(Snapshot(path, *(at or (None, None)), start, stop))
+                frames.append(Snapshot(path, *(at or (None, None)), start, stop))
                 start = stop
-    if not found:
+    if not frames:
         raise ReadError(f"{path}: expected frames, found none: the file is empty or incomplete")
-    if len(found) > 1 and (reason := _lack(found[-1], check)):
-        del found[-1]
-        leave_out_last(path, len(found), reason)
-    return sorted(found, key=lambda one: one.step or 0)
+    if len(frames) > 1 and (reason := _lack(frames[-1], check)):
+        del frames[-1]
+        leave_out_last(path, len(frames), reason)
+    return sorted(frames, key=lambda frame: frame.step or 0)
 
 
 def _lack(snapshot: Snapshot, check: Callable[[Snapshot], object] | None) -> str | None:
-    """Why a frame is incomplete; what else is wrong with it is told when it is read."""
+    """Why a frame is incomplete, or None; other errors are raised when the frame is read."""
     if check is None:
         return None if text_of(snapshot).endswith(b"\n") else "its last line has no end"
     try:
@@ -265,7 +265,7 @@ def _lack(snapshot: Snapshot, check: Callable[[Snapshot], object] | None) -> str
 def numbered_frames(
     path: Path, moments: Iterable[tuple[int | None, float | None]]
 ) -> list[Snapshot]:
-    """Frames with these steps and times; ``start`` of each is its number, not a byte."""
+    """Snapshots with these steps and times; their ``start`` is the number of the frame."""
     found = [
         Snapshot(path, step, time, start=number, stop=number + 1)
         for number, (step, time) in enumerate(moments)
@@ -276,5 +276,5 @@ def numbered_frames(
 
 
 def _time(path: Path, header: re.Match[bytes] | None) -> float:
-    """The time in the first group of the header of a frame."""
+    """The time of a frame, in the first group of its header."""
     return numbers(f"{path}: time of a frame", header[1] if header else b"", 1)[0]

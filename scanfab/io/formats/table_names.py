@@ -1,4 +1,4 @@
-"""Which column of a table is what, by the names that programs give them."""
+"""Find the meaning of the columns of a table by the names that programs give them."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from scanfab.io.columns import DIAMETER_NAMES, ID_NAMES, RADIUS_NAMES, refuse_na
 from scanfab.io.layout import TextTable
 
 Names = Mapping[str, tuple[str, ...]]
-"""The names that a column may have, by what it is; as :func:`plain_name` has them."""
+"""The names that a column may have for each quantity, in the form of :func:`plain_name`."""
 
-# columns that tell frames of one file apart
+# names of columns that number the frames in a file
 FRAME_NAMES = ("step", "timestep", "time.step", "frame", "time", "time.s", "time.ms")
-# names of a coordinate (an axis and its number), of a grain of a contact, and of its force along an
-# axis; PFC's and EDEM's are among them
+# names of a coordinate (axis and its number), of a grain in a contact, and of a force component,
+# including the names of PFC and EDEM
 CENTRE = (
     "{0} pos.{0} pos{0} position.{0} points.{1} ball.pos.{0} ball.position.{0} ball.{0} "
     "particle.position.{0}"
@@ -30,8 +30,8 @@ END = (
     "end{0}.id end{0} contact.id{0}"
 )
 FORCE = "f{0} force.{0} f.{0} contact.force.global.{0} force.global.{0}"
-# of contacts: the force on either grain, the image of the second, the force on the first or second,
-# the normal and the tangential part
+# contacts: force on either grain, image of the second, force on the first or second grain, normal
+# and tangential part of the force
 ALONG = {"f{0}": FORCE, "i{0}": "i{0} image.{0}", "f{0}1": "f{0}1", "f{0}2": "f{0}2"}
 ALONG |= {"fn{0}": "fn{0} contact.normal.force.{0}", "ft{0}": "ft{0} contact.tangential.force.{0}"}
 FORCES: dict[str, tuple[str, ...]] = {
@@ -59,13 +59,13 @@ UNIT = re.compile(r"\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
 
 
 def plain_name(name: str) -> str:
-    """Small letters and digits with one point between words, without number of a query or unit."""
+    """A name in small letters, points between words, without the number of a query and the unit."""
     text = QUERY.sub("", UNIT.sub("", name.strip()).lower())
     return re.sub(r"[^a-z0-9]+", ".", text).strip(".")
 
 
 def is_frame_name(name: str) -> bool:
-    """Whether a column tells frames of one file apart."""
+    """Whether a column of this name numbers the frames in a file."""
     return plain_name(name) in FRAME_NAMES
 
 
@@ -73,64 +73,64 @@ def find_columns(
     path: Path, table: TextTable, known: Names, named: Mapping[str, str], option: str
 ) -> dict[str, str]:
     """
-    The key of each column that is known (its name in the layout), by what it is.
+    Find the column (its name in the layout) for each known quantity.
 
     Parameters
     ----------
     path : Path
-        For messages.
+        The file, for messages.
     table : TextTable
-        With the names of all columns.
+        The table, with the names of all columns.
     known : mapping
-        The usual names.
+        The usual names of each quantity.
     named : mapping of str to str
-        What the user says; a number from 1 means the column at that place, if none has that name.
+        The user's choice: quantity to name or number (from 1) of a column; a name comes first.
     option : str
-        The argument by which the user says it.
+        The name of the option with the user's choice, for messages.
 
     Raises
     ------
     ReadError
-        If the user names a column that is not there or twice, or two columns have a name that
-        matters.
+        If the user names a column that does not exist, or one column twice, or if two columns have
+        the name of one quantity.
     """
     names, plain = table.own, [plain_name(name) for name in table.own]
-    found: dict[str, str] = {}
-    for standard in (*named, *(one for one in known if one not in named)):
-        own = f"{named.get(standard, '')}"
+    roles: dict[str, str] = {}
+    for standard in (*named, *(what for what in known if what not in named)):
+        key = f"{named.get(standard, '')}"
         if standard in named:
-            places = [place for place, name in enumerate(names) if name == own]
-            if not places and re.fullmatch(r"[0-9]{1,6}", own) and 1 <= int(own) <= len(names):
-                places = [int(own) - 1]
+            places = [place for place, name in enumerate(names) if name == key]
+            if not places and re.fullmatch(r"[0-9]{1,6}", key) and 1 <= int(key) <= len(names):
+                places = [int(key) - 1]
             if not places:
-                told = f"there is no column {own!r} to serve as {standard}"
-                raise ReadError(f"{path}: {told}; the columns are {', '.join(names)}")
+                problem = f"there is no column {key!r} to serve as {standard}"
+                raise ReadError(f"{path}: {problem}; the columns are {', '.join(names)}")
         else:
-            word = next((one for one in known[standard] if one in plain), None)
+            word = next((name for name in known[standard] if name in plain), None)
             places = [place for place, name in enumerate(plain) if name == word]
         if len(places) > 1:
             listed = ", ".join(f"{names[place]!r} (column {place + 1})" for place in places)
             advice = f'choose one by its number: `{option}={{"{standard}": {places[0] + 1}}}`'
             raise ReadError(f"{path}: several columns may be {standard}: {listed}: {advice}")
         keys = [table.layout.names[place] for place in places]
-        if standard in named or not {*keys} <= {*found.values()}:
-            found[standard] = keys[0]
-    refuse_named_twice(path, {standard: found[standard] for standard in named}, option)
-    return found
+        if standard in named or not {*keys} <= {*roles.values()}:
+            roles[standard] = keys[0]
+    refuse_named_twice(path, {standard: roles[standard] for standard in named}, option)
+    return roles
 
 
-def check_units(path: Path, found: Mapping[str, str], contacts: bool = False) -> None:
+def check_units(path: Path, roles: Mapping[str, str], contacts: bool = False) -> None:
     """
-    Lengths of one table have one unit, as have forces, and volumes have its cube.
+    Check that all lengths have one unit and volumes its cube; for contacts, that forces have one.
 
     Raises
     ------
     ReadError
-        If the names of the columns say two units.
+        If the names of the columns state different units.
     """
     units: dict[str, str] = {}
-    for what, name in found.items():
-        # micro has two letters that look alike, and a cube many spellings
+    for what, name in roles.items():
+        # NFKC unifies the two letters for micro; CUBE knows the spellings of a cube
         unit = UNIT.search(unicodedata.normalize("NFKC", name))
         if unit and unit[1].strip() and (what.startswith("f") if contacts else what in LENGTHS):
             units[name] = CUBE.sub("", unit[1].strip())
@@ -140,7 +140,7 @@ def check_units(path: Path, found: Mapping[str, str], contacts: bool = False) ->
 
 
 def refuse_frames(path: Path, columns: Columns) -> None:
-    """ReadError for a table of several frames."""
+    """ReadError if a table holds several frames."""
     for name, values in columns.items():
         count = len(np.unique(values)) if is_frame_name(name) else 1
         if count > 1:

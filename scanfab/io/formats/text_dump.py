@@ -1,8 +1,8 @@
 """
-The text dumps of LIGGGHTS and LAMMPS: sections below ``ITEM:`` lines, and LAMMPS' ``dump yaml``.
+Text dumps of LIGGGHTS and LAMMPS: sections below ``ITEM:`` lines, and LAMMPS' ``dump yaml``.
 
-A snapshot is a header and a table. The names of the table's columns stand in the last ``ITEM:``
-line: ``ITEM: ATOMS id type x y z radius``. A header in YAML is translated into such sections.
+A snapshot is a header and a table. The last ``ITEM:`` line has the names of the table's columns:
+``ITEM: ATOMS id type x y z radius``. A header in YAML is translated into the same sections.
 """
 
 from __future__ import annotations
@@ -23,60 +23,60 @@ from scanfab.io.reader import FileKind, Snapshot
 from scanfab.io.text import CutError, Layout, read_rows, text_of
 from scanfab.packing.cell import Cell
 
-# a snapshot begins with the first of these lines
+# the first line of a snapshot, as text and as YAML
 MARK, YAML_MARK = re.compile(rb"ITEM: (?:UNITS|TIME|TIMESTEP)\b"), re.compile(rb"---[ \t\r]*\n")
-# the words behind ITEM:, and the lines below them
+# the words behind ITEM:, and the lines of the section
 SECTION = re.compile(rb"^ITEM: ([^\r\n]*)\r?\n((?:(?!ITEM: )[^\n]*\n)*)", re.MULTILINE)
 YAML_VALUE = re.compile(r"^(\w+):(.*(?:\n[ \t]+-.*)*)", re.MULTILINE)
 YAML_ROWS = re.compile(rb"^data:[ \t]*\r?\n", re.MULTILINE)
 YAML_KEYS = {"timestep": "TIMESTEP", "time": "TIME", "natoms": "NUMBER OF ATOMS"}
-# the kind of box, and two letters for each axis: its lower and its upper face
+# the kind of box, and for each axis two letters for its lower and its upper face
 BOX_KEY = re.compile(r"BOX BOUNDS(?: abc origin| xy xz yz)?((?: (?:pp|[fsm]{2})){3})?")
 # columns of words
 WORDS = ("element", "lattice")
 
 
 class Header(NamedTuple):
-    """What stands above the rows of a snapshot, as it stands there: nothing is checked yet."""
+    """The header of a snapshot, not checked yet."""
 
     sections: dict[str, str]
-    """What stands below each ``ITEM:`` line, by the words in it."""
+    """The text below each ``ITEM:`` line, by the words in this line."""
     words: Sequence[str] = ()
-    """Of the line above the rows: what is counted (ATOMS, ENTRIES) and the names of the columns,
-    which dumps of old versions lack. None if the header is incomplete."""
+    """The words above the rows: ATOMS or ENTRIES, and the names of the columns, which dumps of old
+    versions lack. Empty if the header is incomplete."""
     rows: bytes = b""
     line: int = 1
-    """Number of the first row's line."""
+    """Line number of the first row."""
 
 
 class TextDump(shared.GrainsOnly):
-    """What DumpReader needs of dumps of text."""
+    """Reads text dumps, for DumpReader."""
 
     def recognises(self, path: Path) -> bool:
-        """By the first words."""
+        """By the first words of the file."""
         head = first_bytes(path)
         is_yaml = YAML_MARK.match(head) is not None and b"creator: LAMMPS" in head[:100]
         return is_yaml or head.startswith(b"ITEM: ")
 
     def kind(self, path: Path) -> FileKind:
-        """Atoms are grains if they have a radius; whatever else is counted are contacts."""
+        """Atoms are grains if they have a radius, else points; entries are contacts."""
         header, _ = _whole_header(f"{path}", first_bytes(path, shared.HEADER_BYTES))
         what, *names = header.words
         return "contacts" if what != "ATOMS" else "grains" if has_radius(names) else "points"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
-        """In the order of their steps; an incomplete last one is left out."""
+        """The snapshots in the order of their steps; an incomplete last one is left out."""
         mark = YAML_MARK if first_bytes(path, 3) == b"---" else MARK
         return shared.marked_frames(path, mark, self.table, _moment)
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """
-        Words of elements stay words, all other columns are numbers; by numbers without names.
+        Columns by name (or number if they have no names) and the box; only elements are words.
 
         Raises
         ------
         ReadError
-            If the header or a line is not as it should be; names the line.
+            If the header or a line is damaged; the message names the line.
         """
         data, where = text_of(snapshot), f"{snapshot.path}, step {snapshot.step}"
         header, count = _whole_header(where, data)
@@ -96,17 +96,17 @@ def _header(data: bytes) -> Header:
     if data.startswith(b"---"):
         return _yaml_header(data)
     sections: dict[str, str] = {}
-    for one in SECTION.finditer(data[: shared.HEADER_BYTES]):
-        key = one[1].decode("utf-8", "replace").strip()
+    for section in SECTION.finditer(data[: shared.HEADER_BYTES]):
+        key = section[1].decode("utf-8", "replace").strip()
         if f"NUMBER OF {key.partition(' ')[0]}" in sections:
-            line = data.count(b"\n", 0, one.start(2)) + 1
-            return Header(sections, key.split(), data[one.start(2) :], line)
-        sections[key] = one[2].decode("utf-8", "replace").strip()
+            line = data.count(b"\n", 0, section.start(2)) + 1
+            return Header(sections, key.split(), data[section.start(2) :], line)
+        sections[key] = section[2].decode("utf-8", "replace").strip()
     return Header(sections)
 
 
 def _whole_header(where: str, data: bytes) -> tuple[Header, int]:
-    """With the number of rows; ReadError without it, CutError if the header ends above the rows."""
+    """The header and the number of rows; ReadError without it, CutError if it is cut off."""
     header = _header(data)
     number = header.sections.get(f"NUMBER OF {''.join(header.words[:1])}", "")
     if not re.fullmatch(r"\d{1,18}", number):
@@ -117,10 +117,10 @@ def _whole_header(where: str, data: bytes) -> tuple[Header, int]:
 
 
 def _yaml_header(data: bytes) -> Header:
-    """The header of a document, as the sections of a text dump."""
+    """The header of a YAML document, translated into the sections of a text dump."""
     begin = YAML_ROWS.search(data, 0, shared.HEADER_BYTES)
     head = data[: begin.end() if begin else shared.HEADER_BYTES]
-    # lists such as "- [ p, p, f, f, ]" as their words; names may have brackets, too
+    # the words of lists such as "- [ p, p, f, f, ]"; single brackets only, as names may have some
     values = {
         key: [word for word in value.replace(",", " ").split() if word not in ("-", "[", "]")]
         for key, value in YAML_VALUE.findall(head.decode("utf-8", "replace").replace("\r", ""))
@@ -129,21 +129,21 @@ def _yaml_header(data: bytes) -> Header:
     faces, box = "".join(values.get("boundary", [])), values.get("box", [])
     tilt = box[6:9]
     if tilt:
-        # it stands behind the bounds of all axes
-        box = [word for axis, one in enumerate(tilt) for word in (*box[2 * axis :][:2], one)]
+        # YAML has the tilt behind the bounds of all axes, text dumps have it in each line
+        box = [word for axis, factor in enumerate(tilt) for word in (*box[2 * axis :][:2], factor)]
     key = f"BOX BOUNDS {'xy xz yz ' * bool(tilt)}{faces[:2]} {faces[2:4]} {faces[4:]}"
     sections[key] = " ".join(box)
     if begin is None:
         return Header(sections)
-    # the document ends with a line of dots
+    # a document ends with a line of dots
     rows = data[begin.end() : data.rfind(b"\n.") + 1 or None]
-    # rows such as "  - [ 1, 0.5, ]"; without a run of blanks they parse faster
+    # rows such as "  - [ 1, 0.5, ]"; they parse faster if no run of blanks is left
     rows = rows.replace(b"  - [ ", b"").replace(b"- [", b"").translate(None, b"],")
     return Header(sections, ["ATOMS", *values.get("keywords", [])], rows, head.count(b"\n") + 1)
 
 
 def _moment(path: Path, head: bytes) -> tuple[int | None, float | None] | None:
-    """The step and the time of a snapshot; None if its header goes on at the next mark."""
+    """The step and time of a snapshot; None if its header goes on behind the next mark."""
     header = _header(head)
     if header.sections and header.sections.keys() <= {"UNITS", "TIME", "TIMESTEP"}:
         return None
@@ -157,7 +157,7 @@ def _moment(path: Path, head: bytes) -> tuple[int | None, float | None] | None:
 
 
 def _cell(where: str, sections: dict[str, str]) -> Cell | None:
-    """The box, periodic along the axes with the flag pp; very old dumps have no flags."""
+    """The box, periodic along axes with the flag pp; very old dumps have no flags."""
     key = next((key for key in sections if key.startswith("BOX BOUNDS")), None)
     if key is None:
         return None
@@ -165,7 +165,7 @@ def _cell(where: str, sections: dict[str, str]) -> Cell | None:
     match = BOX_KEY.fullmatch(" ".join(key.split()))
     if match is None:
         raise ReadError(f"{where}: expected three boundary flags such as pp, ff, fs or mm")
-    # numbers in a line: two bounds and perhaps a tilt, or a vector and a coordinate of the origin
+    # a line has two bounds and perhaps a tilt, or a vector and a coordinate of the origin
     width, flags = 4 if "abc" in key else 3 if "xy" in key else 2, match[1] or "ff ff ff"
     bounds = np.reshape(shared.numbers(where, sections[key].encode(), 3 * width), (3, width))
     return shared.box_cell(where, bounds, [flag == "pp" for flag in flags.split()])

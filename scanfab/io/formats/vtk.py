@@ -1,4 +1,4 @@
-"""VTK files: grains as points with a radius, contacts as lines; and files that list others."""
+"""VTK files: grains as points with a radius, contacts as lines; and lists of VTK files."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from scanfab.io.writers.vtk import moment_of, packing_of, says_all
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList
 
-# boxes along the axes are no grains; other kinds of VTK files are indexes, or images
+# rectilinear grids are boxes, not grains
 BOXES = ("RectilinearGrid", "RECTILINEAR_GRID")
-# files that list those of one frame: grains, contacts, boxes
+# kinds of files that list the files of one frame: grains, contacts, boxes
 BLOCKS = ("vtkMultiBlockDataSet", "vtkPartitionedDataSetCollection")
 
 
@@ -37,19 +37,19 @@ class VtkReader:
     extensions += (".vtkhdf", ".xdmf", ".xmf")
     generic = True
     lists_contacts = True
-    # whether an id that no grain has is a wall's, see join_ids
+    # whether an id that no grain has means a wall, see join_ids
     walls: bool | Literal["unknown"] = "unknown"
-    # the arrays of a contact's force, of its normal and its tangential part
+    # names of the arrays with the force of a contact, its normal and its tangential part
     force_arrays = ("force", "", "")
     # +1: forces act on the second grain, -1: on the first, None: the format does not say
     sign: float | None = None
 
     def recognises(self, path: Path) -> bool:
-        """By the first line of legacy VTK, or the root element of the XML formats."""
+        """By the first line of legacy VTK, the root element of XML, or the type in VTKHDF."""
         return form_of(path) is not None
 
     def kind(self, path: Path) -> FileKind:
-        """Lines are contacts, points without any other cells are grains."""
+        """Lines are contacts; points without other cells are grains."""
         form = form_of(path)
         if form == "Collection" or form in BLOCKS:
             return "index"
@@ -61,21 +61,21 @@ class VtkReader:
         if mesh.has_faces:
             return "other"
         if len(mesh.points) == 0:
-            # an empty frame; VTK may have dropped its arrays
+            # an empty frame, whose arrays VTK may have dropped: look for the word in the file
             return "grains" if b"radi" in plain(path).read_bytes().lower() else "other"
         if has_radius(list(mesh.point_arrays)):
             return "grains"
         return "contacts" if len(mesh.lines) else "points"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
-        """One, and hardly more than its name says which step it is; those that a ``.pvd`` lists."""
+        """The frames that a ``.pvd`` lists; any other file is a single frame."""
         if form_of(path) == "Collection":
             return self._listed(path)
         step, time = moment_of(path)
         return [Snapshot(path, step, time, stepless=step is None and says_all(path))]
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """Points and their arrays, with the box of LIGGGHTS or the cell of YADE beside them."""
+        """The points and their arrays, with the companion box of LIGGGHTS or cell of YADE."""
         path = snapshot.path
         if form_of(path) in BLOCKS and not snapshot.parts:
             return self._read_blocks(path, options)
@@ -91,7 +91,7 @@ class VtkReader:
         grains = grain_table(path, columns, cell, options)
         if len(mesh.lines) == 0:
             return grains
-        # lines between the grains' own points
+        # lines between the points of the grains are contacts
         force, force_n = self.forces(mesh)
         contacts = ContactList(mesh.lines, force=force, force_n=force_n)
         return grains._replace(contacts=self._proved(path, grains, contacts, mesh))
@@ -99,7 +99,7 @@ class VtkReader:
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
-        """Lines; by the arrays id1 and id2 where grains have ids, else by their ends."""
+        """The lines as contacts, joined by the arrays id1 and id2, or else by their ends."""
         path, mesh = snapshot.path, read_mesh(snapshot.path)
         force, force_n = self.forces(mesh)
         if grains.id is not None and {"id1", "id2"} <= mesh.line_arrays.keys():
@@ -112,10 +112,10 @@ class VtkReader:
 
     def forces(self, mesh: Mesh) -> tuple[FloatArray | None, FloatArray | None]:
         """
-        The force, and its normal part alone, of each line.
+        The force of each line, and the normal part of the force.
 
-        Shape (M, 3), on the second grain unless the format does not say on which; a normal part
-        may also be of shape (M,), compression positive.
+        Both have shape (M, 3) and act on the second grain, or on an unknown one if the format does
+        not say. The normal part may also have shape (M,), positive in compression.
         """
         whole, normal, tangential = (_vectors(mesh, name) for name in self.force_arrays)
         if whole is None and normal is not None and tangential is not None:
@@ -126,12 +126,12 @@ class VtkReader:
     def _proved(
         self, path: Path, grains: GrainTable, contacts: ContactList | None, mesh: Mesh
     ) -> ContactList | None:
-        """The contacts with a force whose sign the format says, or the forces themselves."""
+        """The contacts; if the format does not define the sign of forces, the forces decide it."""
         if contacts is None or self.sign is not None:
             return contacts
-        names = [one for one in mesh.line_arrays if "force" in one.lower() and one != "force"]
+        names = [name for name in mesh.line_arrays if "force" in name.lower() and name != "force"]
         if names:
-            note(f"left out of the contacts: {', '.join(names)}: only a vector `force` is read")
+            note(f"contact arrays that are not read: {', '.join(names)}: only a vector `force` is")
         if contacts.force is None:
             return contacts
         force = np.asarray(contacts.force, np.float64)
@@ -140,39 +140,39 @@ class VtkReader:
         )
 
     def carries(self, path: Path) -> Carries:
-        """LIGGGHTS writes a box beside its files; VTK itself has no cell."""
+        """Files of scanfab have a cell, LIGGGHTS writes a box file; VTK has no cell."""
         if says_all(path):
             return "cell"
         return "nothing" if _read_box(path) is None else "box"
 
     def beside(self, path: Path) -> list[Path]:
-        """The box of LIGGGHTS and the cell of YADE."""
-        found = (_box_file(path), cell_file(path))
-        return [file for file in found if file is not None]
+        """The files with the box of LIGGGHTS and the cell of YADE, if they exist."""
+        files = (_box_file(path), cell_file(path))
+        return [file for file in files if file is not None]
 
     def _read_blocks(self, index: Path, options: ReadOptions) -> GrainTable:
-        """The grains of the one file of a ``.vtm`` that has some, with the contacts of another."""
-        found: dict[FileKind, list[Path]] = {"grains": [], "contacts": []}
+        """The grains of a ``.vtm``: one of its files holds grains, and one may hold contacts."""
+        files: dict[FileKind, list[Path]] = {"grains": [], "contacts": []}
         for path in listed(index, "DataSet", "file"):
             if form_of(path) not in (*BLOCKS, "Collection"):
-                found.setdefault(self.kind(path), []).append(path)
-        if len(found["grains"]) != 1 or len(found["contacts"]) > 1:
-            counts = " and ".join(f"{len(found[kind])} of {kind}" for kind in found)
+                files.setdefault(self.kind(path), []).append(path)
+        if len(files["grains"]) != 1 or len(files["contacts"]) > 1:
+            counts = " and ".join(f"{len(files[kind])} of {kind}" for kind in files)
             raise ReadError(f"{index}: expected one file of grains, one of contacts: {counts}")
-        table = self.read_grains(Snapshot(found["grains"][0]), options)
-        for path in found["contacts"]:
+        table = self.read_grains(Snapshot(files["grains"][0]), options)
+        for path in files["contacts"]:
             joined = self.read_contacts(Snapshot(path), options, table)
             table = table._replace(contacts=joined.contacts, wall_contacts=joined.wall_contacts)
         return table
 
     def _listed(self, index: Path) -> list[Snapshot]:
-        """The frames of a ``.pvd``, in its order: the parts of one time are one frame."""
+        """The frames of a ``.pvd``, in its order; the parts of one time form one frame."""
         kinds: dict[tuple[str, str, str], FileKind] = {}
         frames: dict[str | None, dict[tuple[str, str], Path]] = {}
         for entry in elements(index).iter("DataSet"):
             path = file_inside(index, entry.get("file", ""))
             part = entry.get("group", ""), entry.get("part", "0")
-            # files of one name hold the same; some are boxes and contacts
+            # files whose names differ only in numbers are of one kind; boxes, contacts are left out
             family = re.sub(r"\d+", "*", path.name), *part
             if kinds.get(family, "other") == "other":
                 kinds[family] = self.kind(path)
@@ -190,50 +190,50 @@ class VtkReader:
 
 
 class FormsReader(VtkReader):
-    """Base class of readers for a program that writes other forms beside VTK."""
+    """Base class of readers for programs that write other forms of files besides VTK."""
 
     generic = False
     forms: tuple[GrainsOnly, ...] = ()
-    """A reader for each of them."""
+    """A reader for each of these forms."""
 
     def form(self, path: Path) -> GrainsOnly | VtkReader:
-        """The reader of the form that a file has, by its first bytes; VTK's for all others."""
+        """The reader for the form of a file, by its first bytes; VTK's if no other fits."""
         vtk: Any = super()
         return next((form for form in self.forms if form.recognises(path)), vtk)
 
     def kind(self, path: Path) -> FileKind:
-        """As the form says."""
+        """Passed on to the reader for the form of the file."""
         return self.form(path).kind(path)
 
     def snapshots(self, path: Path) -> list[Snapshot]:
-        """As the form says."""
+        """Passed on to the reader for the form of the file."""
         return self.form(path).snapshots(path)
 
     def carries(self, path: Path) -> Carries:
-        """As the form says."""
+        """Passed on to the reader for the form of the file."""
         return self.form(path).carries(path)
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """As the form says."""
+        """Passed on to the reader for the form of the file."""
         return self.form(snapshot.path).read_grains(snapshot, options)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
-        """As the form says."""
+        """Passed on to the reader for the form of the file."""
         return self.form(snapshot.path).read_contacts(snapshot, options, grains)
 
 
 def _frame(index: Path, word: str | None, first: Path, *others: Path) -> Snapshot:
-    """One frame; its step is the last number that the names of all parts have in common."""
+    """A frame; its step is the last number that is the same in the names of all parts."""
     time = None if word is None else numbers(f"{index}: timestep", word.encode(), 1)[0]
     names = (re.findall(r"\d+", Path(bare_name(file)).stem) for file in (first, *others))
-    same = [int(one[0]) for one in zip(*names, strict=False) if len(set(one)) == 1]
+    same = [int(column[0]) for column in zip(*names, strict=False) if len(set(column)) == 1]
     return Snapshot(first, same[-1] if same else None, time, parts=others)
 
 
 def _vectors(mesh: Mesh, name: str) -> FloatArray | None:
-    """An array of the lines that holds a vector for each, shape (M, 3); None without it."""
+    """An array with a vector for each line, shape (M, 3); None if there is none."""
     values = mesh.line_arrays.get(name)
     if values is None or values.shape != (len(mesh.lines), 3) or values.dtype.kind not in "iuf":
         return None
@@ -251,7 +251,7 @@ def _box_file(path: Path) -> Path | None:
 
 @np.errstate(over="ignore")
 def _read_box(path: Path) -> Cell | None:
-    """The box that LIGGGHTS writes beside a VTK dump; it does not say what is periodic."""
+    """The box of a VTK dump, from LIGGGHTS' box file, which does not say what is periodic."""
     file = _box_file(path)
     corners = np.zeros((0, 3)) if file is None else read_mesh(file).points
     if len(corners) == 0:

@@ -1,4 +1,4 @@
-"""Extended XYZ: grains in rows, and a line that names columns and cell."""
+"""Extended XYZ: a row for each grain, and a line above that names columns and cell."""
 
 from __future__ import annotations
 
@@ -19,33 +19,33 @@ from scanfab.io.text import Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
 COUNT = re.compile(rb"(?:\xef\xbb\xbf)?[ \t]*([0-9]{1,15})[ \t]*\r?\n")
-# key=value, the value in quotes if it has blanks
+# key=value; a value with blanks is in quotes
 PAIR = re.compile(r"([A-Za-z_][\w.-]*)\s*=\s*(?:\"([^\"]*)\"|([^\s\"]+))")
 PROPERTIES = re.compile(r"[^:]+:[SIRL]:[1-9][0-9]?(:[^:]+:[SIRL]:[1-9][0-9]?)*")
-# the longest line that names columns
+# longest line with the names of columns, in bytes
 HEAD = 1 << 16
 TRUTHS = {"T": True, "F": False, "TRUE": True, "FALSE": False, "1": True, "0": False}
 POSITIONS = ("pos", "position", "positions")
 
 
 class Head(NamedTuple):
-    """The two lines above the rows of a frame."""
+    """The content of the two lines above the rows of a frame."""
 
     rows: int
     words: dict[str, str]
     columns: list[tuple[str, str, int]]
-    """Name, kind and width of each."""
+    """Name, kind and width of each column."""
 
 
 class XyzReader(GrainsOnly):
     """Reader plugin for extended XYZ."""
 
     name = "xyz"
-    description = "extended XYZ with a radius, its cell and step; contacts lie beside it"
+    description = "extended XYZ with a radius, its cell and step; contacts in companion files"
     extensions: tuple[str, ...] = (".xyz", ".extxyz")
 
     def recognises(self, path: Path) -> bool:
-        """A number of rows, and a line behind it that names columns, or the ending .xyz."""
+        """By a number in line 1, and in line 2 names of columns, or the ending .xyz."""
         head = first_bytes(path, HEAD)
         count = COUNT.match(head)
         if count is None:
@@ -54,16 +54,16 @@ class XyzReader(GrainsOnly):
         return bool(names_columns) or bare_name(path).lower().endswith(self.extensions)
 
     def names(self, path: Path) -> Sequence[str]:
-        """Of the columns of the first frame."""
+        """The names of the columns in the first frame."""
         return [name for name, _, _ in _head(path, first_bytes(path, HEAD)).columns]
 
     def carries(self, path: Path) -> Carries:
-        """The line above the rows has a cell, or none."""
+        """``cell`` if the line above the rows has a lattice, else ``nothing``."""
         return "nothing" if _cell(path, _head(path, first_bytes(path, HEAD))) is None else "cell"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
-        """One behind the other."""
-        found: list[Snapshot] = []
+        """The frames, one after the other."""
+        frames: list[Snapshot] = []
         with open(plain(path), "rb") as stream:
             start = 0
             while first := stream.readline():
@@ -72,20 +72,20 @@ class XyzReader(GrainsOnly):
                     rows = sum(1 for _ in islice(stream, head.rows))
                     if rows < head.rows:
                         reason = f"expected {head.rows} rows, the file ends after {rows}"
-                        leave_out_last(path, len(found), reason)
+                        leave_out_last(path, len(frames), reason)
                         break
                     words = (head.words.get(key, "") for key in ("step", "timestep"))
-                    steps = [int(one) for one in words if re.fullmatch(r"[-+]?[0-9]{1,18}", one)]
+                    steps = [int(word) for word in words if re.fullmatch(r"[-+]?[0-9]{1,18}", word)]
                     time = _numbers(path, head, "time", 1)
                     moment = steps[0] if steps else None, time[0] if time else None
-                    found.append(Snapshot(path, *moment, start, stream.tell()))
+                    frames.append(Snapshot(path, *moment, start, stream.tell()))
                 start = stream.tell()
-        if not found:
+        if not frames:
             raise ReadError(f"{path}: the file is empty")
-        return found
+        return frames
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
-        """Columns by their names; ``pos`` are the centres."""
+        """The columns by name, and the cell; ``pos`` are the centres."""
         path, data = snapshot.path, text_of(snapshot)
         head = _head(path, data[:HEAD])
         parts = {name: [f"{name} {k}" for k in range(width)] for name, _, width in head.columns}
@@ -94,19 +94,19 @@ class XyzReader(GrainsOnly):
         text = [part for part, kind in kinds.items() if kind in "SL"]
         layout = Layout(tuple(kinds), line=3, whole=whole, text=text)
         rows = read_rows(snapshot, data.split(b"\n", 2)[2], layout, count=head.rows)
-        found: Columns = {}
+        columns: Columns = {}
         for name, kind, width in head.columns:
             values = np.column_stack([rows[part] for part in parts[name]])
-            is_position = name.lower() in POSITIONS and "position" not in found
+            is_position = name.lower() in POSITIONS and "position" not in columns
             if (kind == "I" and values.dtype.kind != "i") or (is_position and width != 3):
                 expected = "three coordinates" if is_position else "whole numbers"
                 raise ReadError(f"{path}: the column {name}: expected {expected}")
-            found["position" if is_position else name] = values if width > 1 else values[:, 0]
-        return found, _cell(path, head)
+            columns["position" if is_position else name] = values if width > 1 else values[:, 0]
+        return columns, _cell(path, head)
 
 
 def _head(path: Path, text: bytes) -> Head:
-    """The head in the first two lines of a text."""
+    """Parse the first two lines of a frame."""
     lines, count = text[:HEAD].split(b"\n", 2), COUNT.match(text)
     if count is None or len(lines) < 3:
         expected = "expected a number of rows and a line with Properties="
@@ -125,17 +125,17 @@ def _head(path: Path, text: bytes) -> Head:
 
 
 def _numbers(path: Path, head: Head, key: str, count: int) -> list[float] | None:
-    """The numbers behind a key; None without it."""
+    """The numbers that belong to a key; None without the key."""
     text = head.words.get(key)
     return None if text is None else numbers(f"{path}: {key}", text.encode(), count)
 
 
 def _cell(path: Path, head: Head) -> Cell | None:
-    """Of ``Lattice``, ``Origin`` and ``pbc``."""
+    """The cell from ``Lattice``, ``Origin`` and ``pbc``; None without ``Lattice``."""
     vectors, origin = _numbers(path, head, "lattice", 9), _numbers(path, head, "origin", 3)
     if vectors is None:
         return None
-    periodic = [TRUTHS.get(one) for one in head.words.get("pbc", "T T T").upper().split()]
+    periodic = [TRUTHS.get(word) for word in head.words.get("pbc", "T T T").upper().split()]
     if len(periodic) != 3 or None in periodic:
         raise ReadError(f"{path}: pbc: expected three of T and F, found {head.words['pbc']}")
     edges = np.reshape(vectors, (3, 3))

@@ -18,30 +18,30 @@ from scanfab.io.reader import Carries, FileKind, Snapshot
 from scanfab.io.text import Layout, read_rows, text_of
 from scanfab.packing.cell import Cell
 
-# legacy VTK by VTKExporter: VTK itself writes no dot behind the version
+# first line of legacy VTK by VTKExporter; VTK itself writes no dot behind the version
 EXPORTER_HEAD = b"# vtk DataFile Version 3.0.\n"
 PERIODIC_HEAD = b"##PERIODIC::"
 TEXT_HEADS = (b"#format ", PERIODIC_HEAD)
-# an array that VTKRecorder's interactions have
+# the array that marks the interactions of VTKRecorder
 RECORDED = b'Name="forceN"'
 COMMENT = re.compile(rb"^[ \t]*#[^\n]*", re.MULTILINE)
 
 
 class TextExport(GrainsOnly):
-    """The reader of text exports and of ``SpherePack.save``."""
+    """Reads text exports and ``SpherePack.save``."""
 
     name = "yade's text"
 
     def recognises(self, path: Path) -> bool:
-        """By the first line."""
+        """By the first line of the file."""
         return first_bytes(path).startswith(TEXT_HEADS)
 
     def carries(self, path: Path) -> Carries:
-        """``SpherePack.save`` says whether the sample is periodic."""
+        """``SpherePack.save`` has a cell if the sample is periodic; exports have none."""
         return "cell" if first_bytes(path).startswith(PERIODIC_HEAD) else "nothing"
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
-        """Columns by the names in the first line, or in the second one for attributes."""
+        """The columns by the names in the first line; attributes are named in the second."""
         path = snapshot.path
         rows = COMMENT.sub(b"", text_of(snapshot))
         width = len(rows.lstrip().split(b"\n", 1)[0].split())
@@ -56,13 +56,13 @@ class TextExport(GrainsOnly):
             names = named[1].split() if named else names[:-1]
             names += [f"attr{number}" for number in range(1, width - len(names) + 1)]
         if width not in (0, len(names)):
-            told = f"{path}: the first line names {len(names)} columns, the rows have {width}"
-            raise ReadError(told)
+            problem = f"{path}: the first line names {len(names)} columns, the rows have {width}"
+            raise ReadError(problem)
         return read_rows(snapshot, rows, Layout(tuple(names))), cell
 
 
 class YadeReader(FormsReader):
-    """Reader plugin for what YADE exports."""
+    """Reader plugin for the files of YADE."""
 
     name = "yade"
     description = "YADE export.VTKExporter, VTKRecorder, export.text, export.textExt, O.save (XML)"
@@ -73,18 +73,18 @@ class YadeReader(FormsReader):
     sign = 1.0
 
     def recognises(self, path: Path) -> bool:
-        """YADE's own first lines, or the arrays of VTKRecorder's interactions."""
+        """By YADE's own first lines, or by an array of VTKRecorder's interactions."""
         head = first_bytes(path)
         is_recorded = b"<VTKFile" in head and RECORDED in head
         is_vtk = is_recorded or head.startswith(EXPORTER_HEAD)
         return is_vtk or any(form.recognises(path) for form in self.forms)
 
     def kind(self, path: Path) -> FileKind:
-        """VTKRecorder's interactions are known by an array, since reading them may be refused."""
+        """Interactions of VTKRecorder by an array, because reading them may raise an error."""
         return "contacts" if RECORDED in first_bytes(path) else super().kind(path)
 
     def forces(self, mesh: Mesh) -> tuple[FloatArray | None, FloatArray | None]:
-        """Those that act on the second body; VTKRecorder's normal force is a number."""
+        """The forces on the second body; the normal force of VTKRecorder has shape (M,)."""
         force, normal = super().forces(mesh)
         recorded = mesh.line_arrays.get("forceN")
         is_recorded = normal is None and recorded is not None and recorded.ndim == 1

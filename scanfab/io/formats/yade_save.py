@@ -1,11 +1,11 @@
 """
-What YADE writes beside text and VTK: ``O.save`` as XML, and cells beside the VTK files of spheres.
+YADE: simulations saved by ``O.save`` as XML, and the cell files of VTK files of spheres.
 
-Of a saved simulation spheres, contacts and the cell are read. The VTK files of spheres have no cell
-themselves. ``VTKRecorder`` numbers spheres and cells by the step. ``VTKExporter`` numbers a cell by
-how many files of *interactions* it has written, so that a cell may be overwritten, or bear the
-number of another frame: it is taken only where there is one cell for each file of spheres, in their
-order.
+From a saved simulation, spheres, contacts and the cell are read. VTK files of spheres hold no cell;
+YADE writes it to a separate file. ``VTKRecorder`` numbers spheres and cells by the step.
+``VTKExporter`` numbers a cell by the count of *interactions* files written so far, so that a cell
+file may be overwritten or have the number of another frame. These cells are used only if there is
+exactly one for each file of spheres, in the same order.
 """
 
 from __future__ import annotations
@@ -32,63 +32,63 @@ from scanfab.packing.contacts import ListedWallForces
 
 STEP = re.compile(rb"<iter>\s*(\d{1,18})\s*</iter>")
 TIME = re.compile(rb"<time>\s*(\d+\.?\d*(?:e[-+]?\d+)?)\s*</time>")
-# what is read of a sphere, and what it is if it is not there
+# the elements that are read for a sphere, and the defaults of missing ones
 SPHERE = {"id": None, "groupMask": None, "clumpId": "-1", "shape/px/radius": None}
 SPHERE |= {f"state/px/se3/position/{axis}": None for axis in "xyz"}
-# what is read of a contact, whose first number is the step since when it is real
+# the elements that are read for a contact; the first is the step at which it became real
 CONTACT = ("iterMadeReal", "id1", "id2")
 VECTORS = ("cellDist", "normalForce", "shearForce", "contactPoint")
-# files of spheres by VTKExporter and VTKRecorder, and those of cells
+# names of files of spheres by VTKExporter and VTKRecorder, and of files of cells
 EXPORTED = re.compile(r"(.*)-spheres-(\d+)\.vtk")
 RECORDED = re.compile(r"(.*)spheres\.(\d+)\.vtu")
 CELL_FILE = re.compile(r".*-periCell-\d+\.vtk|.*pericell\.\d+\.vtu")
-# corners of a cell in both kinds of file, and those at the ends of its vectors
+# number of corners in a cell file, the corner at the origin, and those at the ends of the vectors
 CORNERS, ORIGIN, ENDS = 8, 4, (7, 5, 0)
-# in cells: YADE wraps spheres into the cell, but writes six digits
+# tolerance as a fraction of the cell: YADE wraps spheres into it, but writes six digits
 ROUNDING = 1e-4
 PERIODIC = (True, True, True)
 
 
 class SavedScene(GrainsOnly):
-    """The reader of what ``O.save`` writes."""
+    """Reads files of ``O.save``."""
 
     name = "yade's O.save"
 
     def recognises(self, path: Path) -> bool:
-        """Any saved simulation, also as YADE's binary."""
+        """Any saved simulation, XML or binary."""
         head = first_bytes(path)
         return b"<boost_serialization" in head or b"serialization::archive" in head[:64]
 
     def kind(self, path: Path) -> FileKind:
-        """Grains, in XML."""
+        """Grains; ReadError for a binary file."""
         if b"<boost_serialization" not in first_bytes(path):
             advice = "load it there, and save it as XML: O.save('name.xml.bz2')"
             raise ReadError(f"{path}: only the same build of YADE can read its binary: {advice}")
         return "grains"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
-        """One, with step and time."""
+        """The only snapshot, with its step and time."""
         head = first_bytes(path)
         step, time = STEP.search(head), TIME.search(head)
         return [Snapshot(path, step and int(step[1]), time and float(time[1]))]
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """Spheres with their ids and masks, the cell, and the real interactions."""
+        """The spheres with ids and masks, the cell, and the real interactions as contacts."""
         return _read_save(snapshot.path, options)
 
 
 def _read_save(path: Path, options: ReadOptions) -> GrainTable:
-    """What the elements of a saved simulation say; ReadError if they are not as YADE writes."""
+    """Read a saved simulation; ReadError if its elements are not as YADE writes them."""
     ids: list[float] = []
     spheres: list[list[float]] = []
     contacts: list[list[float]] = []
-    # a class is spelled out once only, and named by its number afterwards
+    # a class is named at its first occurrence only, and later given by number
     shapes: dict[str, str] = {}
     try:
         with open(plain(path), "rb") as stream:
             parsed: Any = ElementTree.iterparse(stream)
             for _, element in parsed:
-                # a contact stands in the first body that has it; bodies may also be references
+                # contacts are nested in bodies; other px elements, such as references, are left out
                 if element.tag != "px":
                     continue
                 if element.find("iterMadeReal") is not None:
@@ -96,10 +96,10 @@ def _read_save(path: Path, options: ReadOptions) -> GrainTable:
                 elif element.find("id") is not None and element.find("state") is not None:
                     ids.append(_number(element, "id"))
                     if _shape(element, shapes) == "Sphere":
-                        spheres.append([_number(element, *one) for one in SPHERE.items()])
+                        spheres.append([_number(element, *item) for item in SPHERE.items()])
                 else:
                     continue
-                # memory never holds the whole file
+                # free the element, so that the whole file is never in memory
                 element.clear()
         scene = parsed.root
         # the vectors of the cell are the columns of hSize
@@ -118,7 +118,7 @@ def _read_save(path: Path, options: ReadOptions) -> GrainTable:
 
 
 def _shape(body: ElementTree.Element, shapes: dict[str, str]) -> str | None:
-    """The class of a body's shape; `shapes` has the names of classes by their numbers."""
+    """The class of a body's shape; `shapes` collects the names of classes by number."""
     shape = body.find("shape/px")
     attributes = {} if shape is None else shape.attrib
     number = attributes.get("class_id") or attributes.get("class_id_reference") or ""
@@ -128,11 +128,11 @@ def _shape(body: ElementTree.Element, shapes: dict[str, str]) -> str | None:
 
 
 def _contact(contact: ElementTree.Element) -> list[float]:
-    """The numbers of CONTACT and VECTORS; NaN for a vector that is not there."""
+    """The numbers of CONTACT and VECTORS; NaN for a missing vector."""
     row = [_number(contact, name) for name in CONTACT]
     for name in VECTORS:
-        found = next(contact.iter(name), None)
-        row += [np.nan] * 3 if found is None else [_number(found, axis) for axis in "xyz"]
+        vector = next(contact.iter(name), None)
+        row += [np.nan] * 3 if vector is None else [_number(vector, axis) for axis in "xyz"]
     return row
 
 
@@ -146,14 +146,14 @@ def _number(element: ElementTree.Element, name: str, default: str | None = None)
 def _with_contacts(
     path: Path, grains: GrainTable, table: FloatArray, bodies: FloatArray
 ) -> GrainTable:
-    """The grains with their contacts, and with the forces of walls on them."""
-    # YADE also keeps pairs that are near each other
+    """The grains with their contacts, and with the forces of walls on grains."""
+    # leave out pairs that are only near each other: their step is negative
     table = table[table[:, 0] >= 0]
     pairs = whole_numbers(path, table[:, 1:3].ravel()).reshape(-1, 2)
     unknown = ~np.isin(pairs, bodies)
     if unknown.any():
         raise ReadError(f"{path}: a contact names the body {pairs[unknown][0]}, which is not there")
-    # contacts of walls with walls are not ours
+    # leave out contacts of walls with walls
     ours = np.any(rows_of_ids(grains, pairs) >= 0, axis=1)
     pairs, rows = pairs[ours], rows_of_ids(grains, pairs[ours])
     shift, normal, shear, point = np.split(table[ours, 3:], 4, axis=1)
@@ -163,41 +163,41 @@ def _with_contacts(
     joined = join_ids(path, grains, pairs, force, walls=True, image=image)
     at, walls = np.any(rows < 0, axis=1), None
     if at.any() and force is not None and not np.isnan(point).any():
-        # forces are those on the second body
-        own = np.where(rows[at, 1:] >= 0, 1.0, -1.0) * force[at]
-        walls = ListedWallForces(rows[at].max(axis=1), point[at], own)
+        # YADE's forces act on the second body; make them act on the grain
+        forces = np.where(rows[at, 1:] >= 0, 1.0, -1.0) * force[at]
+        walls = ListedWallForces(rows[at].max(axis=1), point[at], forces)
     return grains._replace(
         contacts=joined.contacts, wall_contacts=joined.wall_contacts, wall_forces=walls
     )
 
 
 def is_cell_file(path: Path) -> bool:
-    """Whether a file is named as YADE names those of a cell."""
+    """Whether a file has a name of YADE's cell files."""
     return CELL_FILE.fullmatch(bare_name(path)) is not None
 
 
 def cell_beside(path: Path, position: FloatArray) -> Cell | None:
     """
-    The cell of a file of spheres.
+    Read the cell of a file of spheres from its cell file; None if there is none.
 
     Parameters
     ----------
     path : Path
-        What ``VTKExporter`` or ``VTKRecorder`` has written.
+        A file of spheres by ``VTKExporter`` or ``VTKRecorder``.
     position : ndarray, shape (N, 3)
-        The spheres' centres as they stand there, dump's length unit.
+        The centres in this file, dump's length unit.
 
     Raises
     ------
     ReadError
-        If spheres lie outside: then it is not their cell.
+        If spheres are outside the cell, which is then the cell of another frame.
     """
     file = cell_file(path)
     if file is None:
         exported = EXPORTED.fullmatch(bare_name(path))
         if exported and _numbered(path.parent, f"{exported[1]}-periCell-", stamp_of(path.parent)):
-            told = 'skipped, as not each file of spheres has one: name cells by `cell="FILE.csv"`'
-            warn(f"{path.parent / exported[1]}-periCell-*: {told}")
+            lack = 'skipped, as not each file of spheres has one: name cells by `cell="FILE.csv"`'
+            warn(f"{path.parent / exported[1]}-periCell-*: {lack}")
         return None
     if is_cell_file(file):
         corners = read_mesh(file).points
@@ -212,31 +212,31 @@ def cell_beside(path: Path, position: FloatArray) -> Cell | None:
     fractions = cell.fractional(position)
     outside = np.any((fractions < -ROUNDING) | (fractions > 1.0 + ROUNDING), axis=1)
     if outside.any():
-        told = f"{np.count_nonzero(outside)} grains lie outside the cell of {file}"
+        problem = f"{np.count_nonzero(outside)} grains lie outside the cell of {file}"
         advice = 'name the right one with `cell=(LX, LY, LZ)` or `cell="FILE.csv"`'
-        raise ReadError(f"{path}: {told}: {advice}")
+        raise ReadError(f"{path}: {problem}: {advice}")
     pattern = re.sub(r"\d+", "*", file.name)
     note(f"the cell is read from {file.parent / pattern}, beside the grains")
     return cell
 
 
 def cell_file(path: Path) -> Path | None:
-    """The file that has the cell of a file of spheres; None if there is none, or a doubt."""
+    """The file with the cell of a file of spheres; None if there is none, or if it is unsure."""
     folder, name, stamp = path.parent, bare_name(path), stamp_of(path.parent)
     if exported := EXPORTED.fullmatch(name):
-        # its number counts files; that of a saved state is a step
+        # VTKExporter numbers files by a count, not by the step
         spheres = _numbered(folder, f"{exported[1]}-spheres-", stamp)
         cells = _numbered(folder, f"{exported[1]}-periCell-", stamp)
-        # a cell that was exported after the interactions of its frame has the next number
+        # a cell exported after the interactions of its frame has a number that is higher by 1
         pairs = dict(zip(sorted(spheres), sorted(cells), strict=False))
-        if len(spheres) != len(cells) or any(pairs[one] - one not in (0, 1) for one in pairs):
+        if len(spheres) != len(cells) or any(pairs[k] - k not in (0, 1) for k in pairs):
             return None
         return cells.get(pairs.get(int(exported[2]), -1))
     recorded = RECORDED.fullmatch(name)
     if recorded is None:
         return None
     start, step = recorded[1], int(recorded[2])
-    # or else a saved state of this step, whose name has the number of the step, too
+    # otherwise a saved simulation of this step, with the step in its name
     saved = [
         file
         for file in folder.glob(f"{glob.escape(start)}*{step}.xml*")
@@ -246,12 +246,12 @@ def cell_file(path: Path) -> Path | None:
     return cells.get(step, saved[0] if len(saved) == 1 else None)
 
 
-# listed once for all files of a folder, as long as none comes or goes
+# cached, so that a folder is listed once for all its files, until its content changes
 @lru_cache(maxsize=8)
 def _numbered(folder: Path, start: str, stamp: Stamp) -> dict[int, Path]:
-    """The VTK files whose names begin so, and then have a number, by this number."""
-    found = {}
+    """The VTK files whose names are ``start`` and a number, by this number."""
+    files = {}
     for file in sorted(folder.glob(f"{glob.escape(start)}*")):
         if match := re.fullmatch(r"(\d+)\.vt[ku]", bare_name(file).removeprefix(start)):
-            found[int(match[1])] = file
-    return found
+            files[int(match[1])] = file
+    return files

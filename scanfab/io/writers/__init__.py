@@ -1,1 +1,1 @@
-"""Writers of packings, a format a file."""
+"""Writer plugins for packings."""

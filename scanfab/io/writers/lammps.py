@@ -1,4 +1,4 @@
-"""Packings as LAMMPS' text dump and data file."""
+"""Write packings as text dumps and data files of LAMMPS."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from scanfab.io.writer import Left, csv_bytes, more_columns, table_columns
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
-# whole numbers up to here are the same as decimals
+# doubles hold whole numbers up to here exactly
 MOST_EXACT = 2**53
-# ids and types of LAMMPS as it is usually built
+# limit of ids and types in the usual builds of LAMMPS
 MOST_SMALL = 2**31
 TURNED = (
-    "the box in the file is the one around the cell, which LAMMPS cannot have: its first vector is "
-    "not along x, or its second not in x and y"
+    "LAMMPS cannot store this cell, as its first vector is not along x, or its second not in the "
+    "plane x-y: the box in the file is the box around the cell"
 )
 
 
@@ -25,11 +25,11 @@ class LammpsDumpWriter:
     """``dump custom`` as text, with all digits."""
 
     name = "lammps"
-    description = "LAMMPS dump custom (text), with all digits; contacts beside it"
+    description = "LAMMPS dump custom (text), with all digits; contacts in companion files"
     extensions = (".lammpstrj", ".dump")
 
     def write(self, packing: Packing, path: Path) -> Left:
-        """Write one frame; columns that are no numbers lie beside it."""
+        """Write one frame; columns of texts go into a companion file."""
         known, own, notes = table_columns(packing)
         held = {name: values for name, values in own.items() if _is_dumped(name, values)}
         rows = {**known, **held}
@@ -40,7 +40,7 @@ class LammpsDumpWriter:
         )
         path.write_bytes(head.encode() + csv_bytes(rows, " ", with_names=False))
         left = tuple(name for name in own if name not in held)
-        # from bounds the edges of the cell come back with a rounding error
+        # frame=True: edges that are read back from bounds have a rounding error
         return Left(contacts=True, frame=True, columns=left, notes=tuple(notes))
 
 
@@ -48,13 +48,13 @@ class LammpsDataWriter:
     """``read_data`` of ``atom_style sphere``."""
 
     name = "lammps-data"
-    description = "LAMMPS data file of atom_style sphere; contacts, cell and columns beside it"
+    description = "LAMMPS data file of atom_style sphere; companion files for the rest"
     extensions = (".data", ".lmp")
 
     def write(self, packing: Packing, path: Path) -> Left:
-        """Write one frame; LAMMPS has a place for type and density, all else lies beside it."""
+        """Write one frame with type and density; all other columns go into a companion file."""
         _, own, notes = table_columns(packing)
-        # both columns must be there: without a sound one they are 1
+        # LAMMPS requires type and density: where the packing has no valid values, they are 1
         kinds = {"type": np.ones(len(packing), np.int64), "density": np.ones(len(packing))}
         held = [name for name in kinds if name in own and _is_data(name, own[name])]
         kinds |= {name: own[name].astype(kinds[name].dtype) for name in held}
@@ -79,14 +79,14 @@ class LammpsDataWriter:
 
 
 def _is_dumped(name: str, values: AnyArray) -> bool:
-    """Whether a dump's reader gives a column back: numbers, under a name of one word."""
+    """Whether a dump can hold a column without loss: numbers, and a name of one word."""
     if len(name.split()) != 1 or values.dtype.kind == "U" or name.lower() in ("element", "lattice"):
         return False
     return values.dtype.kind == "f" or bool(np.all(np.abs(values.astype(float)) < MOST_EXACT))
 
 
 def _is_data(name: str, values: AnyArray) -> bool:
-    """Whether LAMMPS takes a column as types (whole numbers from 1) or densities (positive)."""
+    """Whether a column holds valid types (whole numbers from 1) or densities (positive)."""
     if values.dtype.kind not in "iuf" or not np.all(values > 0):
         return False
     return name == "density" or bool(np.all((values < MOST_SMALL) & (values == np.floor(values))))
@@ -94,10 +94,11 @@ def _is_data(name: str, values: AnyArray) -> bool:
 
 def _box(packing: Packing) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
     """
-    Lower and upper corner and tilt (xy, xz, yz) of the box before it was tilted.
+    Lower and upper corner of the box before it is tilted, and the tilt (xy, xz, yz).
 
-    LAMMPS has its first vector along x and its second in x and y. For another cell it is the box
-    around it, and the last value is True. Without a cell it is the box of the grains' surfaces.
+    LAMMPS needs the first vector along x and the second in the plane x-y. For any other cell the
+    result is the box around the cell, and the last value is True. Without a cell the box encloses
+    the grains.
     """
     cell, no_tilt = packing.cell, np.zeros(3)
     if cell is None and not len(packing):
@@ -118,7 +119,7 @@ def _around(cell: Cell) -> tuple[FloatArray, FloatArray]:
 
 
 def _bounds(packing: Packing) -> str:
-    """The box of a dump: its bounds as older readers know them, or else by three vectors."""
+    """The box in a dump: bounds, which older programs read too, or three vectors if need be."""
     cell = packing.cell
     along = (False,) * 3 if cell is None else cell.periodic
     low, high, tilt, is_turned = _box(packing)
@@ -127,7 +128,7 @@ def _bounds(packing: Packing) -> str:
         kind, columns = "abc origin ", [*cell.vectors.T, cell.origin]
     elif cell is not None and tilt.any():
         kind, columns = "xy xz yz ", [*_around(cell), tilt]
-    # with all digits, as LAMMPS writes bounds
+    # 16 digits, as LAMMPS writes bounds
     rows = (" ".join(f"{x:.16e}" for x in row) for row in np.column_stack(columns).tolist())
     flags = " ".join("pp" if repeats else "ff" for repeats in along)
     return "\n".join([f"{kind}{flags}", *rows, ""])

@@ -1,4 +1,4 @@
-"""Packings as tables with a row for each sphere: CSV, TSV, Parquet and extended XYZ."""
+"""Write packings as tables with a row for each sphere: CSV, TSV, Parquet and extended XYZ."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from scanfab.io.formats.table_names import is_frame_name
 from scanfab.io.writer import Left, as_arrays, csv_bytes, flat, table_columns
 from scanfab.packing.packing import Packing
 
-# letters of extended XYZ by numpy's kinds
+# extended XYZ's letter for each of numpy's kinds
 LETTERS = {"b": "L", "i": "I", "u": "I", "f": "R", "U": "S"}
 
 
 class CsvWriter:
-    """Cells separated by commas."""
+    """Tables with commas between the values."""
 
     name = "csv"
-    description = "a table of spheres with commas; contacts and cell beside it"
+    description = "a table of spheres with commas; contacts and cell in companion files"
     extensions: tuple[str, ...] = (".csv",)
     separator = ","
 
     def write(self, packing: Packing, path: Path) -> Left:
-        """Write the columns id, x, y, z, radius and all that do not tell frames apart."""
+        """Write one frame; a column that numbers frames (`time`) goes into a companion file."""
         known, own, notes = table_columns(packing)
         numbers = {name: values for name, values in own.items() if values.dtype.kind in "iuf"}
-        left = {one for one in numbers if is_frame_name(one) and len(np.unique(numbers[one])) > 1}
+        left = {k for k in numbers if is_frame_name(k) and len(np.unique(numbers[k])) > 1}
         held = {name: own[name] for name in own if name not in left}
         path.write_bytes(self.table({**known, **held}))
         columns = tuple(name for name in own if name in left)
@@ -41,10 +41,10 @@ class CsvWriter:
 
 
 class TsvWriter(CsvWriter):
-    """Cells separated by tabs."""
+    """Tables with tabs between the values."""
 
     name = "tsv"
-    description = "a table of spheres with tabs; contacts and cell beside it"
+    description = "a table of spheres with tabs; contacts and cell in companion files"
     extensions = (".tsv",)
     separator = "\t"
 
@@ -53,7 +53,7 @@ class ParquetWriter(CsvWriter):
     """Apache Parquet."""
 
     name = "parquet"
-    description = "a table of spheres as Apache Parquet; contacts and cell beside it"
+    description = "a table of spheres as Apache Parquet; contacts and cell in companion files"
     extensions = (".parquet",)
 
     def table(self, columns: Columns) -> bytes:
@@ -66,14 +66,14 @@ class ParquetWriter(CsvWriter):
 
 
 class XyzWriter:
-    """Extended XYZ: rows of words, and a line above them that names columns and cell."""
+    """Extended XYZ: a row for each sphere, and a line above that names columns and cell."""
 
     name = "xyz"
-    description = "extended XYZ with a radius, its cell and step; contacts lie beside it"
+    description = "extended XYZ with a radius, its cell and step; contacts in companion files"
     extensions: tuple[str, ...] = (".xyz", ".extxyz")
 
     def write(self, packing: Packing, path: Path) -> Left:
-        """Write one frame; texts that are no single words lie beside it."""
+        """Write one frame; texts with blanks go into a companion file."""
         arrays = as_arrays(packing)
         held = {name: values for name, values in arrays.own.items() if _is_xyz(name, values)}
         properties: list[str] = []
@@ -82,7 +82,7 @@ class XyzWriter:
             width = int(np.prod(values.shape[1:]))
             properties.append(f"{name}:{LETTERS[values.dtype.kind]}:{width}")
             words = np.where(values, "T", "F") if values.dtype.kind == "b" else values
-            # no other column has a name with a blank
+            # names with a blank cannot clash with names of other columns
             parts = enumerate(words.reshape(len(values), width).T)
             rows |= {f"{name} {place}": part for place, part in parts}
         line = f"{_line(packing)}Properties={':'.join(properties)}"
@@ -93,19 +93,19 @@ class XyzWriter:
 
 
 def _line(packing: Packing) -> str:
-    """Cell, step and time, as the line above the rows names them."""
+    """Cell, step and time for the line above the rows."""
     cell, words = packing.cell, ""
     if cell is not None:
         vectors = " ".join(map(repr, cell.vectors.ravel().tolist()))
         origin = " ".join(map(repr, cell.origin.tolist()))
-        along = " ".join("FT"[one] for one in cell.periodic)
+        along = " ".join("FT"[repeats] for repeats in cell.periodic)
         words = f'Lattice="{vectors}" Origin="{origin}" pbc="{along}" '
     words += "" if packing.step is None else f"Timestep={packing.step} "
     return words + ("" if packing.time is None else f"Time={packing.time!r} ")
 
 
 def _is_xyz(name: str, values: AnyArray) -> bool:
-    """Whether extended XYZ has a place for a column: its name and its texts are single words."""
+    """Whether extended XYZ can hold a column: its name and its texts must be single words."""
     if re.search(r"[\s:\"=]", name) or not name or int(np.prod(values.shape[1:])) > 99:
         return False
     if name.lower() in ("pos", "position", "positions") or values.dtype == np.uint64:

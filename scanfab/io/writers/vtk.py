@@ -1,8 +1,8 @@
 """
-Packings as VTK's PolyData (``.vtp``) and as ON-DEM's VTKHDF, draft 0.1.
+Write packings as VTK PolyData (``.vtp``) and as ON-DEM's VTKHDF, draft 0.1.
 
-Spheres are points. In PolyData contacts are lines between them; ON-DEM has a table of them. What
-its draft has no name for (the cell, images, the whole force) has a name of ours.
+Spheres are points. Contacts are lines between them in PolyData, and a table in ON-DEM. Data without
+a name in ON-DEM's draft (cell, images, total force) get names of scanfab.
 """
 
 from __future__ import annotations
@@ -24,36 +24,36 @@ from scanfab.packing.packing import Packing
 if TYPE_CHECKING:
     from scanfab.io.mesh import Mesh
 
-# step and time, as a comment in the first line, so that a series is listed without reading its
-# files; or as other programs write them, as text
+# step and time: scanfab writes them as a comment in the first line, so that the frames of a series
+# are found without reading whole files; TIME also matches the text of other programs
 STEP = re.compile(rb"scanfab_step=(-?\d{1,30})[\s<]")
 TIME = re.compile(
     rb'TimeValue(?:=|"[^>]*format="ascii"[^>]*>\s*)([-+]?\d+\.?\d*(?:[eE][-+]?\d+)?)[\s<]'
 )
-# the elements of the arrays of the file as a whole are in its first bytes
+# bytes at the start of a file that hold the field arrays
 HEAD = 1 << 14
-# the array of the file as a whole that says whether contacts are known, and the others
+# names of field arrays: KNOWN says whether contacts are known, FIELDS hold the frame
 KNOWN = "scanfab_contacts"
 FIELDS = {name: f"scanfab_{name}" for name in ("step", "cell", "origin", "periodic")}
 FIELDS["time"] = "TimeValue"
 
-# the groups of ON-DEM, and the attributes of its scene by the names of writer.Arrays
+# groups of ON-DEM, and the attributes of its scene for the names in writer.Arrays
 SCENE, BODIES, INTERACTIONS = "ONDEM/Scene", "ONDEM/Bodies/sphere", "ONDEM/Interactions"
 SCENE_NAMES = {"step": "iteration", "time": "time", "cell": "cell"}
 SCENE_NAMES |= {"origin": "cell_origin", "periodic": "cell_periodic"}
-# stands for / in the names of columns, which would make a group
+# replaces / in names of columns, because / would create a group
 STROKE = "\u2215"
 
 
 class VtpWriter:
-    """PolyData by VTK's own writer, with all numbers as bytes."""
+    """PolyData by VTK's own writer, with numbers in binary form."""
 
     name = "vtp"
     description = "VTK PolyData: spheres as points, contacts as lines, the cell as field data"
     extensions = (".vtp",)
 
     def write(self, packing: Packing, path: Path) -> Left:
-        """Write one frame; it holds everything."""
+        """Write one frame; the file holds all data of the packing."""
         from vtkmodules.vtkCommonCore import vtkPoints
         from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
         from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
@@ -80,10 +80,10 @@ class VtpWriter:
         writer.SetHeaderTypeToUInt64()
         writer.SetCompressorTypeToNone()
         writer.EncodeAppendedDataOff()
-        # a full disk is an OSError if VTK writes into memory first
+        # VTK writes into memory and Python to the disk, so that a full disk raises OSError
         writer.WriteToOutputStringOn()
         writer.Write()
-        said = " ".join(f"{FIELDS[one]}={frame[one]!r}" for one in ("step", "time") if one in frame)
+        said = " ".join(f"{FIELDS[k]}={frame[k]!r}" for k in ("step", "time") if k in frame)
         text: Any = writer.GetOutputString()
         content = text if isinstance(text, bytes) else text.encode()
         path.write_bytes(f"<!-- {said} -->\n".encode() + content)
@@ -91,7 +91,7 @@ class VtpWriter:
 
 
 def _array(name: str, values: AnyArray) -> Any:
-    """An array of VTK, whose writer puts names between quotes as they are."""
+    """A VTK array; its name is escaped, as VTK's writer does not do it."""
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonCore import vtkStringArray
 
@@ -109,14 +109,14 @@ def _array(name: str, values: AnyArray) -> Any:
 
 
 def moment_of(path: Path) -> tuple[int | None, float | None]:
-    """Step and time, if they stand in the first bytes of a file."""
+    """Step and time, if the first bytes of a file have them."""
     head = first_bytes(path, HEAD)
     step, time = STEP.search(head), TIME.search(head)
     return step and int(step[1]), time and float(time[1])
 
 
 def says_all(path: Path) -> bool:
-    """Whether scanfab wrote the file, so that there is no cell or step but those in it."""
+    """Whether scanfab wrote the file; then it states the cell and the step completely."""
     return KNOWN.encode() in first_bytes(path, HEAD)
 
 
@@ -125,25 +125,25 @@ def packing_of(path: Path, mesh: Mesh) -> tuple[Cell | None, ContactList | None]
     fields = mesh.field_arrays
     if KNOWN not in fields:
         return None
-    cell = {name: fields[own] for name, own in FIELDS.items() if own in fields}
+    cell = {name: fields[array] for name, array in FIELDS.items() if array in fields}
     contacts = contacts_of(mesh.lines, mesh.line_arrays) if np.any(fields[KNOWN]) else None
     return cell_of(path, cell), contacts
 
 
 def write_on_dem(packing: Packing, path: Path) -> Left:
-    """Write one frame; it holds everything."""
+    """Write one frame; the file holds all data of the packing."""
     import h5py
 
     arrays, count = as_arrays(packing), len(packing)
     columns = {**arrays.grains, **arrays.own}
     columns["body_id"] = columns.pop("id")
-    # VTK reads no texts at points
+    # VTK cannot read texts as point data
     texts = {name: values for name, values in columns.items() if values.dtype.kind == "U"}
-    # in memory first: on a full disk HDF5 ends the process
+    # in memory first, because HDF5 ends the process if the disk is full
     with h5py.File(path, "w", driver="core", backing_store=False, track_order=True) as file:
         file.attrs.update(file_format="ON-DEM VTKHDF", file_format_version="0.1-draft")
         file.attrs["source_code"] = "scanfab"
-        # PolyData with a vertex at each point, so that ParaView shows them
+        # PolyData with a vertex at each point, so that ParaView shows the points
         group = file.create_group("VTKHDF", track_order=True)
         group.attrs.update(Type=np.bytes_("PolyData"), Version=np.array([2, 0]))
         group["NumberOfPoints"] = np.array([count])
@@ -155,7 +155,7 @@ def write_on_dem(packing: Packing, path: Path) -> Left:
             group[f"{cells}/Connectivity"] = np.arange(filled)
             group[f"{cells}/Offsets"] = np.arange(filled + 1)
         points = group.create_group("PointData", track_order=True)
-        _write(points, {name: one for name, one in columns.items() if name not in texts})
+        _write(points, {name: values for name, values in columns.items() if name not in texts})
         if texts:
             _write(file.create_group(BODIES), {"body_id": packing.id, **texts})
         scene = file.create_group(SCENE)
@@ -165,7 +165,7 @@ def write_on_dem(packing: Packing, path: Path) -> Left:
         if (contacts := packing.contacts) is not None:
             group = file.create_group(INTERACTIONS)
             group.attrs["count"] = len(contacts)
-            # as the draft has them, and the whole force, which no rounding has touched
+            # the parts of the force that the draft names, and the exact total force
             table = {**arrays.contacts, "virtual": np.zeros(len(contacts), np.int8)}
             table |= {"normal": contacts.normal, "contact_point": contacts.point}
             table.pop("force_n", None)

@@ -148,7 +148,7 @@ NO_GRAINS += ["grains_binary_boundingBox_30000.vtk", "grains_boundingBox_30000.v
     ("name", "told"),
     [
         *((name, "no grains: expected points with a radius") for name in NO_GRAINS),
-        ("mesh_30000.stl", "no reader knows the format"),
+        ("mesh_30000.stl", "no reader knows this format"),
         ("binary_30000.bin", "the 6 columns have no names: number them"),
         ("pairs_id_force.txt", r"no grains.*found contacts \(pairs_id_force.txt\)"),
         ("noradius.txt", r"noradius.txt, step 30000: no radius.*`columns.*`radius`"),

@@ -120,7 +120,7 @@ def test_a_text_that_begins_with_a_number_is_no_frame(tmp_path):
     path = write(
         tmp_path / "a.txt", "2 samples of sand from France\nwere sheared by hand in a wooden box\n"
     )
-    with pytest.raises(scanfab.ScanfabError, match="no reader knows the format"):
+    with pytest.raises(scanfab.ScanfabError, match="no reader knows this format"):
         scanfab.read(path)
 
 

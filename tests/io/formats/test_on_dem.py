@@ -76,11 +76,11 @@ def virtual_data(group):
 
 
 SPOILT = {
-    "z stands in another file": lambda one: one.update({"z": h5py.ExternalLink("b.h5", "/x")}),
-    "data of .*z stand in another file": lambda one: one.create_dataset(
+    "z is in another file": lambda one: one.update({"z": h5py.ExternalLink("b.h5", "/x")}),
+    "data of .*z are in another file": lambda one: one.create_dataset(
         "z", (3,), "f8", external=[("z.bin", 0, 24)]
     ),
-    "of VTKHDF/PointData/z stand in another": virtual_data,
+    "of VTKHDF/PointData/z are in another": virtual_data,
     "Unable to allocate": lambda one: one.create_dataset("z", (1 << 40,), "f8", chunks=(1 << 16,)),
     "a radius for each": other_rows,
     "steps in time": lambda one: one.parent.create_group("Steps"),

@@ -24,14 +24,14 @@ from tests.helpers.sound_files import SMALL
 WRONG = {
     "esys": [
         ("snap_t=30_0.txt", "_2.txt", "_1.txt", "each worker's file once"),
-        ("snap_t=30_0.txt", " snap_t=30_2.txt", "", "beside it 1 others: it was cut"),
+        ("snap_t=30_0.txt", " snap_t=30_2.txt", "", "and 1 other files: it is cut"),
         ("snap_t=30_1.txt", "2\n1 1", "9\n1 1", "30_1.txt: the header counts 9 particles"),
         ("snap_t=30_1.txt", "2\n1 1", "1\n1 1", "30_1.txt: .* counts 1 particles, found 2"),
         ("snap_t=30_1.txt", "0.25 4 77", "0.25 4", "30_1.txt: .* counts 2 particles, found 0"),
         ("snap_t=30_2.txt", "1\n3.75", "x\n3.75", "30_2.txt: expected the number of particles"),
     ],
     "kratos": [
-        ("a.mdpa", "7  1 0.2\n", "", "no place or RADIUS for 1 nodes, one is 7"),
+        ("a.mdpa", "7  1 0.2\n", "", "no place or RADIUS for 1 nodes, such as 7"),
         ("a.mdpa", "SphericParticle3D", "Cluster3D", "elements that are spheres"),
         ("a.mdpa", "End Nodes", "", "incomplete"),
         ("a.mdpa", "End SubModelPart\n", "", "incomplete"),
@@ -64,7 +64,12 @@ WRONG = {
     "musen": [
         ("a.txt", "0 1 1 1 5 0.1", "0 1 1 1 5 word", "line 2: expected a number"),
         ("a.txt", "0 1 1 1 5 0.1", "0 1 1 5 0.1", "line 2: expected 0 ID 1 TYPE 5"),
-        ("a.txt", "0 1 1 1 5 0.1 0.4 23", "0 1 1 1 5 0.1 0.4 22", "properties of the first sphere"),
+        (
+            "a.txt",
+            "0 1 1 1 5 0.1 0.4 23",
+            "0 1 1 1 5 0.1 0.4 22",
+            "expected the same properties in the rows of all spheres",
+        ),
         ("a.txt", " 36 9", " 99 9", "expected properties 0 ID"),
         ("a.txt", "28 0 0", "28 1 1", "its periodic domain"),
     ],

@@ -69,7 +69,7 @@ def test_a_table_without_names_is_read_by_a_rule_that_is_told(tmp_path, columns,
     """Also loose packings, with any ending."""
     columns = [loose * one if one is POSITION else one for one in columns]
     path = rows(tmp_path / "111_10k.spheres", *columns)
-    with pytest.warns(ScanfabNote, match=f"no names and are taken for {told}: .*`columns`"):
+    with pytest.warns(ScanfabNote, match=f"no names and are taken as {told}: .*`columns`"):
         packing = read(path)
     np.testing.assert_array_equal(packing.position, loose * POSITION)
     np.testing.assert_array_equal(packing.radius, RADIUS)
@@ -82,12 +82,12 @@ def test_a_table_without_names_is_read_by_a_rule_that_is_told(tmp_path, columns,
 @pytest.mark.parametrize(
     ("reason", "columns"),
     [
-        ("in one another", (POSITION, 2 * RADIUS)),
-        ("in one another", (ID, POSITION, 2 * RADIUS)),
+        ("inside one another", (POSITION, 2 * RADIUS)),
+        ("inside one another", (ID, POSITION, 2 * RADIUS)),
         ("not be positive", (POSITION, -RADIUS)),
         ("two frames", (np.tile(POSITION, (2, 1)), np.tile(RADIUS, 2))),
         ("not be whole", (POSITION, RADIUS, RADIUS)),
-        ("seems to be ids", (ID, POSITION)),
+        ("looks like ids", (ID, POSITION)),
         ("the 6 columns have no names .expected four or five", (POSITION, RADIUS, ID, ID)),
         ("3 columns", (POSITION,)),
     ],
@@ -279,7 +279,7 @@ def test_contacts_of_grains_without_ids_name_rows(tmp_path, base):
         packing = scanfab.read(grains_file(tmp_path, ids=False), contacts=contacts)
     assert {tuple(pair) for pair in packing.contacts.pairs} == {tuple(pair) for pair in PAIRS}
     write(contacts, "id1,id2\n1,40\n2,60\n5,33\n")
-    with pytest.raises(ReadError, match="the grains have no ids, and by rows are no"):
+    with pytest.raises(ReadError, match="the grains have no ids, nor do the numbers fit rows"):
         scanfab.read(tmp_path / "grains.csv", contacts=contacts)
 
 
@@ -315,7 +315,7 @@ def test_contact_columns_that_cannot_be_are_told(tmp_path):
     with pytest.raises(ReadError, match="'a' is named twice in `contact_columns`"):
         scanfab.read(path, contacts=contacts, contact_columns="id1=a,id2=1", format="table")
     write(path, "x,y,z,r,age\n" + ROWS)
-    with pytest.warns(ScanfabWarning, match="there is no file of contacts with such columns"):
+    with pytest.warns(ScanfabWarning, match="no contact file has these columns"):
         scanfab.read(path, contact_columns="id1=a,id2=c")
     assert len(scanfab.read(path, contact_columns="id1=a,id2=b").contacts) == 1
 
@@ -327,7 +327,9 @@ def test_tables_beside_dumps_are_skipped_unless_they_are_named(tmp_path):
     dump = write(tmp_path / "dump_5.txt", dump_text(step=5))
     table = write(tmp_path / "table_5.csv", "id,x,y,z,radius\n1,0,0,0,1\n")
     pairs = write(tmp_path / "pairs_5.csv", "id1,id2\n1,2\n")
-    with pytest.warns(ScanfabNote, match=r"skipped pairs_5\.csv, table_5\.csv: they hold results"):
+    with pytest.warns(
+        ScanfabNote, match=r"skipped pairs_5\.csv, table_5\.csv: they hold results or other tables"
+    ):
         series = scanfab.read_series(tmp_path)
     assert (len(series[0].read()), series.contacts) == (3, ())
     assert len(read(table)) == 1
@@ -378,7 +380,7 @@ def test_edem(tmp_path):
     names = [f"Q{number:02}:Contact {title}:" for number, title in enumerate(titles, start=2)]
     normal = POSITION[PAIRS[:, 1]] - POSITION[PAIRS[:, 0]]
     contacts = rows(tmp_path / "c.csv", ID[PAIRS], -normal, normal - FORCE, names=names)
-    with pytest.warns(ScanfabNote, match="radii are those of spheres of the volumes"):
+    with pytest.warns(ScanfabNote, match="radii are computed from the volumes"):
         packing = scanfab.read(grains, contacts=contacts, format="edem")
     np.testing.assert_allclose(packing.radius, RADIUS, rtol=1e-15)
     np.testing.assert_allclose(np.abs(packing.contacts.force), np.abs(FORCE), rtol=1e-12)
@@ -406,7 +408,7 @@ def test_xyzd(tmp_path):
     np.testing.assert_array_equal(packing.cell.vectors, np.diag([4, 4.5, 5]))
     assert packing.cell.periodic == (True, True, True)
     write(tmp_path / "packing.nfo", info.replace("0.3345", "none"))
-    with pytest.raises(ReadError, match="expected a theoretical and a final porosity"):
+    with pytest.raises(ReadError, match="expected theoretical and final porosities"):
         read(path)
 
 

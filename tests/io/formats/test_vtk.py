@@ -117,5 +117,7 @@ def test_forces_whose_grain_is_in_doubt_and_arrays_of_other_names_are_left_out(t
     with pytest.warns(ScanfabWarning, match=r"lines\.vtp: the forces are left out: 67% of them"):
         assert scanfab.read(spheres, contacts=contacts).contacts.force is None
     polydata(contacts, cells={"normal_force": np.ones(3), "ContactForce": PUSH, "kn": np.ones(3)})
-    with pytest.warns(ScanfabNote, match=r"left out of the contacts: \w+, \w+: only a vector"):
+    with pytest.warns(
+        ScanfabNote, match=r"contact arrays that are not read: \w+, \w+: only a vector"
+    ):
         assert scanfab.read(spheres, contacts=contacts).contacts.force is None

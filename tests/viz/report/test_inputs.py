@@ -112,7 +112,7 @@ def test_labels_tell_runs_of_one_sample_apart(table, tmp_path, capsys):
     text = words_of(page.read_text("utf-8"))
     assert "Void fabric of old, new" in text
     assert run(["report", *words, "--label", "old", "-o", str(page)]) == 2
-    assert "--label: expected one a table: 2, found 1" in capsys.readouterr().err
+    assert "--label: expected one per table: 2, found 1" in capsys.readouterr().err
 
 
 def test_an_empty_table_is_an_error(table, tmp_path, capsys):
