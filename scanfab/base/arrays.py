@@ -67,7 +67,7 @@ def concatenated(parts: Sequence[Any]) -> Any:
     if isinstance(first, np.ndarray):
         return np.concatenate(parts)
     if isinstance(first, dict):
-        return {key: concatenated([one[key] for one in parts]) for key in first}
+        return {key: concatenated([part[key] for part in parts]) for key in first}
     names = [field.name for field in fields(first)]
-    whole = {name: concatenated([getattr(one, name) for one in parts]) for name in names}
+    whole = {name: concatenated([getattr(part, name) for part in parts]) for name in names}
     return type(first)(**whole)

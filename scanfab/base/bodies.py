@@ -136,8 +136,8 @@ class Hull:
             return np.full(len(shift), self.volume), shadow
         lines = MOST_CUTS // (len(self.planes) * max(len(shift), 1))
         lines = min(max(lines, FEWEST_LINES), MOST_LINES)
-        found = [self._long_shares(one, length, lines) for one in shift]
-        shared, number = np.array(found).reshape(-1, 2).T
+        shares = [self._long_shares(vector, length, lines) for vector in shift]
+        shared, number = np.array(shares).reshape(-1, 2).T
         return self.volume * shared, shadow * number
 
     def _long_shares(self, shift: FloatArray, length: float, lines: int) -> tuple[float, float]:

@@ -98,11 +98,11 @@ def columns_of_fields(kind: type) -> tuple[Column, ...]:
     >>> columns_of_fields(StepRow)[0].meaning
     'the series as given'
     """
-    found = []
+    columns = []
     for name, hint in get_type_hints(kind, include_extras=True).items():
         meaning, *unit = hint.__metadata__
         # ``float`` of ``float | None``, ``list`` of ``list[str]`` and the like
-        of_value = next((one for one in get_args(hint.__origin__)), hint.__origin__)
+        of_value = next((argument for argument in get_args(hint.__origin__)), hint.__origin__)
         held = hint.__origin__ if get_origin(hint.__origin__) is list else of_value
-        found.append(Column(name, get_origin(held) or held, "".join(unit), meaning))
-    return tuple(found)
+        columns.append(Column(name, get_origin(held) or held, "".join(unit), meaning))
+    return tuple(columns)

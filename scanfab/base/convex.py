@@ -290,8 +290,8 @@ class Convex:
         normals, distance = self.planes[:, :3], self.planes[:, 3]
         both = distance + np.minimum(normals @ shift, 0.0)
         depth = np.column_stack([normals, np.ones(len(normals))])
-        found = linprog([0, 0, 0, -1], depth, both, bounds=[(None, None)] * 4)
-        return bool(found.x[3] > ROUNDING * self.reach)
+        solution = linprog([0, 0, 0, -1], depth, both, bounds=[(None, None)] * 4)
+        return bool(solution.x[3] > ROUNDING * self.reach)
 
     def deformed(self, gradient: FloatArray) -> Convex:
         """

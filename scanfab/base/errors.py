@@ -101,7 +101,7 @@ def joined(notes: Iterable[Note]) -> tuple[Note, ...]:
 
 def tell(notes: Iterable[Note], where: str = "") -> None:
     """Warn of each note; a frame that was left out is a warning of its own kind."""
-    for one in notes:
-        skipped = one.code == SKIPPED
-        text = one.told(f"{where} skipped" if skipped else where)
+    for note in notes:
+        skipped = note.code == SKIPPED
+        text = note.told(f"{where} skipped" if skipped else where)
         warnings.warn(text, SkippedFrameWarning if skipped else ScanfabWarning, stacklevel=3)

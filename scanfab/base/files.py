@@ -129,14 +129,14 @@ def locked(path: Path) -> Iterator[IO[bytes]]:
 
 def free_memory() -> int:
     """Bytes that this process can still get: the least of machine, container and own limit."""
-    found = [sys.maxsize if (own := address_space()) is None else own]
+    limits = [sys.maxsize if (own := address_space()) is None else own]
     with suppress(OSError):
         text = Path("/proc/meminfo").read_text("ascii")
-        found += [int(kB) << 10 for kB in re.findall(r"MemAvailable:\s*(\d+) kB", text)]
+        limits += [int(kB) << 10 for kB in re.findall(r"MemAvailable:\s*(\d+) kB", text)]
     # without a container there is no such file, and without a limit it says "max"
     with suppress(OSError, ValueError):
-        found.append(int(CONTAINER.read_text("ascii")))
-    return max(min(found), 0)
+        limits.append(int(CONTAINER.read_text("ascii")))
+    return max(min(limits), 0)
 
 
 def address_space() -> int | None:

@@ -114,12 +114,12 @@ running = partial(option, decides=False)
 def options_of(holder: type) -> tuple[Option, ...]:
     """The options that the fields of a dataclass declare."""
     helps: dict[str, str] = {}
-    for one in reversed(holder.__mro__[:-1]):
-        helps |= _docstrings(one.__module__).get(one.__name__, {})
-    kinds = [KINDS.get(str(one.type).removesuffix(" | None"), str) for one in fields(holder)]
+    for base in reversed(holder.__mro__[:-1]):
+        helps |= _docstrings(base.__module__).get(base.__name__, {})
+    kinds = [KINDS.get(str(field.type).removesuffix(" | None"), str) for field in fields(holder)]
     return tuple(
-        Option(one.name, kind, helps[one.name], **one.metadata)
-        for one, kind in zip(fields(holder), kinds, strict=True)
+        Option(field.name, kind, helps[field.name], **field.metadata)
+        for field, kind in zip(fields(holder), kinds, strict=True)
     )
 
 
@@ -153,7 +153,7 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
     The function refuses names that are no options, and in its docstring the help of the options, in
     the order of the signature and with its types, stands in place of ``{options}``.
     """
-    declared = {one.name: one for one in options}
+    declared = {option.name: option for option in options}
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         parameters = inspect.signature(function).parameters
@@ -164,8 +164,8 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
             return function(*args, **kwargs)
 
         helps = [
-            _documented(declared[name], one.annotation)
-            for name, one in parameters.items()
+            _documented(declared[name], parameter.annotation)
+            for name, parameter in parameters.items()
             if name in declared
         ]
         text = inspect.cleandoc(function.__doc__ or "")
@@ -189,24 +189,24 @@ def number(expected: str, holds: Callable[[float], bool]) -> Parse:
 
     def parse(name: str, value: Any) -> float:
         try:
-            found = float(value)
+            result = float(value)
         except (TypeError, ValueError):
-            found = math.nan
-        if not holds(found):
+            result = math.nan
+        if not holds(result):
             raise unusable(name, expected, value)
-        return found
+        return result
 
     return parse
 
 
 def whole(expected: str, holds: Callable[[int], bool]) -> Parse:
     """A parser of one whole number."""
-    parse_float = number(expected, lambda found: found.is_integer() and holds(int(found)))
+    parse_float = number(expected, lambda value: value.is_integer() and holds(int(value)))
 
     def parse(name: str, value: Any) -> int:
-        found = parse_float(name, value)
+        result = parse_float(name, value)
         # a float would round a large integer
-        return value if isinstance(value, int) else int(found)
+        return value if isinstance(value, int) else int(result)
 
     return parse
 
@@ -217,12 +217,12 @@ def numbers(expected: str, holds: Callable[[Floats], bool]) -> Callable[[str, An
     def parse(name: str, value: Any) -> tuple[float, ...]:
         words = value.replace(",", " ").split() if isinstance(value, str) else value
         try:
-            found = tuple(map(float, words))
+            values = tuple(map(float, words))
         except (TypeError, ValueError):
-            found = (math.nan,)
-        if not all(map(math.isfinite, found)) or not holds(found):
+            values = (math.nan,)
+        if not all(map(math.isfinite, values)) or not holds(values):
             raise unusable(name, expected, value)
-        return found
+        return values
 
     return parse
 

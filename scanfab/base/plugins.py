@@ -60,7 +60,7 @@ def load_plugins(group: str, what: str, make: Callable[[Any], Any]) -> dict[str,
     ScanfabError
         If two packages use one name.
     """
-    found: dict[str, Offer] = {}
+    offers: dict[str, Offer] = {}
     for point in sorted(entry_points(group=group), key=lambda point: (point.name, point.value)):
         package = point.dist.name if point.dist is not None else "unknown package"
         try:
@@ -71,10 +71,10 @@ def load_plugins(group: str, what: str, make: Callable[[Any], Any]) -> dict[str,
                 f"{type(error).__name__}: {error}"
             )
             continue
-        if point.name in found:
+        if point.name in offers:
             raise ScanfabError(
                 f"two packages offer a {what} called {point.name!r}: "
-                f"{found[point.name].package} and {package}; remove one of them"
+                f"{offers[point.name].package} and {package}; remove one of them"
             )
-        found[point.name] = Offer(plugin, package)
-    return found
+        offers[point.name] = Offer(plugin, package)
+    return offers

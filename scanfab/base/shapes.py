@@ -91,7 +91,7 @@ def box(
     array([1. , 1.5, 2. ])
     """
     frame, body = _frame(np.multiply(0.5, edges), turn, space), SQUARE if space.is_plane else BLOCK
-    return image_of(body, frame, "box " + " x ".join(f"{one:g}" for one in edges))
+    return image_of(body, frame, "box " + " x ".join(f"{edge:g}" for edge in edges))
 
 
 def ellipsoid(
@@ -121,7 +121,7 @@ def ellipsoid(
     array([2., 3., 4.])
     """
     name, body = ("ellipse", DISC) if space.is_plane else ("ellipsoid", BALL)
-    size = f"{name} of semi-axes {', '.join(f'{one:g}' for one in semi_axes)}"
+    size = f"{name} of semi-axes {', '.join(f'{axis:g}' for axis in semi_axes)}"
     return image_of(body, _frame(semi_axes, turn, space), size)
 
 

@@ -149,7 +149,7 @@ def even_polynomials(axes: FloatArray, degree: int, space: Space) -> FloatArray:
         return np.column_stack([np.ones(len(axes)), np.cos(angles), np.sin(angles)])
     powers = [(i, j, degree - i - j) for i in range(degree + 1) for j in range(degree + 1 - i)]
     i, j, k = np.array(powers).T
-    x, y, z = (np.vander(one, degree + 1, increasing=True) for one in axes.T)
+    x, y, z = (np.vander(coordinate, degree + 1, increasing=True) for coordinate in axes.T)
     design: FloatArray = x[:, i] * y[:, j] * z[:, k]
     return design
 

@@ -157,8 +157,8 @@ def part_errors(values: FloatArray, held: BoolArray) -> FloatArray:
     True
     """
     variance = variance_without_noise(np.moveaxis(values, -1, 0), held.T)
-    known = (held.sum(axis=1) >= FEWEST_PARTS) & (variance > 0)
-    return np.sqrt(np.where(known, variance, np.nan))
+    usable = (held.sum(axis=1) >= FEWEST_PARTS) & (variance > 0)
+    return np.sqrt(np.where(usable, variance, np.nan))
 
 
 def ratio_with_errors(over: FloatArray, under: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -227,8 +227,8 @@ def homogeneity_of(
     # imported here because few scans need it
     from scipy.special import fdtrc
 
-    known = np.isfinite(values) & np.isfinite(variances) & (variances > 0) & (weights > 0)
-    values, variances, weights = values[known], variances[known], weights[known]
+    usable = np.isfinite(values) & np.isfinite(variances) & (variances > 0) & (weights > 0)
+    values, variances, weights = values[usable], variances[usable], weights[usable]
     count = len(values)
     if count < FEWEST_BLOCKS:
         return None

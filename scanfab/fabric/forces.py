@@ -161,11 +161,11 @@ class Forces:
 
     def values(self, measured: Measured) -> dict[str, Any]:
         """All None without contacts."""
-        found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
+        row: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
         normals, axis, space = measured.normals, measured.axis, measured.space
         forces = measured.forces
         if forces is None or not len(normals):
-            return found
+            return row
         means = {
             "bn": directional_mean(normals, forces.branch, axis, space),
             "fn": directional_mean(normals, forces.force_n, axis, space),
@@ -184,10 +184,10 @@ class Forces:
                 means[name] = DirectionalMean(tensor.matrix, tensor.axial(axis), error)
         for name, mean in means.items():
             if mean is not None:
-                found |= {f"{name}_{one}": float(mean.matrix[at]) for one, at in COMPONENTS.items()}
-                found[f"alpha_{name}_axial"] = mean.axial
-                found[f"alpha_{name}_axial_se"] = mean.axial_se
-        return found
+                row |= {f"{name}_{part}": float(mean.matrix[at]) for part, at in COMPONENTS.items()}
+                row[f"alpha_{name}_axial"] = mean.axial
+                row[f"alpha_{name}_axial_se"] = mean.axial_se
+        return row
 
 
 def doubts_of_forces(measured: Measured) -> dict[str, str]:

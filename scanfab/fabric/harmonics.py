@@ -88,8 +88,8 @@ def tensor4(vectors: FloatArray, weights: FloatArray) -> FloatArray:
     np.float64(0.5)
     """
     pairs = np.einsum("ci,cj->cij", vectors, vectors).reshape(-1, 9)
-    found: FloatArray = (weights[:, None] * pairs).T @ pairs / weights.sum()
-    return found.reshape(3, 3, 3, 3)
+    tensor: FloatArray = (weights[:, None] * pairs).T @ pairs / weights.sum()
+    return tensor.reshape(3, 3, 3, 3)
 
 
 class Harmonics:
@@ -115,7 +115,7 @@ class Harmonics:
 
     def values(self, measured: Measured) -> dict[str, Any]:
         """All None of a fabric that does not exist."""
-        found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
+        row: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
         void, axis, space, normals = measured.void, measured.axis, measured.space, measured.normals
         # what each order is the mean of
         each: dict[str, FloatArray] = {}
@@ -129,13 +129,13 @@ class Harmonics:
                     means = np.sum(weights * harmonic(order, void.axes @ axis, space), axis=1)
                     each[f"vs_a{order}"] = harmonics_of(order, space) * means
             tensor = tensor4(void.axes.reshape(-1, 3), weights.ravel())
-            found["vs_tensor4"] = tensor.ravel().tolist()
+            row["vs_tensor4"] = tensor.ravel().tolist()
         if len(normals):
             for order in ORDERS:
                 # the error is that of a mean over independent contacts
                 values = harmonic(order, normals @ axis, space)
                 each[f"c_a{order}"] = harmonics_of(order, space) * values
-            found["c_tensor4"] = tensor4(normals, np.ones(len(normals))).ravel().tolist()
+            row["c_tensor4"] = tensor4(normals, np.ones(len(normals))).ravel().tolist()
         for name, values in each.items():
-            found |= {name: float(values.mean()), f"{name}_se": error_of_mean(values)}
-        return found
+            row |= {name: float(values.mean()), f"{name}_se": error_of_mean(values)}
+        return row

@@ -112,8 +112,8 @@ class Invariants:
         *of_both("f_{0}_bias", "what {1} would give f_{0} in the mean", BIAS),
         *numbers(
             {
-                f"g{one}_{k}": f"principal value of the {what}, {which}"
-                for one, what in FABRICS.items()
+                f"g{fabric}_{k}": f"principal value of the {what}, {which}"
+                for fabric, what in FABRICS.items()
                 for k, which in ((1, "the largest"), (2, "the middle one"), (3, "the smallest"))
             }
         ),
@@ -125,31 +125,31 @@ class Invariants:
         *numbers(
             {
                 f"{name}_se": f"standard error of {name}, {what}"
-                for one, what in ERRORS.items()
-                for name in (f"f_{one}", *(f"g{one}_{k}" for k in (1, 2, 3)))
+                for fabric, what in ERRORS.items()
+                for name in (f"f_{fabric}", *(f"g{fabric}_{k}" for k in (1, 2, 3)))
             }
         ),
     )
 
     def values(self, measured: Measured) -> dict[str, Any]:
         """All None of a fabric that does not exist."""
-        found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
+        row: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
         space, void, contact = measured.space, measured.void, measured.contact
         if void is not None:
             tensors = void.replicates
-            found |= _values("vs", void.tensor, measured.segment_count, tensors)
+            row |= _values("vs", void.tensor, measured.segment_count, tensors)
             if len(tensors) > 1:
                 # all are of trace 1, so the components of the deviator share what there is of
                 # variance in the mean of the replicates
                 freedom = COMPONENTS_OF_DEVIATOR[space.dimension]
                 variance = float(np.sum(np.var(tensors, axis=0, ddof=1))) / freedom / len(tensors)
-                found["f_vs_bias"] = bias_of(space) * math.sqrt(variance)
+                row["f_vs_bias"] = bias_of(space) * math.sqrt(variance)
         if contact is not None:
             n, count = measured.normals, len(measured.normals)
-            found |= _values("c", contact, count, np.einsum("ci,cj->cij", n, n))
+            row |= _values("c", contact, count, np.einsum("ci,cj->cij", n, n))
             variance = CONTACT_VARIANCE[space.dimension] / count
-            found["f_c_bias"] = bias_of(space) * math.sqrt(variance)
-        return found
+            row["f_c_bias"] = bias_of(space) * math.sqrt(variance)
+        return row
 
 
 def _values(
@@ -162,18 +162,20 @@ def _values(
     linear in G: values of a form A, A:G. ``count`` is the number of segments or contacts.
     """
     space, (largest, middle, smallest) = tensor.space, tensor.principal_values.tolist()
-    found: dict[str, float | None] = {
+    row: dict[str, float | None] = {
         f"f_{name}": intensity(tensor.matrix, space),
-        **{f"g{name}_{k}": one for k, one in enumerate((largest, middle, smallest), start=1)},
+        **{f"g{name}_{k}": value for k, value in enumerate((largest, middle, smallest), start=1)},
     }
     alpha = largest - smallest
     if count > 0 and not space.is_plane and alpha >= LEAST_ALPHA / math.sqrt(count):
-        found[f"b_{name}"] = (middle - smallest) / alpha
-    forms = {f"g{name}_{k}": np.outer(one, one) for k, one in enumerate(tensor.principal_axes, 1)}
+        row[f"b_{name}"] = (middle - smallest) / alpha
+    forms = {
+        f"g{name}_{k}": np.outer(axis, axis) for k, axis in enumerate(tensor.principal_axes, 1)
+    }
     deviator = fabric_deviator(tensor.matrix, space)
     size = float(np.linalg.norm(deviator))
     if size > 0.0:
         forms[f"f_{name}"] = math.sqrt(space.intensity) * space.second_order * deviator / size
     for of, form in forms.items():
-        found[f"{of}_se"] = error_of_mean(np.einsum("cij,ij->c", each, form))
-    return found
+        row[f"{of}_se"] = error_of_mean(np.einsum("cij,ij->c", each, form))
+    return row

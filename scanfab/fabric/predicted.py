@@ -80,8 +80,8 @@ def window_alpha(
     if window.is_sphere:
         return 0.0
     shared, slope = (
-        one.reshape(fabric.axes.shape[:2])
-        for one in window.overlap(fabric.axes.reshape(-1, 3), cutoff)
+        values.reshape(fabric.axes.shape[:2])
+        for values in window.overlap(fabric.axes.reshape(-1, 3), cutoff)
     )
     long, whole = float((shared @ fabric.weights).sum()), float((slope @ fabric.weights).sum())
     beyond = fabric.mean_length - cutoff

@@ -92,17 +92,17 @@ def checked_values(name: str, fabric: Fabric, measured: Measured) -> dict[str, A
     """
     columns = {column.name: column.kind for column in fabric.columns}
     try:
-        found = dict(fabric.values(measured))
-        if found.keys() != columns.keys():
-            raise ValueError(f"expected a value for each of {[*columns]}, found {found}")
+        values = dict(fabric.values(measured))
+        if values.keys() != columns.keys():
+            raise ValueError(f"expected a value for each of {[*columns]}, found {values}")
         for key, kind in columns.items():
-            value = found[key]
+            value = values[key]
             if value is None or (kind is not str and not math.isfinite(value)):
-                found[key] = None
+                values[key] = None
             elif kind(value) != value:
                 raise ValueError(f"{key}: expected {kind.__name__} or None, found {value!r}")
             else:
-                found[key] = kind(value)
-        return found
+                values[key] = kind(value)
+        return values
     except Exception as error:  # a foreign package may fail in any way
         raise ScanfabError(f"the fabric {name!r}: {type(error).__name__}: {error}") from error

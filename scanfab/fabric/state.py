@@ -96,26 +96,26 @@ class State:
     def values(self, measured: Measured) -> dict[str, Any]:
         """All but the strain, which is that of the frame."""
         names = [column.name for column in self.columns if column is not VOLUMETRIC_STRAIN]
-        found: dict[str, Any] = dict.fromkeys(names)
+        row: dict[str, Any] = dict.fromkeys(names)
         state = measured.state
         if state is None:
-            return found
-        found["void_ratio"] = state.void_ratio
-        found["coordination_mechanical"] = state.coordination_mechanical
+            return row
+        row["void_ratio"] = state.void_ratio
+        row["coordination_mechanical"] = state.coordination_mechanical
         if state.stress is not None:
             along = float(measured.axis @ state.stress @ measured.axis)
             less = state.space.dimension / (state.space.dimension - 1.0)
-            found |= {f"stress_{one}": float(state.stress[at]) for one, at in COMPONENTS.items()}
-            found |= {"p": state.mean_stress, "q": less * (along - state.mean_stress)}
-        return found | _against_stress(measured, state)
+            row |= {f"stress_{part}": float(state.stress[at]) for part, at in COMPONENTS.items()}
+            row |= {"p": state.mean_stress, "q": less * (along - state.mean_stress)}
+        return row | _against_stress(measured, state)
 
 
 def _against_stress(measured: Measured, state: SampleState) -> dict[str, float | None]:
     """How both fabrics stand to the stress and the direction of its deviator, if it has one."""
     space, n, along = state.space, measured.normals, state.direction
-    found: dict[str, float | None] = {}
+    row: dict[str, float | None] = {}
     if state.stress is None or along is None:
-        return found
+        return row
     stress = FabricTensor(state.stress / np.trace(state.stress), space)
     fabrics: dict[str, tuple[FabricTensor, FloatArray]] = {}
     # with each tensor the F:n of what it is the mean of
@@ -126,7 +126,7 @@ def _against_stress(measured: Measured, state: SampleState) -> dict[str, float |
         each = space.second_order * np.einsum("ci,ij,cj->c", n, along, n)
         fabrics["c"] = measured.contact, each
     for name, (fabric, each) in fabrics.items():
-        found[f"acst_{name}"] = float(np.sum(fabric_deviator(fabric.matrix, space) * along))
-        found[f"angle_{name}_stress"] = fabric.angle_to(stress)
-        found[f"acst_{name}_se"] = error_of_mean(each)
-    return found
+        row[f"acst_{name}"] = float(np.sum(fabric_deviator(fabric.matrix, space) * along))
+        row[f"angle_{name}_stress"] = fabric.angle_to(stress)
+        row[f"acst_{name}_se"] = error_of_mean(each)
+    return row

@@ -189,10 +189,10 @@ def of_both(
     Examples
     --------
     >>> from scanfab.fabric.tensor import of_both
-    >>> [(one.name, one.meaning) for one in of_both("f_{0}", "a of the {1}")]
+    >>> [(column.name, column.meaning) for column in of_both("f_{0}", "a of the {1}")]
     [('f_vs', 'a of the void fabric'), ('f_c', 'a of the contact fabric')]
     """
-    return numbers({name.format(*one): meaning.format(*one) for one in of.items()}, unit)
+    return numbers({name.format(*words): meaning.format(*words) for words in of.items()}, unit)
 
 
 def tensor_columns(name: str, what: str) -> tuple[Column, ...]:
@@ -202,7 +202,7 @@ def tensor_columns(name: str, what: str) -> tuple[Column, ...]:
     Examples
     --------
     >>> from scanfab.fabric.tensor import tensor_columns
-    >>> [one.name for one in tensor_columns("c", "contact fabric")][4:]
+    >>> [column.name for column in tensor_columns("c", "contact fabric")][4:]
     ['gc_xz', 'gc_yz', 'alpha_c', 'alpha_c_axial']
     """
     components = {f"g{name}_{k}": f"{k} of the {what} tensor, whose trace is 1" for k in COMPONENTS}
@@ -220,7 +220,7 @@ def tensor_values(
 ) -> dict[str, float | None]:
     """The values of these columns; all None without a tensor."""
     if tensor is None:
-        return dict.fromkeys(one.name for one in tensor_columns(name, ""))
+        return dict.fromkeys(column.name for column in tensor_columns(name, ""))
     return {
         **{f"g{name}_{place}": value for place, value in tensor.components().items()},
         f"alpha_{name}": tensor.alpha,

@@ -75,17 +75,17 @@ class Scatter:
 
     def values(self, measured: Measured) -> dict[str, Any]:
         """All None where there is no fabric, or none without some block."""
-        found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
+        row: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
         void, axis = measured.void.tensor if measured.void else None, measured.axis
         for name, tensor, scatter in (
             (VOID, void, measured.void_scatter),
             (CONTACT, measured.contact, measured.contact_scatter),
         ):
             if tensor is not None and scatter is not None:
-                found[f"{name}_sample_se"] = scatter.error
+                row[f"{name}_sample_se"] = scatter.error
                 without = tensor.axial(axis) + scatter.shift
-                found |= {f"{name}_without_{k}": float(x) for k, x in enumerate(without, start=1)}
-        return found
+                row |= {f"{name}_without_{k}": float(x) for k, x in enumerate(without, start=1)}
+        return row
 
 
 class Halves:
@@ -112,9 +112,9 @@ class Orientation:
     columns = (
         *numbers(
             {
-                f"g{one}_axis_{k}": f"{k} of the direction of the {what}'s largest principal "
+                f"g{name}_axis_{k}": f"{k} of the direction of the {what}'s largest principal "
                 "value, a unit vector"
-                for one, what in FABRICS.items()
+                for name, what in FABRICS.items()
                 for k in "xyz"
             }
         ),
@@ -125,11 +125,11 @@ class Orientation:
         """Of what there is: an angle needs both fabrics."""
         void = measured.void.tensor if measured.void else None
         contact = measured.contact
-        found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
+        row: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
         for prefix, tensor in (("gvs", void), ("gc", contact)):
             if tensor is not None:
                 along = zip("xyz", tensor.major_axis.tolist(), strict=True)
-                found |= {f"{prefix}_axis_{one}": x for one, x in along}
+                row |= {f"{prefix}_axis_{letter}": x for letter, x in along}
         if void is not None and contact is not None:
-            found["coaxiality_deg"] = void.angle_to(contact)
-        return found
+            row["coaxiality_deg"] = void.angle_to(contact)
+        return row

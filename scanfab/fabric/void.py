@@ -254,7 +254,7 @@ def block_fabrics(
         Of the kept segments, as :func:`scanfab.void_fabric` takes them.
     """
     empty = number <= 0
-    over, under = (np.einsum("d,rd...->r...", weights, one) for one in (length, number))
+    over, under = (np.einsum("d,rd...->r...", weights, values) for values in (length, number))
     usual = np.where(under > 0, ratio(over, under), 1.0)
     mean = np.where(empty, usual[:, None], ratio(length, number))
     mean *= weights.reshape(-1, *[1] * (mean.ndim - 2))

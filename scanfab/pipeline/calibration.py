@@ -168,19 +168,19 @@ def calibrate(
     >>> sorted({row.ladder for row in found.rows})
     ['cutoff', 'directions', 'recommended', 'rv', 'spacing']
     """
-    refuse_unknown("calibrate", options, [one.name for one in options_of(Settings)])
+    refuse_unknown("calibrate", options, [option.name for option in options_of(Settings)])
     settings = Settings(variants=variants, **options)
     if settings.lists_gaps or len(settings.rvs) > 1:
         raise SettingsError("calibrate: its ladders take neither cutoffs, moment nor several rv")
-    one = _OneFrame(source, settings, frame)
-    settings, cutoffs = one.settings, one.cutoffs()
-    spacings, directions, rvs = (one.ladder(name) for name in ("spacing", "directions", "rv"))
+    one_frame = _OneFrame(source, settings, frame)
+    settings, cutoffs = one_frame.settings, one_frame.cutoffs()
+    spacings, directions, rvs = (one_frame.ladder(name) for name in ("spacing", "directions", "rv"))
     ladders = {"spacing": spacings, "directions": directions, "cutoff": cutoffs, "rv": rvs}
     cutoff = settings.cutoff.value if settings.cutoff.unit == "rmin" else PAPER_CUTOFF
     at_cutoff = [row for row in cutoffs if row.value == cutoff] or cutoffs
     sample = _largest(at_cutoff, "alpha_vs_axial_sample_se")
     target = max(settings.tolerance, OF_SAMPLE * (sample or 0.0))
-    best, recommended = one.recommended(spacings, directions, target)
+    best, recommended = one_frame.recommended(spacings, directions, target)
     findings = [_finding(name, rows) for name, rows in ladders.items() if rows]
     reached, own = (
         "unknown" if error is None else f"{error:.2g}"
@@ -275,9 +275,9 @@ class _OneFrame:
         for row in result.rows:
             # errors at other cut-offs than the scan's stand in the rows themselves
             own = [n for n in result.notes if row.variant in n.variants and n.code != OTHER_CUTOFFS]
-            whole = [one for one in result.notes if one.code == TOLERANCE_MISSED]
+            whole = [note for note in result.notes if note.code == TOLERANCE_MISSED]
             step = StepRow(
-                **{one.name: row[one.name] for one in fields(StepRow) if one.name in row},
+                **{field.name: row[field.name] for field in fields(StepRow) if field.name in row},
                 ladder=ladder,
                 value=round(row.cutoff / r_min, 9) if value is None else value,
                 rule=plan.rule.name,
@@ -286,7 +286,7 @@ class _OneFrame:
                 rv_radius=window.radius if window and row.variant in "cd" else None,
                 seconds=seconds,
                 steady=None,
-                note="; ".join(one.text for one in (*own, *whole)),
+                note="; ".join(note.text for note in (*own, *whole)),
             )
             rows.append(step)
         return rows, result.measurements[0]
@@ -305,9 +305,12 @@ class _OneFrame:
         other_lines = replace(self.settings, tolerance=target, seed=self.settings.seed + 1)
         for _ in range(ROUNDS):
             trial = replace(other_lines, spacing=Length(spacing, "rmin"), directions=rule)
-            _, found = self.measured("recommended", len(rule), trial)
-            errors = [Goal().errors(found.sums, found.plan, one) for one in found.plan.variants]
-            missing = missing_work(errors, found.plan, found.sums.replicates)
+            _, measurement = self.measured("recommended", len(rule), trial)
+            errors = [
+                Goal().errors(measurement.sums, measurement.plan, name)
+                for name in measurement.plan.variants
+            ]
+            missing = missing_work(errors, measurement.plan, measurement.sums.replicates)
             if missing <= 1.0:
                 break
             wanted = len(rule) * missing
@@ -326,16 +329,16 @@ def judged(rows: Sequence[StepRow], dimension: int = 3) -> list[StepRow]:
     # by how many standard errors steps may differ by chance, given all pairs of a variant's
     pairs = sum(math.comb(count, 2) for count in Counter(row.variant for row in rows).values())
     most = float(stdtrit(FREEDOM, 1.0 - 0.5 * CHANCE / max(pairs, 1)))
-    found: list[StepRow] = []
+    judged_rows: list[StepRow] = []
     for row in reversed(rows):
-        later = [one for one in found if one.variant == row.variant]
+        later = [step for step in judged_rows if step.variant == row.variant]
         is_sound = None not in (row.alpha_vs_axial, row.alpha_vs_axial_se) and not row.note
-        agree = all(one.steady and _agree(row, one, most, dimension) for one in later)
-        found.append(replace(row, steady=int(is_sound and agree)))
-    return found[::-1]
+        agree = all(step.steady and _agree(row, step, most, dimension) for step in later)
+        judged_rows.append(replace(row, steady=int(is_sound and agree)))
+    return judged_rows[::-1]
 
 
-def _agree(one: StepRow, other: StepRow, most: float, dimension: int) -> bool:
+def _agree(row: StepRow, other: StepRow, most: float, dimension: int) -> bool:
     """
     Whether two values differ by no more than so many standard errors of their difference.
 
@@ -344,15 +347,15 @@ def _agree(one: StepRow, other: StepRow, most: float, dimension: int) -> bool:
     the difference is the difference of the variances; both follow from the larger RV's, which is
     the better known.
     """
-    if one.alpha_vs_axial is None or other.alpha_vs_axial is None:
+    if row.alpha_vs_axial is None or other.alpha_vs_axial is None:
         return False
     nested = 0.0
-    if one.ladder == "rv":
-        small, large = sorted((one, other), key=lambda row: row.rv_radius or 0.0)
+    if row.ladder == "rv":
+        small, large = sorted((row, other), key=lambda step: step.rv_radius or 0.0)
         more = ((large.rv_radius or 0.0) / (small.rv_radius or 1.0)) ** dimension
         nested = (large.alpha_vs_axial_sample_se or 0.0) * math.sqrt(max(more - 1.0, 0.0))
-    error = math.hypot(one.alpha_vs_axial_se or 0.0, other.alpha_vs_axial_se or 0.0, nested)
-    return abs(one.alpha_vs_axial - other.alpha_vs_axial) <= most * error
+    error = math.hypot(row.alpha_vs_axial_se or 0.0, other.alpha_vs_axial_se or 0.0, nested)
+    return abs(row.alpha_vs_axial - other.alpha_vs_axial) <= most * error
 
 
 def first_steady(rows: Sequence[StepRow]) -> float | None:
@@ -373,18 +376,18 @@ def _finding(ladder: str, rows: list[StepRow]) -> str:
     """What the rows of a ladder show, in one sentence."""
     if ladder != "cutoff":
         steady = first_steady(rows)
-        said = "no step agrees with all later ones"
+        text = "no step agrees with all later ones"
         if steady is not None:
-            said = f"from {steady:g} on nothing changes within the errors"
-        return f"{ladder}: {said}{PAPER.get(ladder, '')}"
+            text = f"from {steady:g} on nothing changes within the errors"
+        return f"{ladder}: {text}{PAPER.get(ladder, '')}"
     variant = rows[0].variant
     own = {row.value: row.alpha_vs_axial or 0.0 for row in rows if row.variant == variant}
     best = max(own, key=lambda value: abs(own[value]))
-    said = (
+    text = (
         f"cut-off: it decides what is measured; in {variant} the anisotropy is largest "
         f"({own[best]:.2g}) at {best:g} r_min"
     )
     paper = own.get(PAPER_CUTOFF)
     if paper:
-        said += f"; at the paper's 1 r_min it is {paper / own[best]:.0%} of that"
-    return said
+        text += f"; at the paper's 1 r_min it is {paper / own[best]:.0%} of that"
+    return text

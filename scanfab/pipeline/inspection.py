@@ -69,47 +69,47 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
     ScanfabError
         If a frame cannot be read, or no frame has any of the boundary's particles.
     """
-    frames, found = Frames(series, settings), False
+    frames, any_chosen = Frames(series, settings), False
     window: Window | None = None
     for number, frame in enumerate(series.whole):
         if number in frames.chosen:
-            found = True
-            sample, told = _read(frames, frame)
+            any_chosen = True
+            sample, doubts = _read(frames, frame)
             window = window or _rv(frames, sample)
-            yield _report(series.name, number, frame, sample, told, window)
+            yield _report(series.name, number, frame, sample, doubts, window)
         elif window is None:
             with suppress(PackingError, ReadError):
                 window = _rv(frames, _read(frames, frame)[0])
         if number >= frames.chosen.stop - 1:
             break
-    if not found:
+    if not any_chosen:
         raise frames.no_such_frames()
 
 
 def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
     """A frame, and what is doubtful about it, also what makes it impossible to measure."""
-    told = []
+    doubts = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         sample = frames.read(frame)
-    for one in caught:
-        if issubclass(one.category, ScanfabNote):
-            warnings.warn(one.message, stacklevel=2)
+    for warning in caught:
+        if issubclass(warning.category, ScanfabNote):
+            warnings.warn(warning.message, stacklevel=2)
         else:
-            told.append(str(one.message))
+            doubts.append(str(warning.message))
     if len(sample.packing):
-        told += [one.text for one in boundary_hints(sample, frames.settings)]
+        doubts += [doubt.text for doubt in boundary_hints(sample, frames.settings)]
     try:
         refuse_impossible(sample)
     except PackingError as error:
-        told.append(str(error))
-    told += [one.text for one in doubts_of(sample, **frame.named)]
+        doubts.append(str(error))
+    doubts += [doubt.text for doubt in doubts_of(sample, **frame.named)]
     if no_cell := cell_doubt(sample, frame.carries):
-        told.append(no_cell)
+        doubts.append(no_cell)
     elif hint := cell_hint(sample, frame.carries):
         note(hint)
-    told += [one.text for one in sample.doubts_of_escaped()]
-    return sample, told
+    doubts += [doubt.text for doubt in sample.doubts_of_escaped()]
+    return sample, doubts
 
 
 def _rv(frames: Frames, sample: Sample) -> Window | None:
@@ -121,7 +121,7 @@ def _rv(frames: Frames, sample: Sample) -> Window | None:
 
 
 def _report(
-    source: str, number: int, frame: Frame, sample: Sample, told: list[str], window: Window | None
+    source: str, number: int, frame: Frame, sample: Sample, doubts: list[str], window: Window | None
 ) -> FrameReport:
     packing, grains, cell = sample.packing, sample.grains, sample.packing.cell
     radius = packing.radius[grains]
@@ -143,7 +143,7 @@ def _report(
         cell=None if cell is None else cell.vectors.tolist(),
         periodic=None if cell is None else list(cell.periodic),
         columns=["id", "x", "y", "z", "radius", *packing.columns],
-        warnings=told,
+        warnings=doubts,
         low=None if box is None else box.low.tolist(),
         high=None if box is None else box.high.tolist(),
         rv_center=None if window is None else window.center.tolist(),

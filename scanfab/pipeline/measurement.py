@@ -247,11 +247,11 @@ def solids_of(
             order = np.argsort(vectors[:, space.across] != 0.0, kind="stable")
             vectors, periodic = vectors[order], periodic[order]
             vectors[2] = 2.0 * float(radius.mean()) * space.normal
-    every = CellGrains(position, radius, removed, vectors, periodic)
-    around = every if edge == START and shape is not None else None
+    all_grains = CellGrains(position, radius, removed, vectors, periodic)
+    around = all_grains if edge == START and shape is not None else None
     margin = 0.0 if around is None else margin_of(around)
     if cell is not None and packing.is_periodic:
-        medium = every if whole else None
+        medium = all_grains if whole else None
         reach = 0.0 if shape is None else shape.reach
         position, row = cell.images_near_origin(position, radius + reach + margin)
         radius, removed = radius[row], removed[row]
@@ -262,8 +262,8 @@ def solids_of(
         # where all grains of an open sample are known
         gathered = sample.gathered
         largest = float(packing.radius[gathered].max())
-        found = inner_ellipsoid(packing.position[gathered], largest, space)
-        inner = None if found is None else Inner(found.shape, found.center - origin)
+        ellipsoid = inner_ellipsoid(packing.position[gathered], largest, space)
+        inner = None if ellipsoid is None else Inner(ellipsoid.shape, ellipsoid.center - origin)
     return Solids(
         position, radius, removed, shape, medium, origin,
         edge=edge, around=around, inner=inner, space=space,

@@ -29,8 +29,8 @@ def _columns() -> list[str]:
     from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
     from scanfab.table.compare import FRAMES, SUMMARY
 
-    every = (*OWN_COLUMNS, *MORE_COLUMNS, *FRAMES, *SUMMARY)
-    return list(dict.fromkeys(one.name for one in every))
+    columns = (*OWN_COLUMNS, *MORE_COLUMNS, *FRAMES, *SUMMARY)
+    return list(dict.fromkeys(column.name for column in columns))
 
 
 @dataclass
@@ -102,22 +102,24 @@ class Other:
     """Write a picture instead of opening a window; this needs no screen."""
 
 
-OPTIONS = {one.name: one for one in (*READING_OPTIONS, *options_of(Settings), *options_of(Output))}
+OPTIONS = {
+    option.name: option for option in (*READING_OPTIONS, *options_of(Settings), *options_of(Output))
+}
 """The options of compute by name."""
 
 MAP_OPTIONS = {
-    one.name: one
-    for one in (*READING_OPTIONS, *options_of(MapSettings), *options_of(Output))
-    if one.name not in ("cutoffs", "figure", "with_")
+    option.name: option
+    for option in (*READING_OPTIONS, *options_of(MapSettings), *options_of(Output))
+    if option.name not in ("cutoffs", "figure", "with_")
 }
 """Those of map."""
 
-DECLARED = {**MAP_OPTIONS, **OPTIONS, **{one.name: one for one in options_of(Other)}}
+DECLARED = {**MAP_OPTIONS, **OPTIONS, **{option.name: option for option in options_of(Other)}}
 """Those of the other commands too."""
 NAMES = "|".join(DECLARED)
 
 
-def as_options(told: str | Exception) -> str:
+def as_options(message: str | Exception) -> str:
     """
     What the library tells, which speaks of its arguments, in the words of the command line.
 
@@ -131,15 +133,15 @@ def as_options(told: str | Exception) -> str:
     >>> as_options('choose another `rv_center`, or name the `cell=(LX, LY, LZ)`')
     'choose another --rv-center, or name the --cell LX LY LZ'
     """
-    text = without_temporary(str(told))
-    if isinstance(told, SettingsError):
+    text = without_temporary(str(message))
+    if isinstance(message, SettingsError):
         text = re.sub(rf"^({NAMES}): ", r"`\1`: ", text)
     return re.sub(rf"`({NAMES})(=[^`]*)?`", _as_words, text)
 
 
-def _as_words(found: re.Match[str]) -> str:
+def _as_words(match: re.Match[str]) -> str:
     """An option with its value in Python: `cell=(1, 2)` is --cell 1 2, `x={"a": "b"}` is -x a=b."""
-    flag, value = DECLARED[found[1]].flag, (found[2] or "")[1:]
+    flag, value = DECLARED[match[1]].flag, (match[2] or "")[1:]
     if value.startswith("("):
         value = value.strip("()").replace(",", "")
     elif value.startswith("{"):
@@ -148,5 +150,5 @@ def _as_words(found: re.Match[str]) -> str:
     return " ".join([flag, re.sub(r'^"([\w.:/+-]*)"$', r"\1", value)]).strip()
 
 
-MEANINGS = {name: as_options(one.help) for name, one in OPTIONS.items() if one.decides}
+MEANINGS = {name: as_options(option.help) for name, option in OPTIONS.items() if option.decides}
 """What each option decides that decides a result, in the words of the report."""

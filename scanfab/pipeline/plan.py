@@ -125,7 +125,7 @@ class Plan:
     @property
     def windows(self) -> list[Window]:
         """All RVs."""
-        return [one.window for one in self.rvs if one.window is not None]
+        return [rv.window for rv in self.rvs if rv.window is not None]
 
     def rvs_of(self, variant: str) -> tuple[RV, ...]:
         """The RVs that a variant has rows for; the whole has one entry without a window."""
@@ -141,7 +141,7 @@ class Plan:
 
     def along(self, replicates: int) -> Iterator[Plan]:
         """A plan for each of the other RVs, with the lines that the first was scanned along."""
-        variants = "".join(one for one in self.variants if VARIANTS[one].in_window)
+        variants = "".join(name for name in self.variants if VARIANTS[name].in_window)
         for rv in self.rvs[1:]:
             yield replace(self, rvs=(rv,), variants=variants, replicates=replicates, auto="")
 
@@ -192,7 +192,9 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     lengths = {"rmin": float(radii.min()), "rmean": float(radii.mean()), "rmax": float(radii.max())}
     box = SurfaceBox.of(packing, sample.gathered)
     windows = windows_of(sample, settings) if settings.needs_window else []
-    notes = [note for one in windows for note in doubts_of_rv(one, sample, box, lengths["rmax"])]
+    notes = [
+        note for window in windows for note in doubts_of_rv(window, sample, box, lengths["rmax"])
+    ]
     blocks: MapBlocks | None = None
     if isinstance(settings, MapSettings):
         blocks = MapBlocks.of(settings, sample)
@@ -208,20 +210,20 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     # of several RVs the first gets the share of all chords that its scan cuts at least
     share = 1.0
     if len(windows) > 1:
-        volumes = [one.shape.volume for one in windows]
+        volumes = [window.shape.volume for window in windows]
         share = volumes[0] / sum(volumes)
-        if any(not VARIANTS[one].in_window for one in settings.variants):
+        if any(not VARIANTS[name].in_window for name in settings.variants):
             # its scan is that of the whole, too
             share = 1.0 / len(windows)
     return replace(
         plan,
-        rvs=tuple(RV(rv.fraction, one) for rv, one in zip(plan.rvs, windows, strict=True)),
+        rvs=tuple(RV(rv.fraction, window) for rv, window in zip(plan.rvs, windows, strict=True)),
         strains=plan.strains.since(sample),
         deformation=deformation,
         max_chords=plan.max_chords * share,
         cutoff=cutoff,
         # as many as were asked for, also if two are equal: all frames have the same number of rows
-        cutoffs=tuple(sorted(one.resolve(lengths) for one in settings.cutoffs)) or (cutoff,),
+        cutoffs=tuple(sorted(length.resolve(lengths) for length in settings.cutoffs)) or (cutoff,),
         map_blocks=blocks,
         notes=tuple(notes),
         **_lines(settings, len(plan.rule), box, windows[0].shape if windows else None, lengths),
@@ -245,17 +247,17 @@ def _lines(
     if settings.spacing is None:
         spacing = _auto_spacing(settings, axes, area, depth, lengths["rmean"], space)
         return {"spacing": spacing, "replicates": REPLICATES, "auto": "replicates"}
-    asked = settings.spacing.resolve(lengths)
-    if not CLOSEST * reach <= asked <= 2.0 * reach:
+    spacing = settings.spacing.resolve(lengths)
+    if not CLOSEST * reach <= spacing <= 2.0 * reach:
         raise SettingsError(
             f"spacing: expected a length from {CLOSEST * reach:.2g} to {2.0 * reach:.4g}, the "
-            f"width of what is scanned, found {asked:g}: lengths are in the dump's unit; did you "
+            f"width of what is scanned, found {spacing:g}: lengths are in the dump's unit; did you "
             f"mean 1rmin ({lengths['rmin']:g})?"
         )
     auto = "directions" if settings.directions is None else ""
     fewest, most = (REPLICATES, MOST_REPLICATES) if auto else (1, REPLICATES)
-    replicates = int(min(max(space.lines(area, asked) / FEWEST_LINES, fewest), most))
-    return {"spacing": asked * space.apart(replicates), "replicates": replicates, "auto": auto}
+    replicates = int(min(max(space.lines(area, spacing) / FEWEST_LINES, fewest), most))
+    return {"spacing": spacing * space.apart(replicates), "replicates": replicates, "auto": auto}
 
 
 def _auto_spacing(

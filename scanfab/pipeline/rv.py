@@ -39,7 +39,7 @@ def sizes_of(settings: Settings) -> tuple[RV, ...]:
     """The RVs of a series, without their windows; none if no variant needs one."""
     if not settings.needs_window:
         return ()
-    return tuple(RV(one if len(settings.rvs) > 1 else None) for one in settings.rvs)
+    return tuple(RV(fraction if len(settings.rvs) > 1 else None) for fraction in settings.rvs)
 
 
 def windows_of(sample: Sample, settings: Settings) -> list[Window]:
@@ -57,7 +57,7 @@ def windows_of(sample: Sample, settings: Settings) -> list[Window]:
     packing, space = sample.packing, sample.packing.space
     surfaces = SurfaceBox.of(packing, sample.gathered)
     smallest = float(packing.radius[sample.grains].min())
-    found = []
+    windows = []
     for fraction in settings.rvs:
         shape, center = _shape(settings, fraction * (0.5 * surfaces.extents), space)
         if settings.rv_center is not None:
@@ -77,8 +77,8 @@ def windows_of(sample: Sample, settings: Settings) -> list[Window]:
                 f"rv: the {shape} is nothing beside the smallest grain (radius {smallest:g}): "
                 f"choose a larger `rv`, `rv_radius` or `rv_size`"
             )
-        found.append(Window(center, shape))
-    return found
+        windows.append(Window(center, shape))
+    return windows
 
 
 def _shape(settings: Settings, part: FloatArray, space: Space) -> tuple[Convex, FloatArray | None]:
@@ -200,8 +200,10 @@ class Deformation:
             return list(windows)
         gradient = edges @ np.linalg.inv(self.edges)
         return [
-            Window(origin + gradient @ (one.center - self.origin), one.shape.deformed(gradient))
-            for one in windows
+            Window(
+                origin + gradient @ (window.center - self.origin), window.shape.deformed(gradient)
+            )
+            for window in windows
         ]
 
 

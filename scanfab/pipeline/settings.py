@@ -187,10 +187,10 @@ class Settings:
     def __init__(self, **options: Any) -> None:
         """Check what users write, and keep what it means."""
         declared = options_of(type(self))
-        refuse_unknown("Settings", options, [one.name for one in declared])
-        for one in declared:
-            value = one.parse(one.name, options.get(one.name, one.default))
-            object.__setattr__(self, one.name, value)
+        refuse_unknown("Settings", options, [option.name for option in declared])
+        for option in declared:
+            value = option.parse(option.name, options.get(option.name, option.default))
+            object.__setattr__(self, option.name, value)
         for problem in self._clashes():
             raise SettingsError(problem)
         # whether the grains are discs is not known before a frame is read
@@ -199,9 +199,10 @@ class Settings:
 
     def __repr__(self) -> str:
         chosen = [
-            f"{one.name}={as_written(getattr(self, one.name))!r}"
-            for one in options_of(type(self))
-            if as_written(getattr(self, one.name)) != as_written(one.parse(one.name, one.default))
+            f"{option.name}={as_written(getattr(self, option.name))!r}"
+            for option in options_of(type(self))
+            if as_written(getattr(self, option.name))
+            != as_written(option.parse(option.name, option.default))
         ]
         return f"{type(self).__name__}({', '.join(chosen)})"
 
@@ -259,9 +260,12 @@ class Settings:
         several = len(self.rvs) > 1
         of_window = {RV_COLUMN.name: several, "window_alpha_vs_axial": shaped}
         columns = [name for name, asked in of_window.items() if asked and self.needs_window]
-        columns += [one.name for one in EDGE_COLUMNS if self.edge != CLIP]
+        columns += [column.name for column in EDGE_COLUMNS if self.edge != CLIP]
         columns += ["alpha_vs_axial_contacts"] * bool(self.cutoffs)
-        return (*columns, *(one.name for group in self.with_ for one in GROUPS[group].columns))
+        return (
+            *columns,
+            *(column.name for group in self.with_ for column in GROUPS[group].columns),
+        )
 
     @property
     def columns(self) -> tuple[Column, ...]:

@@ -31,9 +31,9 @@ def refuse_forces(sample: Sample, groups: Collection[str]) -> None:
     """PackingError if forces are asked for but missing, or if one is no finite number."""
     contacts = sample.contacts
     if contacts.force_n is not None and not np.isfinite(contacts.force_n).all():
-        one, two = sample.packing.id[contacts.pairs[np.argmin(np.isfinite(contacts.force_n))]]
+        first, second = sample.packing.id[contacts.pairs[np.argmin(np.isfinite(contacts.force_n))]]
         raise PackingError(
-            f"the contact of the grains {one} and {two} has a force that is no finite number"
+            f"the contact of the grains {first} and {second} has a force that is no finite number"
         )
     if contacts.force_n is None and len(contacts) and "forces" in groups:
         found = "are found by geometry" if contacts.source == "geometric" else "have none"
@@ -77,9 +77,9 @@ def doubts_of_state(sample: Sample, window: Window | None) -> dict[str, str]:
     """Notes, by code, on why there is no stress, or on forces that it leaves out."""
     contacts, packing = sample.contacts, sample.packing
     if len(contacts) and contacts.force is None:
-        known = "no forces" if contacts.force_n is None else "the normal part of forces only"
+        present = "no forces" if contacts.force_n is None else "the normal part of forces only"
         return {
-            "no_stress": f"the contacts have {known}: stress, and what follows from it, is empty"
+            "no_stress": f"the contacts have {present}: stress, and what follows from it, is empty"
         }
     if _volume(packing, window) is None:
         return {
@@ -124,14 +124,14 @@ def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
     volume = _volume(packing, window)
     if contacts.force is None or volume is None:
         return None
-    one, two = contacts.pairs.T
+    first, second = contacts.pairs.T
     places, branch = _places_and_branches(packing)
-    start, end = places[one], places[one] + branch
+    start, end = places[first], places[first] + branch
     # boundary is a wall: the branch of such a contact ends where the grain does
-    start = np.where(sample.boundary[one][:, None], contacts.point, start)
-    end = np.where(sample.boundary[two][:, None], contacts.point, end)
+    start = np.where(sample.boundary[first][:, None], contacts.point, start)
+    end = np.where(sample.boundary[second][:, None], contacts.point, end)
     branch = end - start
-    chosen = ~(sample.boundary[one] & sample.boundary[two]) & branch.any(axis=1)
+    chosen = ~(sample.boundary[first] & sample.boundary[second]) & branch.any(axis=1)
     start, branch, force = start[chosen], branch[chosen], contacts.force[chosen]
     walls = packing.wall_forces
     if walls is not None:
@@ -190,14 +190,14 @@ def cut_volumes(
     ball = math.sqrt(shape.quadric.level / curved) if curved > 0.0 else math.inf
     room = 1.0 - radius / min([ball, *shape.planes[:, 3]])
     scaled = places / np.where(room > 0.0, room, 1.0)[:, None]
-    found = ((room > 0.0) & shape.contains(scaled)).astype(np.float64)
-    cut = np.flatnonzero(found == 0.0)
+    share = ((room > 0.0) & shape.contains(scaled)).astype(np.float64)
+    cut = np.flatnonzero(share == 0.0)
     for first in range(0, len(cut), CHUNK):
         rows = cut[first : first + CHUNK]
         spread = places[rows, None] + radius[rows, None, None] * points
         inside = shape.contains(spread.reshape(-1, 3)).reshape(-1, len(points))
-        found[rows] = inside.mean(axis=1)
-    return space.volume(radius, found)
+        share[rows] = inside.mean(axis=1)
+    return space.volume(radius, share)
 
 
 def _rays(count: int, space: Space = SPACE) -> FloatArray:

@@ -148,7 +148,7 @@ def volumetric_strain(cell: Cell | None, first: Cell | None) -> float | None:
     """
     if cell is None or first is None or not (cell.is_endless and first.is_endless):
         return None
-    now, before = (np.linalg.det(one.own_vectors) for one in (cell, first))
+    now, before = (np.linalg.det(box.own_vectors) for box in (cell, first))
     # written so that an unchanged cell gives 0.0, not -0.0
     return float(np.log(abs(before / now)))
 

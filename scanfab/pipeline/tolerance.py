@@ -103,11 +103,11 @@ def missing_work(errors: Iterable[Errors], plan: Plan, replicates: int) -> float
     if plan.auto != "replicates" and replicates > 1:
         margin = 1.0 + SIGMAS / math.sqrt(2.0 * (replicates - 1))
     missing = expected = 0.0
-    for one in errors:
-        if math.isfinite(one.reported):
-            missing = max(missing, (one.reported / plan.tolerance) ** 2)
-            expected = max(expected, (margin * one.expected / plan.tolerance) ** 2)
-        elif one.empty < 1.0 and plan.auto == "replicates" and replicates < 256:
+    for error in errors:
+        if math.isfinite(error.reported):
+            missing = max(missing, (error.reported / plan.tolerance) ** 2)
+            expected = max(expected, (margin * error.expected / plan.tolerance) ** 2)
+        elif error.empty < 1.0 and plan.auto == "replicates" and replicates < 256:
             # a direction without any segment may still get one
             return GROWTH
     # The scatter of the replicates is what the table reports, but it is too noisy to decide alone:
@@ -199,7 +199,7 @@ class _AutoScan:
         self.spent += float(batch.work.sum()) + lines * batch.replicates
         each = float(self.sums.work.mean()) + lines
         self.left = (plan.max_chords - self.spent) / max(each, 1.0)
-        self.errors = {one: self.goal.errors(self.sums, plan, one) for one in plan.variants}
+        self.errors = {name: self.goal.errors(self.sums, plan, name) for name in plan.variants}
 
     def _first_round(self) -> Any:
         """
@@ -208,13 +208,13 @@ class _AutoScan:
         Only a scan can tell how far lines go through a periodic medium, so one replicate goes
         ahead, and ends when it has used its share.
         """
-        every, most = self.plan.replicates, self.plan.max_chords
+        replicates, most = self.plan.replicates, self.plan.max_chords
         if self.solids.medium is None:
-            return self.goal.scan(self.solids, self.plan, range(every))
+            return self.goal.scan(self.solids, self.plan, range(replicates))
         while True:
             try:
-                first = self.goal.scan(self.solids, self.plan, range(1), most / every)
-                rest = self.goal.scan(self.solids, self.plan, range(1, every), most)
+                first = self.goal.scan(self.solids, self.plan, range(1), most / replicates)
+                rest = self.goal.scan(self.solids, self.plan, range(1, replicates), most)
                 return concatenated([first, rest])
             except FollowedTooFarError:
                 wider = 2.0 * self.plan.spacing
@@ -295,12 +295,12 @@ class _AutoScan:
         for name, errors in self.errors.items():
             if name in counted or errors.reported <= self.plan.tolerance:
                 continue
-            said = "there is no void fabric yet"
+            text = "there is no void fabric yet"
             if math.isfinite(errors.reported):
                 reached, tolerance = spelt_apart(errors.reported, self.plan.tolerance)
-                said = f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}"
-            said += ": it keeps few grains, or would need far more lines than the others "
-            yield Note("variant_dropped", f'{said}(`variants="{name}"` scans it alone)', (name,))
+                text = f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}"
+            text += ": it keeps few grains, or would need far more lines than the others "
+            yield Note("variant_dropped", f'{text}(`variants="{name}"` scans it alone)', (name,))
 
 
 def _within_budget(plan: Plan, solids: Solids) -> Plan:

@@ -94,7 +94,7 @@ def as_written(value: Any) -> Any:
     if isinstance(value, Axis):
         return next((name for name, axis in AXES.items() if axis == value), tuple(value))
     if isinstance(value, tuple):
-        return [as_written(one) for one in value]
+        return [as_written(item) for item in value]
     # of a boundary rule its text, of a rule of directions its name
     return getattr(value, "text", getattr(value, "name", value))
 
@@ -109,12 +109,12 @@ def parse_length(name: str, text: str | float | Length) -> Length:
     >>> parse_length("cutoff", "0.5rmin")
     Length(value=0.5, unit='rmin')
     """
-    found = re.fullmatch(r"\s*(.+?)\s*(rmin|rmean|rmax)?\s*", str(as_written(text)))
+    match = re.fullmatch(r"\s*(.+?)\s*(rmin|rmean|rmax)?\s*", str(as_written(text)))
     expected = "a length such as 0.0005 or 1rmin (rmin, rmean, rmax), not negative"
     parse = number(expected, lambda value: 0 <= value < math.inf)
-    if found is None:
+    if match is None:
         raise unusable(name, expected, text)
-    return Length(parse(name, found[1]), found[2] or "")  # type: ignore[arg-type]
+    return Length(parse(name, match[1]), match[2] or "")  # type: ignore[arg-type]
 
 
 def parse_spacing(name: str, value: Any) -> Length | None:
@@ -187,10 +187,10 @@ def parse_fractions(name: str, value: Any) -> float | tuple[float, ...]:
         "a fraction above 0, or several such as 0.4,0.5,0.6",
         lambda sizes: len(sizes) > 0 and min(sizes) > 0,
     )
-    found = sorted(parse(name, [value] if isinstance(value, int | float) else value))
-    if len(set(found)) < len(found):
+    fractions = sorted(parse(name, [value] if isinstance(value, int | float) else value))
+    if len(set(fractions)) < len(fractions):
         raise unusable(name, "fractions that differ", value)
-    return found[0] if len(found) == 1 else tuple(found)
+    return fractions[0] if len(fractions) == 1 else tuple(fractions)
 
 
 def parse_sizes(name: str, value: Any) -> tuple[float, ...]:
@@ -198,7 +198,7 @@ def parse_sizes(name: str, value: Any) -> tuple[float, ...]:
     if value is None or value in ((), []):
         return ()
     expected = "two or three lengths above 0, such as 2,3,4"
-    return numbers(expected, lambda found: len(found) in (2, 3) and min(found) > 0)(name, value)
+    return numbers(expected, lambda sizes: len(sizes) in (2, 3) and min(sizes) > 0)(name, value)
 
 
 def parse_shape(name: str, value: Any) -> str:
@@ -223,8 +223,8 @@ def parse_variants(name: str, letters: object) -> str:
 
 def parse_groups(name: str, groups: Any) -> tuple[str, ...]:
     """Groups of columns, in a text between commas or blanks; each once, in the table's order."""
-    given = groups.replace(",", " ").split() if isinstance(groups, str) else groups
-    words = tuple(given) if isinstance(given, Iterable) else () if given is None else (given,)
+    groups = groups.replace(",", " ").split() if isinstance(groups, str) else groups
+    words = tuple(groups) if isinstance(groups, Iterable) else () if groups is None else (groups,)
     for word in words:
         if word not in GROUP_NAMES:
             raise unusable(name, f"groups of columns out of {', '.join(GROUP_NAMES)}", word)

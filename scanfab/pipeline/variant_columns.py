@@ -44,28 +44,28 @@ class VariantColumns:
         self.rv = self.plan.rvs_of(variant.name)[0].fraction
         """The size of the variant's RV, where there are several."""
         self.edge = edge_of(variant, self.plan, measurement.solids)
-        self.which = "abcd".index(variant.name)
-        kept = float(self.sums.segments[:, self.which].sum())
+        self.index = "abcd".index(variant.name)
+        kept = float(self.sums.segments[:, self.index].sum())
         self.left_out = left_out_of(self.sums, variant, self.edge, kept)
 
     def columns(self) -> dict[str, Any]:
         """The values of all columns but those that are the same in all rows of a frame."""
         plan, measured = self.plan, self.measured
-        found = sample_values(self.sample, self.variant, self.window, len(measured.normals))
-        found |= {
+        row = sample_values(self.sample, self.variant, self.window, len(measured.normals))
+        row |= {
             "solid_fraction": self.solid_fraction,
             "directions": len(plan.rule),
             "replicates": self.sums.replicates,
-            "lines": int(self.sums.lines[:, self.which].sum()),
+            "lines": int(self.sums.lines[:, self.index].sum()),
             "segments": measured.segment_count,
             # of all replicates together, as users choose it for a fixed scan
             "spacing": plan.spacing / plan.space.apart(self.sums.replicates),
             "cutoff": self.cutoff,
         }
         for fabric in OWN_FABRICS.values():
-            found |= fabric.values(measured)
+            row |= fabric.values(measured)
         for name, fabric in installed_fabrics().items():
-            found |= checked_values(name, fabric, measured)
+            row |= checked_values(name, fabric, measured)
         more: dict[str, Any] = {
             RV_COLUMN.name: self.rv,
             "edge": self.edge,
@@ -77,17 +77,17 @@ class VariantColumns:
             more[predicted.PREDICTED_ALPHA.name] = self.predicted_alpha
         for group in plan.groups:
             more |= GROUPS[group].values(measured)
-        return found | {name: more[name] for name in plan.more_columns if name in more}
+        return row | {name: more[name] for name in plan.more_columns if name in more}
 
     @cached_property
     def measured(self) -> Measured:
         """What the fabrics are computed from."""
-        sample, plan, found = self.sample, self.plan, self.measurement
+        sample, plan, measurement = self.sample, self.plan, self.measurement
         name, groups = self.variant.name, plan.groups
-        length, segments = found.kept(name, self.place)
-        count = self.sums.segments[:, self.which].sum()
-        if found.gaps is not None:
-            count = found.gaps.in_blocks(name, self.place)[1].sum()
+        length, segments = measurement.kept(name, self.place)
+        count = self.sums.segments[:, self.index].sum()
+        if measurement.gaps is not None:
+            count = measurement.gaps.in_blocks(name, self.place)[1].sum()
         chosen = sample.fabric_contacts(self.variant, self.window)
         # np.compress is several times as fast as to index with a mask
         points = np.compress(chosen, sample.contacts.point, axis=0)
@@ -105,14 +105,17 @@ class VariantColumns:
             segments=segments,
             meets_solids=bool(sample.solids(self.variant, self.window).any()),
             blocked=BlockedSums(
-                found.blocked.axes,
-                found.block_rule.weights,
-                found.blocked.kept(*words),
-                [found.blocked.kept(*words, without=one) for one in range(2**plan.space.dimension)],
+                measurement.blocked.axes,
+                measurement.block_rule.weights,
+                measurement.blocked.kept(*words),
+                [
+                    measurement.blocked.kept(*words, without=block)
+                    for block in range(2**plan.space.dimension)
+                ],
             ),
             normals=np.compress(chosen, sample.contacts.normal, axis=0),
             points=points,
-            blocks=found.blocks[self.variant.in_window].of(places),
+            blocks=measurement.blocks[self.variant.in_window].of(places),
             space=plan.space,
             segment_count=int(count),
             forces=contact_forces(sample, chosen) if "forces" in groups else None,
@@ -125,8 +128,8 @@ class VariantColumns:
         cell, weights = self.sample.packing.cell, self.plan.rule.weights
         if self.window is None and not (cell is not None and cell.is_endless):
             return None
-        length = float(weights @ self.sums.line_length[:, self.which].sum(axis=0))
-        void = float(weights @ self.sums.void[:, self.which].sum(axis=0))
+        length = float(weights @ self.sums.line_length[:, self.index].sum(axis=0))
+        void = float(weights @ self.sums.void[:, self.index].sum(axis=0))
         return None if length == 0 else 1.0 - void / length
 
     @property
@@ -171,8 +174,8 @@ class VariantColumns:
             rattlers = self.sample.number(self.sample.solids(with_rattlers, window))
             if not rattlers:
                 return {"no_solid": f"no grain reaches into the {window}"}
-            there = " that reach into the RV" if self.variant.in_window else ""
-            return {"no_solid": f"no grain is left, all {rattlers}{there} are rattlers"}
+            reaching = " that reach into the RV" if self.variant.in_window else ""
+            return {"no_solid": f"no grain is left, all {rattlers}{reaching} are rattlers"}
         if self.edge == ENDS and window is None and self.measurement.solids.inner is None:
             return {"no_inner_window": NO_INNER_WINDOW}
         if self.measured.segment_count == 0:
@@ -215,16 +218,16 @@ def left_out_of(sums: ScanSums, variant: Variant, edge: str | None, kept: float)
 
 def doubts_of_lines(sums: ScanSums, variant: Variant, left_out: float | None) -> dict[str, str]:
     """Notes, by code, on lines that meet no grain and on segments that leave the sample."""
-    found, which = {}, "abcd".index(variant.name)
-    channels, others = (int(one[:, which].sum()) for one in (sums.channels, sums.lines))
+    texts, index = {}, "abcd".index(variant.name)
+    channels, others = (int(counts[:, index].sum()) for counts in (sums.channels, sums.lines))
     if channels:
-        found["channels"] = (
+        texts["channels"] = (
             f"{channels} of {channels + others} lines stay in a channel and meet no grain"
         )
     if left_out is not None and left_out > MOST_LEFT_OUT:
-        found["left_out"] = (
+        texts["left_out"] = (
             f"{left_out:.1%} of the void segments of the RV leave the sample and are left "
             f"out: they are the long ones, so the mean length is too small: choose a smaller `rv`, "
             f"or `edge=ends`, which needs nothing from outside"
         )
-    return found
+    return texts

@@ -51,9 +51,9 @@ def _axis(axis: Axis, space: Space) -> Axis:
     if abs(axis[space.across]) > ROUNDING:
         first, second = ("xyz"[k] for k in sorted(space.along))
         named = as_written(axis)
-        asked = named if isinstance(named, str) else spelt_place(axis)
+        spelt = named if isinstance(named, str) else spelt_place(axis)
         raise DimensionError(
-            f"axis: the axis {asked} leads out of {space}, in which all discs "
+            f"axis: the axis {spelt} leads out of {space}, in which all discs "
             f"lie: choose {first}, {second}, or another axis in the plane"
         )
     if axis[space.across] == 0.0:

@@ -39,7 +39,7 @@ OWN_COLUMNS: tuple[Column, ...] = (
 )
 """The columns of every fabric table."""
 
-COLUMNS: tuple[str, ...] = tuple(one.name for one in OWN_COLUMNS)
+COLUMNS: tuple[str, ...] = tuple(column.name for column in OWN_COLUMNS)
 """Their names."""
 
 MORE_COLUMNS = (
@@ -62,7 +62,7 @@ MAP_COLUMNS = (
     *(Column(name, float, LENGTH, f"of a map: {name} of the block's middle") for name in "xyz"),
     FRAME_COLUMNS[-1],
     *SAMPLE_COLUMNS,
-    *(one for one in SCAN_COLUMNS if one.name != "lines"),
+    *(column for column in SCAN_COLUMNS if column.name != "lines"),
     *Void.columns,
     *Contact.columns,
     Column("coordination_se", float, "", f"of a map: {SCATTER}"),
@@ -78,7 +78,7 @@ AT_SURFACE = Column("at_surface", int, "", f"of a map: {LOSES}")
 @cache
 def installed_fabrics() -> dict[str, Fabric]:
     """The fabrics of other packages by name; usually there are none."""
-    return load_fabrics([*COLUMNS, *(one.name for one in MORE_COLUMNS)])
+    return load_fabrics([*COLUMNS, *(column.name for column in MORE_COLUMNS)])
 
 
 def table_columns(more: Collection[str] = ()) -> tuple[Column, ...]:
@@ -87,20 +87,20 @@ def table_columns(more: Collection[str] = ()) -> tuple[Column, ...]:
 
     ``more`` are names from ``MORE_COLUMNS``.
     """
-    asked = (column for column in MORE_COLUMNS if column.name in more)
+    chosen = (column for column in MORE_COLUMNS if column.name in more)
     others = (column for fabric in installed_fabrics().values() for column in fabric.columns)
-    return (*OWN_COLUMNS, *asked, *others)
+    return (*OWN_COLUMNS, *chosen, *others)
 
 
 def map_columns(more: Collection[str] = (), *, shells: bool = False) -> tuple[Column, ...]:
     """The columns of a map; ``more`` are names of the columns that its edge rule adds."""
-    asked = (one for one in EDGE_COLUMNS if one.name in more)
-    return (*MAP_COLUMNS, *(SHELL_COLUMNS if shells else ()), AT_SURFACE, *asked)
+    chosen = (column for column in EDGE_COLUMNS if column.name in more)
+    return (*MAP_COLUMNS, *(SHELL_COLUMNS if shells else ()), AT_SURFACE, *chosen)
 
 
 def row_of(columns: Iterable[Column], values: Mapping[str, Any]) -> Row:
     """A row with a value for each column, None where there is none."""
-    return Row(**{one.name: values.get(one.name) for one in columns})
+    return Row(**{column.name: values.get(column.name) for column in columns})
 
 
 def complete_row(values: Mapping[str, Any], more: Collection[str] = ()) -> Row:
@@ -118,7 +118,7 @@ def complete_row(values: Mapping[str, Any], more: Collection[str] = ()) -> Row:
     >>> complete_row({**dict.fromkeys(COLUMNS), "frame": 3}).frame
     3
     """
-    names = [one.name for one in table_columns(more)]
+    names = [column.name for column in table_columns(more)]
     if wrong := sorted({*names} ^ {*values}):
         raise TypeError(f"a row has a value for each column, None for none: {', '.join(wrong)}")
     return Row(**{name: values[name] for name in names})

@@ -42,7 +42,7 @@ TURNED = (
     "alpha_c and the angle between their axes instead; or compute with `axis` along the major axis"
 )
 
-KINDS = {one.name: one.kind for one in (*OWN_COLUMNS, *MORE_COLUMNS)}
+KINDS = {column.name: column.kind for column in (*OWN_COLUMNS, *MORE_COLUMNS)}
 KEPT = "as in the fabric table"
 RV = f"{KEPT}: only where that has several RVs"
 
@@ -147,9 +147,9 @@ class Comparison:
 
     def __repr__(self) -> str:
         lines = [
-            f"{one.source}, variant {variant_of(one)}: "
-            f"slope {with_error(one.slope, one.slope_se)}, {counted(one.frames, 'frame')}"
-            for one in self.summary
+            f"{row.source}, variant {variant_of(row)}: "
+            f"slope {with_error(row.slope, row.slope_se)}, {counted(row.frames, 'frame')}"
+            for row in self.summary
         ]
         return "\n".join([f"Comparison of {len(self.frames)} rows", *lines])
 
@@ -226,8 +226,8 @@ def _tell_of_strains(rows: Rows, column: str, strain_max: float | None) -> None:
         return
     if not math.isfinite(strain_max):
         raise SettingsError(f"strain_max: expected a number, found {strain_max}")
-    known = [row for row in rows if number_of(row, column) is not None]
-    strains = {(row["source"], row["frame"]): float(row[column]) for row in known}
+    strained = [row for row in rows if number_of(row, column) is not None]
+    strains = {(row["source"], row["frame"]): float(row[column]) for row in strained}
     if not strains:
         warn("`strain_max`: no frame has a strain, so none is fitted")
         return
@@ -337,13 +337,13 @@ def _differences(groups: Mapping[tuple[str, str], Rows]) -> Iterator[dict[str, A
         variants = sorted(variant for name, variant in groups if name == source)
         for first, second in combinations(variants, 2):
             others = {row["frame"]: row for row in groups[source, second]}
-            for one in groups[source, first]:
-                pair = one, others.get(one["frame"], {})
+            for row in groups[source, first]:
+                pair = row, others.get(row["frame"], {})
                 values = numbers_of(pair, "alpha_vs_axial")
                 errors = numbers_of(pair, "alpha_vs_axial_se")
                 if len(values) == 2:
                     yield {
-                        **{name: one[name] for name in ("source", "frame", "strain")},
+                        **{name: row[name] for name in ("source", "frame", "strain")},
                         "variants": f"{first}-{second}",
                         "difference": values[0] - values[1],
                         "difference_se": math.hypot(*errors) if len(errors) == 2 else None,

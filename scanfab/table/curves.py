@@ -55,8 +55,8 @@ class Curve:
         """
         if name == "alpha_c_axial" and self.contact_alone:
             return self.errors("alpha_c_axial_se")
-        found = np.array([total_error(row, name) for row in self.rows], np.float64)
-        return np.where(found < 0, np.nan, _drawable(found))
+        errors = np.array([total_error(row, name) for row in self.rows], np.float64)
+        return np.where(errors < 0, np.nan, _drawable(errors))
 
     @property
     def contact_alone(self) -> bool:
@@ -108,8 +108,8 @@ def strain_column(rows: Rows) -> str | None:
     >>> strain_column(rows)
     'shear_strain'
     """
-    found = [name for name in STRAINS if not _lacking(rows, name)]
-    return found[0] if found and numbers_of(rows, "alpha_vs_axial") else None
+    usable = [name for name in STRAINS if not _lacking(rows, name)]
+    return usable[0] if usable and numbers_of(rows, "alpha_vs_axial") else None
 
 
 def why_not_strain(rows: Rows) -> str | None:
@@ -132,22 +132,22 @@ def _lacking(rows: Rows, column: str) -> list[str]:
     for row in rows:
         if number_of(row, "alpha_vs_axial") is not None:
             sources.setdefault(row["source"], {})[row["frame"]] = number_of(row, column)
-    said = []
+    problems = []
     for source, strains in sources.items():
         without = [frame for frame, strain in strains.items() if strain is None]
         known = [strain for strain in strains.values() if strain is not None]
         if without:
-            said.append(f"{source} has none" + (f" in frame {without[0]}" if known else ""))
+            problems.append(f"{source} has none" + (f" in frame {without[0]}" if known else ""))
         elif len(known) > 1 and max(known) - min(known) < SAME:
-            said.append(f"{source} has the same in all frames ({known[0]:g})")
-    return said
+            problems.append(f"{source} has the same in all frames ({known[0]:g})")
+    return problems
 
 
 def frame_strain_column(row: Mapping[str, Any]) -> str | None:
     """The strain column of a single frame, preferably one that is not 0 there."""
-    known = [name for name in STRAINS if number_of(row, name) is not None]
-    moved = [name for name in known if abs(row[name]) >= SAME]
-    return next(iter([*moved, *known]), None)
+    present = [name for name in STRAINS if number_of(row, name) is not None]
+    moved = [name for name in present if abs(row[name]) >= SAME]
+    return next(iter([*moved, *present]), None)
 
 
 def spelt_strain(row: Mapping[str, Any], column: str | None, *, symbol: bool = False) -> str:
@@ -196,14 +196,14 @@ def is_turned(rows: Rows) -> bool:
     anisotropic decides; if none is, curves over the shear strain count as turned.
     """
     names = ("alpha_c", "alpha_c_axial", "alpha_c_axial_se", "alpha_vs")
-    known = [row for row in rows if None not in [number_of(row, name) for name in names]]
+    complete = [row for row in rows if None not in [number_of(row, name) for name in names]]
     certainty, along = 0.0, 1.0
-    for row in known:
+    for row in complete:
         intensity, error = row["alpha_c"], row["alpha_c_axial_se"]
         if intensity > 0 and error > 0:
             axial = abs(row["alpha_c_axial"]) / intensity
             certainty, along = max((certainty, along), (intensity / error, axial))
-    return along < ALONG if certainty > CERTAIN else strain_column(known) == "shear_strain"
+    return along < ALONG if certainty > CERTAIN else strain_column(complete) == "shear_strain"
 
 
 def short_names(sources: Iterable[str], longest: int = LONGEST_NAME) -> dict[str, str]:

@@ -25,7 +25,7 @@ Rows = Iterable[Mapping[str, Any]]
 Columns = Sequence[Column]
 
 # cells of these columns stay texts even if they look like numbers: a source may be called 2024
-TEXT_COLUMNS = {one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind is str}
+TEXT_COLUMNS = {column.name for column in (*OWN_COLUMNS, *MORE_COLUMNS) if column.kind is str}
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
@@ -105,7 +105,7 @@ class SeparatedText(OwnFormat):
         name = getattr(stream, "name", "")
         lines = (row.values() for row in rows)
         first = list(islice(lines, 1))
-        for line in chain([[one.name for one in columns]], first, lines):
+        for line in chain([[column.name for column in columns]], first, lines):
             with named_errors("standard output" if name == "<stdout>" else name):
                 writer.writerow(line)
                 stream.flush()
@@ -198,17 +198,17 @@ def data_frame(rows: Sequence[Mapping[str, Any]], columns: Columns) -> polars.Da
     import polars
 
     kinds = {int: polars.Int64, float: polars.Float64, str: polars.String}
-    found = []
-    for one in columns:
-        values = [row.get(one.name) for row in rows]
+    series_of_columns = []
+    for column in columns:
+        values = [row.get(column.name) for row in rows]
         try:
-            series = polars.Series(one.name, values, kinds.get(one.kind))
+            series = polars.Series(column.name, values, kinds.get(column.kind))
         except (TypeError, ValueError, OverflowError):
-            series = polars.Series(one.name, values, strict=False)
+            series = polars.Series(column.name, values, strict=False)
         if series.null_count() > values.count(None):
-            raise SettingsError(f"{one.name}: its values are of kinds that no column can hold")
-        found.append(series)
-    return polars.DataFrame(found)
+            raise SettingsError(f"{column.name}: its values are of kinds that no column can hold")
+        series_of_columns.append(series)
+    return polars.DataFrame(series_of_columns)
 
 
 # In the order in which they are listed. A file is recognised in the opposite order, as any text
@@ -232,12 +232,12 @@ def foreign_formats() -> tuple[TableFormat, ...]:
         **dict.fromkeys(("recognises", "read", "write"), Callable),
     )
     offers = load_plugins("scanfab.table_formats", "table format", make)
-    return tuple(one.plugin for one in offers.values())
+    return tuple(offer.plugin for offer in offers.values())
 
 
 def known_formats() -> dict[str, TableFormat]:
     """All formats by suffix; other packages cannot replace those of this one."""
-    return {one.suffix: one for one in (*OWN_FORMATS, *foreign_formats()[::-1], *OWN_FORMATS)}
+    return {form.suffix: form for form in (*OWN_FORMATS, *foreign_formats()[::-1], *OWN_FORMATS)}
 
 
 def format_of(path: Path) -> TableFormat:
@@ -251,13 +251,15 @@ def format_of(path: Path) -> TableFormat:
     """
     suffix = path.suffix.lower()
     # looking for the formats of other packages takes a while, so it is done only if needed
-    found = {one.suffix: one for one in OWN_FORMATS}.get(suffix) or known_formats().get(suffix)
-    if found is None:
+    table_format = {form.suffix: form for form in OWN_FORMATS}.get(suffix) or known_formats().get(
+        suffix
+    )
+    if table_format is None:
         raise SettingsError(
             f"{path}: results can be written as {', '.join(known_formats())}, "
             f"not as {path.suffix or 'a file without a suffix'}"
         )
-    return found
+    return table_format
 
 
 def read_rows(path: Path | str, *, whole: bool = False) -> list[dict[str, Any]]:
@@ -299,10 +301,10 @@ def read_rows(path: Path | str, *, whole: bool = False) -> list[dict[str, Any]]:
     suffix = Path(path).suffix.lower()
     if not data and suffix == ".jsonl":
         return []
-    others = () if suffix in [one.suffix for one in OWN_FORMATS] else foreign_formats()
-    found = next(one for one in (*others, *reversed(OWN_FORMATS)) if one.recognises(data))
-    rows = found.read(data, str(path))
-    if whole and found.is_text and not data.endswith(b"\n"):
+    others = () if suffix in [form.suffix for form in OWN_FORMATS] else foreign_formats()
+    table_format = next(form for form in (*others, *reversed(OWN_FORMATS)) if form.recognises(data))
+    rows = table_format.read(data, str(path))
+    if whole and table_format.is_text and not data.endswith(b"\n"):
         raise ReadError(
             f"{path}: its last line has no end, so it may be cut off: copy it again, or remove it "
             f"and run its command again"

@@ -27,13 +27,13 @@ def installed_figures() -> dict[str, Any]:
         return plugin
 
     offers = load_plugins("scanfab.figures", "figure", checked)
-    found = {name: one.plugin for name, one in offers.items()}
-    return dict(sorted(found.items(), key=lambda one: one[1].order))
+    figures = {name: offer.plugin for name, offer in offers.items()}
+    return dict(sorted(figures.items(), key=lambda item: item[1].order))
 
 
 def figures_of(kind: str) -> dict[str, Any]:
     """The figures of a kind of data: ``table``, ``frames``, ``calibration`` or ``map``."""
-    return {name: one for name, one in installed_figures().items() if one.kind == kind}
+    return {name: figure for name, figure in installed_figures().items() if figure.kind == kind}
 
 
 class Plots:
@@ -70,7 +70,7 @@ class Plots:
 
         # a notebook shows the help and the options of the figure
         axes = Parameter("ax", Parameter.POSITIONAL_OR_KEYWORD, default=None)
-        named = [one.replace(kind=Parameter.KEYWORD_ONLY) for one in options]
+        named = [option.replace(kind=Parameter.KEYWORD_ONLY) for option in options]
         plot.__name__, plot.__doc__ = name, figure.__doc__
         plot.__signature__ = Signature([axes, *named])  # type: ignore[attr-defined]
         return plot

@@ -52,7 +52,7 @@ class Record(Mapping[str, Any]):
         return getattr(self, name)
 
     def __iter__(self) -> Iterator[str]:
-        return (one.name for one in fields(self))  # type: ignore[arg-type]
+        return (field.name for field in fields(self))  # type: ignore[arg-type]
 
     def __len__(self) -> int:
         return len(fields(self))  # type: ignore[arg-type]
@@ -206,7 +206,7 @@ def as_text(rows: Rows, names: Sequence[str]) -> str:
 def as_html(rows: Rows, names: Sequence[str]) -> str:
     """The same for a notebook."""
     heads, *lines = [[html.escape(cell) for cell in line] for line in _lines(rows, names)]
-    head = "".join(f"<th>{one}</th>" for one in heads)
+    head = "".join(f"<th>{title}</th>" for title in heads)
     body = "".join(f"<tr><td>{'</td><td>'.join(line)}</td></tr>" for line in lines)
     return (
         f"<table><caption>Table of {counted(len(rows), 'row')}</caption>"

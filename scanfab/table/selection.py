@@ -18,7 +18,9 @@ Rows = list[dict[str, Any]]
 
 NEEDED = ("source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_c_axial")
 NAMES = ("source", "variant")
-NUMBERS = tuple(one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind in (int, float))
+NUMBERS = tuple(
+    column.name for column in (*OWN_COLUMNS, *MORE_COLUMNS) if column.kind in (int, float)
+)
 # columns that only other tables have, and how to call these tables
 OTHER_TABLES = {
     "alpha_vs_axial_norm": "a table of scanfab compare",
@@ -116,12 +118,12 @@ def check_rows(rows: Sequence[Mapping[str, Any]], table: str = "") -> None:
 
 def _of_cutoff(name: str, rows: Rows, cutoff: float) -> Rows:
     """The rows of one cut-off; frames without grains have no cut-off and keep a row a variant."""
-    known = sorted({row["cutoff"] for row in rows if row.get("cutoff") is not None})
-    nearest = min(known, key=lambda one: abs(one - cutoff), default=math.nan)
+    cutoffs = sorted({row["cutoff"] for row in rows if row.get("cutoff") is not None})
+    nearest = min(cutoffs, key=lambda value: abs(value - cutoff), default=math.nan)
     if not abs(nearest - cutoff) <= ROUNDING * abs(nearest):
-        there = ", ".join(f"{one:.3g}" for one in known) or "none in this table"
+        listed = ", ".join(f"{value:.3g}" for value in cutoffs) or "none in this table"
         raise SettingsError(
-            f"{name}: no row has the cut-off {cutoff:g}: expected one of the table's: {there}"
+            f"{name}: no row has the cut-off {cutoff:g}: expected one of the table's: {listed}"
         )
     kept: dict[tuple[Any, ...], dict[str, Any]] = {}
     for place, row in enumerate(rows):
@@ -134,7 +136,7 @@ def _of_cutoff(name: str, rows: Rows, cutoff: float) -> Rows:
 
 def _each_once(tables: Sequence[tuple[str, Rows]]) -> list[Rows]:
     """Leaves out rows that an earlier table holds, however the path of their source is spelt."""
-    known: dict[tuple[Any, ...], tuple[str, dict[str, Any]]] = {}
+    seen: dict[tuple[Any, ...], tuple[str, dict[str, Any]]] = {}
     chosen: list[Rows] = []
     for name, rows in tables:
         chosen.append([])
@@ -142,7 +144,7 @@ def _each_once(tables: Sequence[tuple[str, Rows]]) -> list[Rows]:
             source = row["source"]
             place = os.path.abspath(source) if source not in ("", "-") else source
             key = (place, row["frame"], variant_of(row), row.get("cutoff"))
-            earlier, twin = known.setdefault(key, (name, row))
+            earlier, twin = seen.setdefault(key, (name, row))
             if twin is row or {**twin, "source": source} != row:
                 chosen[-1].append(row)
             else:

@@ -90,11 +90,11 @@ class Table(Sequence[Row]):
         self, rows: Iterable[Mapping[str, Any]] = (), columns: Sequence[Column] | None = None
     ) -> None:
         given = list(rows)
-        found = [{name: plain(value) for name, value in row.items()} for row in given]
+        values = [{name: plain(value) for name, value in row.items()} for row in given]
         if columns is None and given and is_dataclass(given[0]):
             columns = columns_of_fields(type(given[0]))
-        self.columns = _columns(found) if columns is None else tuple(columns)
-        self._frame = data_frame(found, self.columns)
+        self.columns = _columns(values) if columns is None else tuple(columns)
+        self._frame = data_frame(values, self.columns)
 
     def __len__(self) -> int:
         return self._frame.height
@@ -191,10 +191,10 @@ class Table(Sequence[Row]):
         >>> Table([row]).tensor("gc")[0, 2, 1]
         np.float64(0.1)
         """
-        found = np.empty((len(self), 3, 3))
+        tensors = np.empty((len(self), 3, 3))
         for component, (i, j) in COMPONENTS.items():
-            found[:, i, j] = found[:, j, i] = self[f"{name}_{component}"]
-        return found
+            tensors[:, i, j] = tensors[:, j, i] = self[f"{name}_{component}"]
+        return tensors
 
     def compare(self, *, strain_max: float | None = None) -> Comparison:
         """

@@ -83,8 +83,8 @@ class Excerpt:
 
     def asked(self) -> dict[str, Any]:
         """The options that differ from their defaults, for the manifest."""
-        asked: dict[str, Any] = {"fields": list(self.fields)} if self.fields else {}
-        return asked if self.digits == DEFAULT_DIGITS else {**asked, "digits": self.digits}
+        options: dict[str, Any] = {"fields": list(self.fields)} if self.fields else {}
+        return options if self.digits == DEFAULT_DIGITS else {**options, "digits": self.digits}
 
 
 def plain(value: Any) -> Any:
@@ -92,7 +92,7 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     if isinstance(value, list | tuple):
-        return [plain(one) for one in value]
+        return [plain(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -112,14 +112,14 @@ def write_to(
     A format whose cells hold one value leaves out the columns of lists; SettingsError if all that
     is asked for are lists.
     """
-    asked = excerpt.columns(columns)
+    chosen = excerpt.columns(columns)
     if not getattr(table_format, "holds_lists", False):
-        kept = [one for one in asked if one.kind is not list]
-        if asked and not kept:
-            lists = ", ".join(one.name for one in asked)
+        kept = [column for column in chosen if column.kind is not list]
+        if chosen and not kept:
+            lists = ", ".join(column.name for column in chosen)
             raise SettingsError(f"fields: {lists} are lists of numbers: write .json or .jsonl")
-        asked, excerpt = kept, replace(excerpt, fields=tuple(one.name for one in kept))
-    table_format.write(stream, map(excerpt.of, rows), asked)
+        chosen, excerpt = kept, replace(excerpt, fields=tuple(column.name for column in kept))
+    table_format.write(stream, map(excerpt.of, rows), chosen)
 
 
 def check_output(path: Path) -> None:

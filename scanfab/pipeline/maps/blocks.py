@@ -96,14 +96,14 @@ class MapBlocks(NamedTuple):
 
     def _parted(self, corner: FloatArray, edges: FloatArray, repeats: BoolArray) -> Blocks:
         """What is tiled, in as many blocks as are asked for."""
-        settings, one = self.settings, Blocks(corner, edges, (1, 1, 1), repeats)
+        settings, undivided = self.settings, Blocks(corner, edges, (1, 1, 1), repeats)
         if settings.shells is not None:
-            radius = 0.5 * float(one.heights.min())
-            return replace(one, radius=radius, shells=settings.shells)
+            radius = 0.5 * float(undivided.heights.min())
+            return replace(undivided, radius=radius, shells=settings.shells)
         if settings.grid is not None:
-            return replace(one, parts=settings.grid)
+            return replace(undivided, parts=settings.grid)
         # slices lie between the faces that are most nearly normal to the axis
-        cosines = np.abs(one.matrix @ np.asarray(settings.axis)) * one.heights
+        cosines = np.abs(undivided.matrix @ np.asarray(settings.axis)) * undivided.heights
         across = int(np.argmax(cosines))
         if cosines[across] < MOST_OBLIQUE:
             angle = np.degrees(np.arccos(cosines[across]))
@@ -111,7 +111,9 @@ class MapBlocks(NamedTuple):
                 f"slices: in a periodic cell they lie between its faces, the nearest of which is "
                 f"{angle:.0f} degrees off the axis: choose another `axis`, or `grid`"
             )
-        return replace(one, parts=tuple(settings.blocks if k == across else 1 for k in range(3)))
+        return replace(
+            undivided, parts=tuple(settings.blocks if k == across else 1 for k in range(3))
+        )
 
     def doubts(self, sample: Sample, window: Window | None, mean: float) -> Iterator[Note]:
         """
@@ -122,12 +124,14 @@ class MapBlocks(NamedTuple):
         SettingsError
             If they are smaller than a grain.
         """
-        every = [self.of_window(window)] if window is not None else []
+        tilings = [self.of_window(window)] if window is not None else []
         if {*"ab"} & {*self.settings.variants}:
-            every.append(self.of_whole(sample.packing.cell))
-        thinnest = float(min(one.heights.min() for one in every))
-        name = next(one for one in BLOCK_OPTIONS if getattr(self.settings, one))
-        found = f"makes blocks {thinnest:.4g} thick, {thinnest / mean:.3g} mean radii of the grains"
+            tilings.append(self.of_whole(sample.packing.cell))
+        thinnest = float(min(tiling.heights.min() for tiling in tilings))
+        name = next(option for option in BLOCK_OPTIONS if getattr(self.settings, option))
+        thickness = (
+            f"makes blocks {thinnest:.4g} thick, {thinnest / mean:.3g} mean radii of the grains"
+        )
         choose = (
             f"choose fewer, so that they are at least {DOUBTED_BELOW:g} mean radii thick "
             f"({DOUBTED_BELOW * mean:.4g})"
@@ -135,11 +139,11 @@ class MapBlocks(NamedTuple):
         times = thinnest / mean / (1.0 - 1e-9)
         if times < REFUSED_BELOW:
             raise SettingsError(
-                f"{name}: {found}: less than a grain says nothing of a fabric: {choose}"
+                f"{name}: {thickness}: less than a grain says nothing of a fabric: {choose}"
             )
         if times < DOUBTED_BELOW:
             unsure = "grains lie in several blocks, and errors from parts of a block are uncertain"
-            yield Note("thin_blocks", f"`{name}` {found}: {unsure}: {choose}")
+            yield Note("thin_blocks", f"`{name}` {thickness}: {unsure}: {choose}")
 
 
 def _axes(
@@ -165,10 +169,10 @@ def near_surface(
     if blocks.radius:
         units = direction_points()[0][::SOME]
         outline = blocks.middles[:, None] + blocks.bounds[1:, None, None] * units
-    found = np.zeros(len(blocks), bool)
+    near = np.zeros(len(blocks), bool)
     for normal, distance in zip(normals, furthest, strict=True):
-        found |= np.any(outline @ normal - distance > -DEPTH * mean, axis=1)
-    return found
+        near |= np.any(outline @ normal - distance > -DEPTH * mean, axis=1)
+    return near
 
 
 def surface_of(window: Window) -> tuple[FloatArray, FloatArray]:
@@ -222,8 +226,8 @@ def _grid_inside(blocks: Blocks, window: Convex) -> FloatArray:
     for block in cut:
         best = np.inf
         for turn in range(3):
-            one, two, along = np.roll(edges, turn, axis=0)
-            across = (steps[:, None, None] * one + steps[:, None] * two).reshape(-1, 3)
+            first, second, along = np.roll(edges, turn, axis=0)
+            across = (steps[:, None, None] * first + steps[:, None] * second).reshape(-1, 3)
             lines = window.share(corners[block, 0] + across, np.broadcast_to(along, across.shape))
             lines = lines.reshape(side, side)
             # lines along a cylinder's axis are inside or outside, and tell its volume less well

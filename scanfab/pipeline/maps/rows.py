@@ -82,12 +82,12 @@ def map_rows(
     rows = []
     for name in plan.variants:
         variant = VARIANTS[name]
-        one = BlocksOfVariant(
+        mapped = BlocksOfVariant(
             sample, plan, solids, variant, blocks[variant.in_window], sums, parts[name]
         )
-        values = ({**known, "variant": name, **own} for own in one.rows())
+        values = ({**known, "variant": name, **own} for own in mapped.rows())
         rows += [row_of(settings.columns, own) for own in values]
-        notes += one.notes()
+        notes += mapped.notes()
     return rows, joined(notes), blocks
 
 
@@ -112,8 +112,8 @@ class MedianBlock(Goal):
         """As planned; replicate by replicate, as the sums of all their axes would be too many."""
         weights, moment, parts = plan.rule.weights, plan.moment, []
         scan = partial(gap_scan(solids, plan, self.blocks, [plan.cutoff]), plan.rule)
-        for one in replicates:
-            sums = scan(spacing=plan.spacing, replicates=[one], most_steps=most_steps)
+        for replicate in replicates:
+            sums = scan(spacing=plan.spacing, replicates=[replicate], most_steps=most_steps)
             most_steps -= float(sums.scan.steps.sum())
             fabrics = {
                 name: block_fabrics(sums.axes, weights, *sums.in_blocks(name, 0, moment))
@@ -125,13 +125,13 @@ class MedianBlock(Goal):
 
     def errors(self, sums: MapSums, plan: Plan, variant: str) -> Errors:
         """The median of the blocks that hold any segment: of many, it is sure enough to plan by."""
-        found = sums.fabrics[variant]
-        is_met = found.is_met
+        fabrics = sums.fabrics[variant]
+        is_met = fabrics.is_met
         if not is_met.any():
             return Errors(math.inf, math.inf, 1.0)
-        errors = np.where(found.exists, found.axial_errors(np.asarray(plan.axis)), np.inf)
+        errors = np.where(fabrics.exists, fabrics.axial_errors(np.asarray(plan.axis)), np.inf)
         median = float(np.median(errors[is_met]))
-        return Errors(median, median, float(np.median(found.filled.mean(axis=0)[is_met])))
+        return Errors(median, median, float(np.median(fabrics.filled.mean(axis=0)[is_met])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,15 +155,15 @@ def _part_sums(
     spacing = coarse_spacing(solids, PART_REPLICATES * len(rule), before, plan, most)
     finer = blocks[0].finer(), blocks[1].finer()
     scan, clipped = (
-        gap_scan(one, plan, finer, [0.0, plan.cutoff])
-        for one in (solids, replace(solids, edge=CLIP))
+        gap_scan(version, plan, finer, [0.0, plan.cutoff])
+        for version in (solids, replace(solids, edge=CLIP))
     )
     for replicate in range(PART_REPLICATES):
         sums = voids = scan(rule, spacing=spacing, replicates=[replicate])
         if solids.edge == START:
             # by this rule segments count with what is outside the window, too
             voids = clipped(rule, spacing=spacing, replicates=[replicate])
-        found = {}
+        sums_of_variants = {}
         for name in plan.variants:
             by_part = blocks[name in "cd"].by_part
             length, number = map(by_part, sums.in_blocks(name, 1, plan.moment))
@@ -173,8 +173,8 @@ def _part_sums(
             void = np.einsum("d,rdbp->rbp", rule.weights, by_part(voids.in_blocks(name)[0]))
             void *= spacing**2 / rule.weights.sum()
             without = block_fabrics(sums.axes, rule.weights, rest, left)
-            found[name] = PartSums(without, number.sum(axis=1), void)
-        parts.append(found)
+            sums_of_variants[name] = PartSums(without, number.sum(axis=1), void)
+        parts.append(sums_of_variants)
     whole: dict[str, PartSums] = concatenated(parts)
     return whole
 
@@ -240,7 +240,7 @@ class BlocksOfVariant:
             arrays |= {"r_inner": blocks.bounds[:-1], "r_outer": blocks.bounds[1:]}
         # rows have None in the place of NaN
         listed = {
-            name: [None if one != one else one for one in values.tolist()]
+            name: [None if value != value else value for value in values.tolist()]
             for name, values in arrays.items()
         }
         number = blocks.of(points)
@@ -273,8 +273,8 @@ class BlocksOfVariant:
         """Sums of values by the block and part that their places lie in, shape (B, 8) each."""
         number, count = self.blocks.finer().of(points), 8 * len(self.blocks)
         inside = number >= 0
-        found = (np.bincount(number[inside], one[inside], count) for one in values)
-        return [self.blocks.by_part(one.astype(np.float64)) for one in found]
+        sums = (np.bincount(number[inside], array[inside], count) for array in values)
+        return [self.blocks.by_part(array.astype(np.float64)) for array in sums]
 
     @cached_property
     def grains(self) -> dict[str, Any]:
@@ -301,21 +301,21 @@ class BlocksOfVariant:
         """Columns of the void fabric and its errors; NaN where there is none."""
         fabrics, rest, axis = self.fabrics, self.parts.rest, np.asarray(self.plan.axis)
         held = self.parts.segments.sum(axis=0) > 0
-        found = {
+        columns = {
             "mean_length": ratio(fabrics.length.sum(axis=0), fabrics.number.sum(axis=0)),
             "alpha_vs_axial": axial(fabrics.tensors.mean(axis=0), axis),
             "alpha_vs_axial_se": fabrics.axial_errors(axis),
             "alpha_vs_axial_sample_se": part_errors(axial(rest.tensors, axis), held),
             "mean_length_se": part_errors(ratio(rest.length, rest.number), held),
         }
-        return {name: np.where(fabrics.exists, values, np.nan) for name, values in found.items()}
+        return {name: np.where(fabrics.exists, values, np.nan) for name, values in columns.items()}
 
     def _solid_fraction(self) -> dict[str, FloatArray]:
         """1 - void with its middle in the block / volume of the block in the window."""
         void = self.parts.void
         volumes = volumes_inside(self.blocks, self.window)
-        every = volumes.sum(axis=1)
-        known = every > 0
+        volume = volumes.sum(axis=1)
+        known = volume > 0
         if self.window is None:
             # beyond an open sample nobody knows what is void
             known &= ~self.at_surface
@@ -327,13 +327,13 @@ class BlocksOfVariant:
             chord = 4.0 * float(np.sum(radius**3) / (3.0 * np.sum(radius**2)))
             free = chord * max(float(volumes.sum()) - solid, 0.0)
             known &= free <= solid * self.blocks.heights.min()
-        left, total = every[:, None] - volumes, void.sum(axis=2)
+        left, total = volume[:, None] - volumes, void.sum(axis=2)
         without = 1.0 - ratio(total[..., None] - void, left)
-        found = {
-            "solid_fraction": 1.0 - ratio(total.mean(axis=0), every),
+        columns = {
+            "solid_fraction": 1.0 - ratio(total.mean(axis=0), volume),
             "solid_fraction_se": part_errors(without, (volumes > 0) & (left > 0)),
         }
-        return {name: np.where(known, values, np.nan) for name, values in found.items()}
+        return {name: np.where(known, values, np.nan) for name, values in columns.items()}
 
     def notes(self) -> Iterator[Note]:
         """Lines and blocks that are doubtful, and whether the sample is homogeneous."""
@@ -341,7 +341,7 @@ class BlocksOfVariant:
         kept = float(fabrics.segments.sum())
         left_out = left_out_of(self.scan, variant, edge_of(variant, self.plan, self.solids), kept)
         texts = doubts_of_lines(self.scan, variant, left_out)
-        lacking, empty = (int((~one).sum()) for one in (fabrics.exists, fabrics.is_met))
+        lacking, empty = (int((~mask).sum()) for mask in (fabrics.exists, fabrics.is_met))
         if lacking:
             texts["few_segments"] = (
                 f"{lacking} of {counted(len(self.blocks), 'block')} have no void fabric: {empty} "

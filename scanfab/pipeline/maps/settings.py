@@ -23,7 +23,7 @@ def parse_grid(name: str, value: Any) -> tuple[int, int, int]:
     """Three whole numbers of at least 1, in a text between commas or blanks."""
     parse = numbers(
         "three numbers of blocks, such as 4,4,8",
-        lambda grid: len(grid) == 3 and all(one >= 1 and one.is_integer() for one in grid),
+        lambda grid: len(grid) == 3 and all(count >= 1 and count.is_integer() for count in grid),
     )
     first, second, third = map(int, parse(name, value))
     return first, second, third
