@@ -293,7 +293,7 @@ def read_rows(path: Path | str, *, whole: bool = False) -> list[dict[str, Any]]:
     >>> rows[0]["contacts"]
     2076
     """
-    check_file(Path(path), "a table", "as - in place of its name")
+    check_file(Path(path), "a table", "give - in place of its name")
     try:
         data = sys.stdin.buffer.read() if str(path) == "-" else Path(path).read_bytes()
     except OSError as error:
