@@ -78,8 +78,8 @@ def computed():
 
 
 BROKEN = [
-    (Foreign(name="alpha_vs"), "there is a column 'alpha_vs' already"),
-    (Foreign(name="strain"), "there is a column 'strain' already"),
+    (Foreign(name="alpha_vs"), "there is already a column 'alpha_vs'"),
+    (Foreign(name="strain"), "there is already a column 'strain'"),
     (3, "found 3, whose columns is None"),
     (Foreign, "found the class Foreign itself"),
     (Foreign(kind=list), "columns that hold int, float or str"),
