@@ -1,4 +1,4 @@
-"""What a reader sees in each frame of a series, with nothing computed from it."""
+"""Inspect a series: what a reader finds in each frame, without computing a fabric."""
 
 from __future__ import annotations
 
@@ -27,47 +27,47 @@ class FrameReport(Record):
     """One frame as the reader sees it; lengths in the dump's unit."""
 
     source: Annotated[str, "the series as given"]
-    frame: Annotated[int, "index in the series, from 0"]
-    step: Annotated[int | None, "of the dump"]
-    time: Annotated[float | None, "of the dump", "time"]
-    format: Annotated[str, "the reader"]
-    grains: Annotated[int, "without boundary particles; a clump is one grain"]
+    frame: Annotated[int, "index of the frame in the series, from 0"]
+    step: Annotated[int | None, "time step of the dump"]
+    time: Annotated[float | None, "simulation time of the dump", "time"]
+    format: Annotated[str, "name of the reader"]
+    grains: Annotated[int, "number of grains, without boundary particles; a clump is one grain"]
     boundary: Annotated[int, "number of boundary particles"]
     radius_min: Annotated[float | None, "smallest radius of a grain", LENGTH]
     radius_max: Annotated[float | None, "largest radius of a grain", LENGTH]
-    contacts: Annotated[int, "listed or found by geometry, those with boundary particles too"]
-    contacts_from: Annotated[str, "file or geometric"]
-    rattlers: Annotated[int, "grains with too few contacts; of clumps, with too few neighbours"]
-    coordination: Annotated[float | None, "mean number of contacts, of clumps of neighbours"]
-    cell: Annotated[list[list[float]] | None, "the lattice vectors, by rows", LENGTH]
-    periodic: Annotated[list[bool] | None, "whether the sample repeats along each of them"]
-    columns: Annotated[list[str], "of the particles; those that are not standard by their names"]
-    warnings: Annotated[list[str], "what is doubtful"]
-    low: Annotated[list[float] | None, "corner of the box of the gathered grains' surfaces", LENGTH]
-    high: Annotated[list[float] | None, "the opposite corner", LENGTH]
+    contacts: Annotated[int, "number of contacts, including those with boundary particles"]
+    contacts_from: Annotated[str, "file: listed in the dump; geometric: found by geometry"]
+    rattlers: Annotated[int, "number of grains with too few contacts (clumps: neighbours)"]
+    coordination: Annotated[float | None, "mean number of contacts (clumps: neighbours) per grain"]
+    cell: Annotated[list[list[float]] | None, "lattice vectors as rows", LENGTH]
+    periodic: Annotated[list[bool] | None, "whether the sample repeats along each lattice vector"]
+    columns: Annotated[list[str], "names of the particle columns, standard columns first"]
+    warnings: Annotated[list[str], "doubts about the frame"]
+    low: Annotated[list[float] | None, "lower corner of the box around the grains", LENGTH]
+    high: Annotated[list[float] | None, "upper corner of the box around the grains", LENGTH]
     rv_center: Annotated[list[float] | None, "centre of the RV of the series", LENGTH]
     rv_radius: Annotated[float | None, "radius of the ball that holds the RV", LENGTH]
-    rv_shape: Annotated[str | None, "its shape and size in words"]
-    clumps: Annotated[int, "grains that are bodies of several spheres"]
-    spheres: Annotated[int, "that the grains are made of"]
+    rv_shape: Annotated[str | None, "shape and size of the RV in words"]
+    clumps: Annotated[int, "number of grains that are bodies of several spheres"]
+    spheres: Annotated[int, "number of spheres that the grains consist of"]
 
 
 def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
     """
-    Read the chosen frames and tell what is in them.
+    Read the chosen frames and report what is in them.
 
     Parameters
     ----------
     series : Series
         The frames.
     settings : Settings
-        ``boundary``, ``frames``, ``min_contacts``, ``rattlers``, ``min_force``,
-        ``contact_tolerance`` and the RV count.
+        Only ``boundary``, ``frames``, ``min_contacts``, ``rattlers``, ``min_force``,
+        ``contact_tolerance`` and the options of the RV are used.
 
     Raises
     ------
     ScanfabError
-        If a frame cannot be read, or no frame has any of the boundary's particles.
+        If a frame cannot be read, or no frame has boundary particles although they are named.
     """
     frames, any_chosen = Frames(series, settings), False
     window: Window | None = None
@@ -87,7 +87,7 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
 
 
 def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
-    """A frame, and what is doubtful about it, also what makes it impossible to measure."""
+    """Read a frame and collect doubts, including errors that would prevent a measurement."""
     doubts = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -113,7 +113,7 @@ def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
 
 
 def _rv(frames: Frames, sample: Sample) -> Window | None:
-    """The RV, the largest of several, and a word on the boundary, from the first frame with any."""
+    """The largest RV from a frame with grains, else None; also warns about the boundary."""
     if not sample.grains.any():
         return None
     tell(frames.check_boundary(sample))
