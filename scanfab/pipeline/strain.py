@@ -49,7 +49,7 @@ def axial_length(sample: Sample, mode: str, axis: Vector) -> float | None:
         return float(np.ptp(centers_of(sample, mode) @ np.array(axis))) if mode else None
     along = _coordinate_of(axis)
     if along is None:
-        raise SettingsError("strain: cell needs a loading axis along x, y or z: choose another")
+        raise SettingsError("strain: cell was asked for, but the axis is not x, y or z")
     return float(cell_of(sample).vectors[along, along])
 
 

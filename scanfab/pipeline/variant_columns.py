@@ -175,7 +175,7 @@ class VariantColumns:
             if not rattlers:
                 return {"no_solid": f"no grain reaches into the {window}"}
             reaching = " that reach into the RV" if self.variant.in_window else ""
-            return {"no_solid": f"no grain is left: all {rattlers}{reaching} are rattlers"}
+            return {"no_solid": f"no grain is left, all {rattlers}{reaching} are rattlers"}
         if self.edge == ENDS and window is None and self.measurement.solids.inner is None:
             return {"no_inner_window": NO_INNER_WINDOW}
         if self.measured.segment_count == 0:

@@ -97,7 +97,7 @@ def folder(tmp_path, monkeypatch):
         ("map cube --slices 2 --variants c --rv 1e-3", 1, "holds no grain"),
         ("calibrate {TRIAXIAL} --frame 7 --boundary mask=3", 1, "the series has no frame in 7:8"),
         ("calibrate {TRIAXIAL} --rv 3 --boundary mask=3", 1, "beyond the sample"),
-        ("calibrate {TRIAXIAL} --rv 0.5,0.6", 1, "nor several rv"),
+        ("calibrate {TRIAXIAL} --rv 0.5,0.6", 1, "all but one --rv"),
         ("calibrate {TRIAXIAL} --boundary mask=5", 1, "no particle of any frame has mask=5"),
         ("view cube --screenshot x.png --frame 9", 1, "there is no frame 9"),
         ("view cube --screenshot x.png --frame -5", 1, "there is no frame -5"),
@@ -105,7 +105,7 @@ def folder(tmp_path, monkeypatch):
         ("compute {DISCS} --axis 0,1,1", 2, "--axis: the axis (0, 0.7071, 0.7071) leads out of"),
         ("compute {DISCS} --directions lebedev:11", 2, "lebedev:11 is a rule for three dimensions"),
         ("compute {DISCS} --rv-center 7 7 3", 1, "--rv-center: lies outside the plane x-y"),
-        ("map {DISCS} --grid 2,2,1", 1, "spheres in space, but all grains are discs"),
+        ("map {DISCS} --grid 2,2,1", 1, "needs spheres, but all grains are discs"),
     ],
 )
 def test_one_message_and_nothing_else(folder, ask, line, code, message):

@@ -111,7 +111,7 @@ def test_strain_and_directions_of_a_series():
 
 def test_an_open_whole_has_no_volume_and_says_so():
     series = scanfab.read_series(TRIAXIAL)[:1]
-    with pytest.warns(scanfab.ScanfabWarning, match="they need a volume"):
+    with pytest.warns(scanfab.ScanfabWarning, match="they need the volume of an RV"):
         a, c = scanfab.compute(series, with_="state", variants="ac", boundary="mask=3", **FAST)
     assert a.void_ratio is None
     assert a.stress_zz is None

@@ -210,9 +210,9 @@ def test_frames_without_grains_have_empty_rows():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({}, "just one of `grid`, `slices` and `shells`, found none"),
+        ({}, "exactly one of `grid`, `slices` and `shells`, found none"),
         ({"shells": 2.5}, "shells: expected 1 or more"),
-        ({"slices": 2, "cutoffs": "0,1"}, "cutoffs: a map is of one cut-off"),
+        ({"slices": 2, "cutoffs": "0,1"}, "cutoffs: a map has one cut-off"),
         ({"slices": 2, "rv": "0.4,0.6"}, "rv: expected one size, .* found 2"),
         ({"slices": 2, "with_": "state"}, "with_: a map has no further columns, found state"),
     ],
