@@ -49,7 +49,7 @@ class Output:
     follow: bool = running(default=False, group="reading")
     """
     Wait for the frames of a running simulation, and compute each frame when its files are complete.
-    Ctrl-C or SIGTERM ends the run after the current frame; a second signal interrupts it.
+    Ctrl-C or SIGTERM finishes the frames under way and ends the run; a second signal interrupts it.
     """
     follow_for: float | None = running(group="reading", metavar="SECONDS")
     """Same as `follow`, but stop after this many seconds without a new frame."""
