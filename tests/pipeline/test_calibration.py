@@ -137,7 +137,7 @@ def test_the_sentences_say_what_the_rows_show(found):
     best = max(alpha, key=lambda value: abs(alpha[value]))
     said.insert(
         2,
-        f"cut-off: it decides what is measured; in c the anisotropy is largest ("
+        f"cut-off: it decides what is measured; in variant c the anisotropy is largest ("
         f"{alpha[best]:.2g}) at {best:g} r_min; at the paper's 1 r_min it is "
         f"{alpha[1.0] / alpha[best]:.0%} of that",
     )
