@@ -61,7 +61,7 @@ def test_without_forces_their_columns_are_an_error_and_stress_is_empty_with_one_
     ("force", "told", "empty"),
     [
         (lambda one: {"force_n": one.force_n}, "normal part of", ("ft", "stress")),
-        (lambda one: {"force": -one.force}, "the contacts pull in the mean", ("fn", "ft")),
+        (lambda one: {"force": -one.force}, "the mean normal force is tension", ("fn", "ft")),
     ],
 )
 def test_forces_that_do_not_suffice_leave_columns_empty(yade, force, told, empty):
