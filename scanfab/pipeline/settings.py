@@ -232,7 +232,19 @@ class Settings:
             )
 
     def check_sizes(self, dimension: int) -> None:
-        """Raise DimensionError if the number of the RV's sizes does not fit the dimension."""
+        """
+        Check that the number of the RV's sizes fits the dimension of the sample.
+
+        Parameters
+        ----------
+        dimension : int
+            2 for discs, 3 for spheres.
+
+        Raises
+        ------
+        SettingsError
+            If there are too many sizes, or too few.
+        """
         shape, takes = self.rv_shape, SHAPES.get(self.rv_shape)
         if not self.rv_size or not takes:
             return
