@@ -1,1 +1,1 @@
-"""What every room stands on: errors, arrays, files, threads, compiled kernels."""
+"""Foundations of the package: errors, arrays, files, options, shapes, compiled kernels."""

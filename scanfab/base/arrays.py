@@ -1,4 +1,4 @@
-"""Casting and checking of arrays, once, where they enter the package."""
+"""Arrays are cast and checked here, once, when they enter the package."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ import numpy.typing as npt
 from scanfab.base.errors import PackingError
 from scanfab.base.typing import IntArray
 
-# lengths lie between these, so that their cubes are still finite and above 0
+# limits for lengths: the cube of any length between them is finite and above 0
 LEAST, MOST = 1e-100, 1e100
 # rows at a time, whose temporary arrays take some tens of megabytes
 ROWS = 1 << 18
 
 
 def doubles(values: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
-    """Numbers of eight bytes; a signalling NaN of four bytes draws no warning."""
+    """Convert numbers to 8-byte floats; a signalling 4-byte NaN raises no warning."""
     with np.errstate(invalid="ignore"):
         return values.astype(np.float64, copy=False)
 
@@ -27,13 +27,17 @@ def doubles(values: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
 def cast(
     name: str, values: npt.ArrayLike, dtype: type | None, shape: tuple[Any, ...]
 ) -> npt.NDArray[Any]:
-    """An array of the given type and shape (None: any length; ...: any further dimensions)."""
+    """
+    Return a read-only array of the given type and shape.
+
+    In ``shape``, None allows any length, and a final ``...`` allows any further dimensions.
+    """
     spelt = ", ".join("N" if n is None else "..." if n is ... else str(n) for n in shape)
     try:
         array = np.asarray(values)
         if array.size == 0 and shape[0] is None:
             array = np.zeros((0, *shape[1:]))  # an empty list
-        # a read-only array that is no view of another can be shared, as nobody can change it
+        # A read-only array that owns its memory never changes, so it is shared, not copied.
         shared = array.flags.owndata and not array.flags.writeable
         numbers = array.astype(array.dtype if dtype is None else dtype, copy=not shared)
     except (TypeError, ValueError) as error:
@@ -52,7 +56,7 @@ def cast(
 
 
 def all_within(values: npt.NDArray[np.float64], least: float, most: float) -> bool:
-    """Whether all values lie from least to most; NaN does not. Makes no temporary array."""
+    """Return whether all values lie between two limits, without making a temporary array."""
     return values.size == 0 or bool(values.min() >= least and values.max() <= most)
 
 
@@ -70,19 +74,19 @@ def in_parts(function: Callable[..., npt.NDArray[Any]], *arrays: npt.NDArray[Any
 
 
 def grains_named(id: IntArray, wrong: npt.NDArray[np.bool_]) -> str:
-    """'grain 7' or '3 grains, first 7'."""
+    """Name the wrong grains in a message: 'grain 7' or '3 grains, the first is 7'."""
     first = id[np.argmax(wrong)]
     number = np.count_nonzero(wrong)
     return f"grain {first}" if number == 1 else f"{number} grains, the first is {first}"
 
 
 def concatenated(parts: Sequence[Any]) -> Any:
-    """Joins arrays end to end; in dicts and dataclasses, each array with its namesakes."""
+    """Join arrays end to end; in dicts and dataclasses, join the arrays of the same name."""
     first = parts[0]
     if isinstance(first, np.ndarray):
         return np.concatenate(parts)
     if isinstance(first, dict):
-        return {key: concatenated([one[key] for one in parts]) for key in first}
+        return {key: concatenated([part[key] for part in parts]) for key in first}
     names = [field.name for field in fields(first)]
-    whole = {name: concatenated([getattr(one, name) for one in parts]) for name in names}
+    whole = {name: concatenated([getattr(part, name) for part in parts]) for name in names}
     return type(first)(**whole)

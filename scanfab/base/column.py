@@ -1,4 +1,4 @@
-"""A column of a table: its name, the kind of its values, their unit and what they mean."""
+"""Columns of tables: each has a name, a kind of values, a unit and a meaning."""
 
 from __future__ import annotations
 
@@ -10,31 +10,31 @@ from typing import get_args, get_origin, get_type_hints
 
 from scanfab.base.errors import ScanfabError
 
-# With 17 significant digits every float reads back as the same number; users cannot ask for more.
-# Manifests list the digits only if they differ from this.
+# 17 significant digits are enough for every float to read back as the same number, so they are also
+# the most that users can ask for. Manifests list the digits only if they differ from this.
 DEFAULT_DIGITS = 17
-# all lengths are in the unit of the dump; nothing is converted
+# the unit of all lengths: that of the dump, as nothing is converted
 LENGTH = "length"
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
     """
-    A column of a table, declared beside the code that computes it.
+    A column of a table; it is declared beside the code that computes its values.
 
-    The header and the order of CSV files, the schema of Parquet files, the rows of empty frames
-    and docs/command-line.md all follow from such declarations.
+    The declarations decide the header and order of CSV files, the schema of Parquet files, the rows
+    of empty frames and the tables in docs/command-line.md.
 
     Parameters
     ----------
     name : str
-        As scripts know it.
+        Name in files and scripts.
     kind : type
-        ``int``, ``float`` or ``str``; ``list`` only in tables that are written as JSON. A missing
-        value is None in any column.
+        ``int``, ``float`` or ``str``; ``list`` for columns that only JSON files hold. In any
+        column, None stands for a missing value.
     unit : str
-        ``"length"`` and ``"time"`` are the units of the dump; empty for names, counts and
-        dimensionless numbers.
+        ``"length"`` and ``"time"`` stand for the units of the dump. Names, counts and dimensionless
+        numbers have an empty unit.
     meaning : str
         What the column holds, for the documentation.
 
@@ -52,25 +52,25 @@ class Column:
 
 
 def numbers(meanings: Mapping[str, str], unit: str = "") -> tuple[Column, ...]:
-    """Columns of floats by their names and meanings; dimensionless if no unit is named."""
+    """Columns of floats from their names and meanings; without a unit they are dimensionless."""
     return tuple(Column(name, float, unit, meaning) for name, meaning in meanings.items())
 
 
 class NoColumnError(ScanfabError, KeyError, AttributeError):
     """
-    A row or table has no column of this name; the message suggests the most similar one.
+    A row or table has no column of this name; the message suggests the most similar name.
 
-    Its arguments are the name that was asked for and the names of all columns.
+    The arguments are the wrong name and the names of all columns.
     """
 
     def __str__(self) -> str:
-        # made only when the error is shown: ``row.get(name)`` raises many that nobody sees
+        # The message is made only when it is shown, because ``row.get(name)`` drops many errors.
         return no_column(*self.args)
 
 
 def no_column(name: object, known: Iterable[str]) -> str:
     """
-    The message for a name that no column has.
+    The message for a wrong name of a column.
 
     Examples
     --------
@@ -87,9 +87,9 @@ def no_column(name: object, known: Iterable[str]) -> str:
 @cache
 def columns_of_fields(kind: type) -> tuple[Column, ...]:
     """
-    The columns of a dataclass, one for each field, with the meaning and unit of its annotation.
+    The columns of a dataclass: one for each field, with the meaning and unit in its annotation.
 
-    An example of a field is ``radius: Annotated[float, "of the smallest grain", LENGTH]``.
+    For example: ``radius: Annotated[float, "radius of the smallest grain", LENGTH]``.
 
     Examples
     --------
@@ -98,11 +98,11 @@ def columns_of_fields(kind: type) -> tuple[Column, ...]:
     >>> columns_of_fields(StepRow)[0].meaning
     'the series as given'
     """
-    found = []
+    columns = []
     for name, hint in get_type_hints(kind, include_extras=True).items():
         meaning, *unit = hint.__metadata__
-        # ``float`` of ``float | None``, ``list`` of ``list[str]`` and the like
-        of_value = next((one for one in get_args(hint.__origin__)), hint.__origin__)
+        # ``float | None`` becomes ``float``, and ``list[str]`` becomes ``list``
+        of_value = next((argument for argument in get_args(hint.__origin__)), hint.__origin__)
         held = hint.__origin__ if get_origin(hint.__origin__) is list else of_value
-        found.append(Column(name, get_origin(held) or held, "".join(unit), meaning))
-    return tuple(found)
+        columns.append(Column(name, get_origin(held) or held, "".join(unit), meaning))
+    return tuple(columns)

@@ -1,12 +1,12 @@
 """
-Convex regions about the origin: what lies in them, and how much of them.
+Convex regions about the origin: which points, segments and spheres lie in them.
 
-A region is the image of a body under a linear map. The map makes every ellipsoid from the ball of
-radius 1 and every box from a cube, and it carries over the closed formulas of the body, so that a
-window that deforms with its sample needs no formula of its own.
+A region is the image of a body under a linear map. The map makes every ellipsoid from the unit ball
+and every box from a cube. The closed formulas of the body hold for the image too, so a window that
+deforms with its sample needs no formulas of its own.
 
-A region in a plane is spanned by the map's first two columns; the third is the unit normal. Its
-volume is an area, and its areas are lengths.
+The first two columns of the map span a region in a plane, and the third column is the unit normal.
+Such a flat region has an area in place of a volume, and lengths in place of areas.
 """
 
 from __future__ import annotations
@@ -19,21 +19,22 @@ import numpy as np
 from scanfab.base.bodies import AXES, POINTS, Hull, Product, on_circle, on_sphere
 from scanfab.base.typing import BoolArray, FloatArray
 
-# steps towards the nearest place of a region, and the share of a distance that may be rounding
+# STEPS: most steps of the walk to the point of a region that is nearest to a sphere.
+# ROUNDING: relative differences of lengths below this are rounding.
 STEPS, ROUNDING = 200, 1e-12
 
 
 class Quadric(NamedTuple):
     """
-    The places x with x·(m I + D) x below a level; D = 0 for a sphere, however its axes are turned.
+    The points x with x·(m I + D) x < level; D is exactly 0 for a sphere with any axes.
     """
 
     isotropic: float
     """m, not negative."""
     deviator: FloatArray
-    """D, symmetric, shape (3, 3), no eigenvalue below -m."""
+    """D: symmetric, shape (3, 3), all eigenvalues at least -m."""
     level: float
-    """Above 0: the origin lies inside."""
+    """Above 0, so that the origin lies inside."""
 
     @property
     def form(self) -> FloatArray:
@@ -41,36 +42,36 @@ class Quadric(NamedTuple):
         return self.isotropic * np.eye(3) + self.deviator
 
 
-# the quadric of a region that only planes bound
+# the quadric of a region that is bounded by planes alone: no point violates it
 EVERYWHERE = Quadric(0.0, np.zeros((3, 3)), 1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Convex:
     """
-    A convex region about the origin, bounded; its surface is not part of it.
+    A bounded convex region about the origin, without its surface.
 
-    Planes and quadric alone decide which places lie in it. Volume, shadow and surface follow from
-    the body and the frame whose image it is, and so does the region after a deformation.
+    Planes and quadric decide which points lie in the region. Body and frame give its volume, its
+    projected area, its surface, and the region after a deformation.
 
     Parameters
     ----------
     planes : ndarray
-        Rows n, d with unit vectors n: of each plane the side n·x < d, shape (P, 4).
+        Flat bounds, shape (P, 4): each row n, d, with a unit vector n, keeps the side n·x < d.
     quadric : Quadric
-        The second bound of the region; ``EVERYWHERE`` where the planes are the only one.
+        Curved bound; ``EVERYWHERE`` if only planes bound the region.
     low : ndarray
-        The box along x, y and z that holds the region, shape (3,).
+        Lower corner of the box along x, y and z that holds the region, shape (3,).
     high : ndarray, shape (3,)
-        Its opposite corner.
+        Upper corner of this box.
     reach : float
-        Radius of the ball about the origin that holds the region; of a sphere its own.
+        Radius of a ball about the origin that holds the region; for a sphere its own radius.
     size : str
-        Its size in messages, for instance ``radius 2``.
+        Size in words for messages, for instance ``radius 2``.
     body : Product or Hull
-        The body whose image it is.
+        The body that is mapped.
     frame : ndarray, shape (3, 3)
-        The region holds the places frame @ x with x in the body.
+        The linear map: the region holds the points frame @ x for all x in the body.
 
     Examples
     --------
@@ -99,12 +100,12 @@ class Convex:
 
     @property
     def is_sphere(self) -> bool:
-        """Whether all its diameters are equal; in a plane it is then a circle."""
+        """Whether the region is a sphere, or in a plane a circle."""
         return not len(self.planes) and not self.quadric.deviator.any()
 
     @property
     def is_flat(self) -> bool:
-        """Whether it lies in a plane; the third column of the frame is then the normal."""
+        """Whether the region lies in a plane, whose normal is the third column of the frame."""
         return self.body.is_flat
 
     @property
@@ -114,7 +115,7 @@ class Convex:
 
     @property
     def mean_shadow(self) -> float:
-        """Mean projected area over all directions, within some per cent; in a plane a length."""
+        """Projected area, averaged over all directions to a few per cent; in a plane a length."""
         axes = on_sphere()[:: POINTS // AXES]
         if self.is_flat:
             axes = on_circle()[:, :2] @ np.linalg.qr(self.frame[:, :2])[0].T
@@ -122,17 +123,17 @@ class Convex:
 
     @property
     def outline(self) -> FloatArray:
-        """Points of the surface, shape (K, 3), whose hull is the region, or nearly so if curved."""
+        """Points of the surface, shape (K, 3); their hull is the region, or nearly if curved."""
         return self.body.outline @ self.frame.T
 
     def contains(self, points: FloatArray) -> BoolArray:
         """
-        Which points lie inside.
+        Whether each point lies inside the region.
 
         Parameters
         ----------
         points : ndarray, shape (N, 3)
-            From the origin of the region.
+            Coordinates from the origin of the region.
 
         Returns
         -------
@@ -141,7 +142,7 @@ class Convex:
         isotropic, deviator, level = self.quadric
         form = isotropic * np.einsum("ij,ij->i", points, points)
         form += np.einsum("ij,ij->i", points @ deviator, points)
-        # roots are compared, as distances are everywhere else, so that rounding is the same
+        # Distances are compared, not their squares, to round as all other code that compares them.
         inside = np.sqrt(form) < np.sqrt(level)
         for plane in self.planes:
             inside &= points @ plane[:3] < plane[3]
@@ -149,14 +150,14 @@ class Convex:
 
     def share(self, start: FloatArray, branch: FloatArray) -> FloatArray:
         """
-        Which share of each straight piece lies inside.
+        The fraction of each straight segment that lies inside the region.
 
         Parameters
         ----------
         start : ndarray, shape (N, 3)
-            Where it begins, from the origin of the region.
+            Start of each segment, from the origin of the region.
         branch : ndarray, shape (N, 3)
-            From there to where it ends; not of length 0.
+            Vector from the start of each segment to its end; no length may be 0.
 
         Returns
         -------
@@ -171,7 +172,7 @@ class Convex:
             b = np.einsum("ni,ij,nj->n", start, form, branch)
             c = np.einsum("ni,ij,nj->n", start, form, start) - level
             root = np.sqrt(np.maximum(b * b - a * c, 0.0))
-            # along the axis of a cylinder a is 0: all of the piece is inside, or none
+            # along the axis of a cylinder a is 0: the quadric keeps the whole segment, or nothing
             steep = a > ROUNDING * (self.quadric.isotropic * np.einsum("ni,ni->n", branch, branch))
             slope = np.where(steep, a, 1.0)
             first = np.where(steep, np.maximum(first, (-b - root) / slope), first)
@@ -188,14 +189,14 @@ class Convex:
 
     def may_meet(self, points: FloatArray, radius: FloatArray) -> BoolArray:
         """
-        Which spheres reach inside; a sphere that nearly touches may count too.
+        Whether each sphere may reach into the region; a near miss may also give True.
 
         Parameters
         ----------
         points : ndarray, shape (N, 3)
-            Their centres, from the origin of the region.
+            Centres of the spheres, from the origin of the region.
         radius : ndarray, shape (N,)
-            Their radii.
+            Radii of the spheres.
 
         Returns
         -------
@@ -206,17 +207,18 @@ class Convex:
             near &= points @ plane[:3] < plane[3] + radius
         if self.is_sphere:
             return np.asarray(near)
-        # Near an edge, or a quadric that is no sphere, these are too many. For a centre p outside,
-        # walk from a place x inside as near to p as the way to the place furthest along p - x
-        # allows. The distance of p is at most |p - x|, and at least that of the plane through the
-        # furthest place; a sphere between the two after all steps may reach inside.
+        # The test so far keeps too many spheres near edges and near quadrics that are no spheres.
+        # For each centre p outside, x walks inside the region towards p: each step goes towards
+        # the point that lies furthest along p - x, and stops as near to p as possible. Then |p - x|
+        # is an upper bound of the distance of p, and the plane through the furthest point gives a
+        # lower bound. A sphere whose radius still lies between them after all steps is kept.
         left = np.flatnonzero(near)
         left = left[~self.contains(points[left])]
         at = np.zeros((len(left), 3))
         for _ in range(STEPS):
             toward = points[left] - at
             distance, furthest = np.linalg.norm(toward, axis=1), self.support(toward)
-            # the distance is 0 once the walk has reached a centre on the surface
+            # a centre on the surface is reached: the distance is 0
             over = np.where(distance > 0.0, distance, 1.0)
             missed = np.einsum("ij,ij->i", points[left] - furthest, toward) / over >= radius[left]
             near[left[missed]] = False
@@ -232,12 +234,12 @@ class Convex:
 
     def support(self, along: FloatArray) -> FloatArray:
         """
-        The place of the region that is furthest along each vector.
+        The point of the region that lies furthest along each vector.
 
         Parameters
         ----------
         along : ndarray, shape (N, 3)
-            Of any length but 0.
+            Vectors of any length above 0.
 
         Returns
         -------
@@ -247,22 +249,22 @@ class Convex:
 
     def overlap(self, axes: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
         """
-        The volume that the region shares with itself moved along axes, and how fast it falls.
+        The volume that the region shares with a moved copy of itself, and its slope.
 
         Parameters
         ----------
         axes : ndarray, shape (N, 3)
             Unit vectors.
         length : float
-            How far it is moved, dump's length unit.
+            Distance z by which the copy is moved, dump's length unit.
 
         Returns
         -------
         shared : ndarray, shape (N,)
-            The covariogram g, a volume.
+            The covariogram g(z), a volume.
         slope : ndarray, shape (N,)
-            -dg/dlength, the area of the lines with a piece in it that is at least so long; at
-            length 0 the projected area.
+            -dg/dz: the cross-section of all lines along the axis whose piece in the region is at
+            least z long; at z = 0 the projected area.
         """
         scale = abs(np.linalg.det(self.frame))
         shared, slope = self.body.overlap(axes @ np.linalg.inv(self.frame).T, length)
@@ -270,7 +272,7 @@ class Convex:
 
     def meets_itself(self, shift: FloatArray) -> bool:
         """
-        Whether the region overlaps its copy that is moved by a vector.
+        Whether the region overlaps a copy of itself that is moved by a vector.
 
         Parameters
         ----------
@@ -282,27 +284,27 @@ class Convex:
         bool
         """
         if self.body.is_symmetric:
-            # if any place lies in both, so does the middle of the two centres, half the shift
+            # two copies of a symmetric body meet if the point halfway between their centres does
             return bool(self.contains(0.5 * shift[None])[0])
         from scipy.optimize import linprog
 
-        # how deep a ball fits into both
+        # the radius of the largest ball that fits into both copies
         normals, distance = self.planes[:, :3], self.planes[:, 3]
         both = distance + np.minimum(normals @ shift, 0.0)
         depth = np.column_stack([normals, np.ones(len(normals))])
-        found = linprog([0, 0, 0, -1], depth, both, bounds=[(None, None)] * 4)
-        return bool(found.x[3] > ROUNDING * self.reach)
+        solution = linprog([0, 0, 0, -1], depth, both, bounds=[(None, None)] * 4)
+        return bool(solution.x[3] > ROUNDING * self.reach)
 
     def deformed(self, gradient: FloatArray) -> Convex:
         """
-        The image of the region under the map gradient @ x.
+        The image of the region under a deformation gradient: the points gradient @ x.
 
-        A sphere becomes an ellipsoid, a box leans: planes and a quadric again.
+        A sphere becomes an ellipsoid, and a box may lean.
 
         Parameters
         ----------
         gradient : ndarray, shape (3, 3)
-            Not singular.
+            Deformation gradient, not singular.
 
         Returns
         -------
@@ -314,17 +316,17 @@ class Convex:
 
 
 def image_of(body: Product | Hull, frame: FloatArray, size: str) -> Convex:
-    """The places frame @ x with x in the body."""
+    """The region of the points frame @ x for all x in the body."""
     inverse = np.linalg.inv(frame)
     planes = np.column_stack([body.planes[:, :3] @ inverse, body.planes[:, 3]])
     planes /= np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
     quadric = EVERYWHERE
     if body.form.any():
         form = inverse.T @ np.diag(body.form) @ inverse
-        # scaled to an isotropic part of 1, whatever the unit of length
+        # scaled so that the isotropic part is 1 in any unit of length
         level = 3.0 / np.trace(form)
         quadric = Quadric(1.0, level * form - np.eye(3), float(level))
-    # the supports along -x, -y, -z are not those along x, y, z with the other sign in every body
+    # not every body is symmetric, so the extents along -x, -y, -z are computed as well
     along = np.concatenate([np.eye(3), -np.eye(3)])
     ends = np.einsum("ij,ij->i", body.support(along @ frame) @ frame.T, along)
     reach = body.reach(frame)

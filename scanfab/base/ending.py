@@ -1,4 +1,4 @@
-"""Steps that must be taken before the process ends, also when a signal ends it at once."""
+"""Clean-up steps that run before the process ends, also if a signal ends it."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ _steps: list[Step] = []
 def at_end(step: Step) -> None:
     """Call a function at the end of the process."""
     if util := sys.modules.get("multiprocessing.util"):
-        # a worker that was forked ends without the functions of atexit
+        # a forked worker process ends without calling the functions of atexit
         util.Finalize(None, finish, exitpriority=0)
     _steps.append(step)
 
 
 @contextmanager
 def undone_at_end(step: Step) -> Iterator[None]:
-    """Call a function if the process ends inside the block."""
+    """Within the block, call a function if the process ends."""
     _steps.append(step)
     try:
         yield
@@ -31,13 +31,13 @@ def undone_at_end(step: Step) -> Iterator[None]:
 
 
 if hasattr(os, "register_at_fork"):
-    # a forked process leaves the steps that it inherits to its parent
+    # the parent process runs its own steps, so a forked child forgets them
     os.register_at_fork(after_in_child=_steps.clear)
 
 
 @atexit.register
 def finish() -> None:
-    """Take all steps that are left; the one that was asked for last comes first."""
+    """Run all remaining steps, the newest first."""
     while _steps:
         with suppress(OSError):
             _steps.pop()()

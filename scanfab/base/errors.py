@@ -1,7 +1,8 @@
 """
-Errors and warnings, a class for each kind of problem that a user can mend, and notes.
+Errors, warnings and notes.
 
-A note is data about a frame; the command line and the report make sentences of it.
+Each kind of problem that a user can mend has an error class of its own. A note is data about a
+frame; the command line and the report make sentences of it.
 """
 
 from __future__ import annotations
@@ -11,62 +12,62 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 SKIPPED = "skipped"
-"""The code of the note on a frame that was left out because it could not be read."""
+"""Code of the note about a frame that was skipped because it could not be read."""
 
 
 class ScanfabError(Exception):
-    """Base of all errors that scanfab raises on purpose; the message is written for users."""
+    """Base class of the errors that scanfab raises on purpose; users can act on the message."""
 
 
 class ReadError(ScanfabError):
-    """A file could not be read; names the file, what was found and what was expected."""
+    """A file cannot be read; the message names the file, what was expected and what was found."""
 
 
 class UnknownFormatError(ReadError):
-    """No reader knows the file, or the named reader does not exist."""
+    """No reader recognises the file, or there is no reader of the given name."""
 
 
 class NoFrameError(ReadError, IndexError):
-    """A series has no frame of this number; says how many it has."""
+    """A series has no frame of this number; the message says how many it has."""
 
 
 class PackingError(ScanfabError):
-    """Grains, contacts or cell do not form a packing (a radius of zero, a missing grain)."""
+    """Grains, contacts and cell do not form a packing: a radius is 0, or a grain is missing."""
 
 
 class SettingsError(ScanfabError):
-    """An option has a value that cannot be used, by itself or with this packing."""
+    """The value of an option cannot be used, either at all or with this packing."""
 
 
 class DimensionError(SettingsError):
-    """An option for spheres was given for discs, or the other way round: wrong usage."""
+    """An option for spheres is used with discs, or the other way round."""
 
 
 class ScanfabWarning(UserWarning):
-    """Something that the user should know, although the result stands."""
+    """A doubt about a result, which is nevertheless computed."""
 
 
 class ScanfabNote(UserWarning):
-    """Something worth knowing that puts nothing in doubt."""
+    """Information that puts no result in doubt."""
 
 
 class SkippedFrameWarning(ScanfabWarning):
-    """A frame was left out because it could not be read."""
+    """A frame was skipped because it could not be read."""
 
 
 class Note(NamedTuple):
     """One thing that a user should know."""
 
     code: str
-    """The kind of the note, for programs."""
+    """Kind of the note, for programs."""
     text: str
-    """The sentence; it names arguments as the library does."""
+    """The message; it names options as Python spells them."""
     variants: tuple[str, ...] = ()
-    """The variants that the note is about; empty if it is about the whole frame."""
+    """Variants that the note is about; empty if it is about the whole frame."""
 
     def told(self, where: str) -> str:
         """
-        The sentence behind the frame and variants that it is about.
+        The message, preceded by the frame and the variants that it is about.
 
         Examples
         --------
@@ -82,17 +83,17 @@ class Note(NamedTuple):
 
 
 def warn(text: str) -> None:
-    """Tell the user something that he should know, although the result stands."""
+    """Warn the user of a doubt about a result."""
     warnings.warn(text, ScanfabWarning, stacklevel=5)
 
 
 def note(text: str) -> None:
-    """Tell the user something worth knowing that puts nothing in doubt."""
+    """Inform the user of something that puts no result in doubt."""
     warnings.warn(text, ScanfabNote, stacklevel=5)
 
 
 def joined(notes: Iterable[Note]) -> tuple[Note, ...]:
-    """Notes with the same sentence become one note about all their variants."""
+    """Merge notes with the same message into one note about all their variants."""
     variants: dict[tuple[str, str], dict[str, None]] = {}
     for code, text, about in notes:
         variants.setdefault((code, text), {}).update(dict.fromkeys(about))
@@ -100,8 +101,8 @@ def joined(notes: Iterable[Note]) -> tuple[Note, ...]:
 
 
 def tell(notes: Iterable[Note], where: str = "") -> None:
-    """Warn of each note; a frame that was left out is a warning of its own kind."""
-    for one in notes:
-        skipped = one.code == SKIPPED
-        text = one.told(f"{where} skipped" if skipped else where)
+    """Issue a warning for each note; a skipped frame has a warning class of its own."""
+    for note in notes:
+        skipped = note.code == SKIPPED
+        text = note.told(f"{where} skipped" if skipped else where)
         warnings.warn(text, SkippedFrameWarning if skipped else ScanfabWarning, stacklevel=3)

@@ -1,7 +1,7 @@
 """
-Files: what kind a path is, files that are written completely or not at all, and locks.
+Files: the kind of a path, files that are written completely or not at all, and locks.
 
-The memory that the process can still get is here too, as it decides whether a file can be read.
+The memory left for the process is found here too, because it limits how much can be read.
 """
 
 from __future__ import annotations
@@ -19,39 +19,39 @@ from typing import IO
 from scanfab.base.ending import undone_at_end
 from scanfab.base.errors import ReadError, ScanfabError, SettingsError
 
-# reading from a pipe, a device or a socket may wait for ever
+# kinds of paths that are not read as files, because reading them may wait for ever
 KINDS = {stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
 KINDS |= {stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
-# pipes that a shell or another program has opened for this process
+# paths of the pipes that a shell or another program has opened for this process
 INHERITED = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")
-# Windows lets nobody read a locked byte, so the lock is on one that no table is long enough to have
+# Windows lets nobody read a locked byte, so a byte far beyond the end of any table is locked.
 FAR = 1 << 40
-# the limit of the container
+# holds the memory limit of the container
 CONTAINER = Path("/sys/fs/cgroup/memory.max")
 
 
 def kind_of(path: Path) -> str | None:
-    """The kind of a pipe, socket or device; None for a file, a folder and a path to nothing."""
+    """The kind of a pipe, socket or device; None for a file, a folder or a missing path."""
     try:
         return KINDS.get(stat.S_IFMT(path.stat().st_mode))
     except OSError:
-        return None  # opening the path fails with a reason
+        return None  # opening the path will raise an error that says why
 
 
 def check_file(path: Path, expected: str = "a file", instead: str = "") -> None:
-    """ReadError if a path is a pipe or a device; a table may be a shell's ``<(command)``."""
+    """Raise ReadError for a pipe or device; a table may also come from ``<(command)``."""
     kind = kind_of(path)
     passed_on = kind in ("a pipe", "a socket") and os.fspath(path).startswith(INHERITED)
     if kind is not None and not (passed_on and expected == "a table"):
-        instead = instead or "by - in place of its name and `format=NAME`"
+        instead = instead or "give - in place of its name, and `format=NAME`"
         raise ReadError(
-            f"{path}: is {kind}, expected {expected}: what a program writes is read from "
-            f"standard input, {instead}"
+            f"{path}: is {kind}, expected {expected}: to read what a program writes "
+            f"from standard input, {instead}"
         )
 
 
 def check_folder(path: Path) -> None:
-    """SettingsError if the folder of a file does not exist or cannot be written to."""
+    """Raise SettingsError if the folder of a file does not exist or cannot be written to."""
     if kind_of(path) is not None:
         return
     if not path.parent.is_dir():
@@ -63,16 +63,16 @@ def check_folder(path: Path) -> None:
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """
-    A temporary file beside the wanted one; it takes its place when the block ends without error.
+    Give the path of a temporary file, which replaces the file if the block ends without an error.
 
-    A pipe or a device is written to directly.
+    A pipe or device is written to directly.
     """
     if kind_of(path) is not None:
         with named_errors(path):
             yield path
         return
-    # Libraries know the format by the suffix, so it stays at the end. The random part keeps apart
-    # processes that write the same file.
+    # Libraries tell the format from the suffix, so it stays at the end. The random part gives
+    # processes that write the same file different temporary files.
     part = path.with_name(f"{path.stem[:60]}.{os.urandom(4).hex()}.part{path.suffix}")
     remove = partial(part.unlink, missing_ok=True)
     with named_errors(path, part), undone_at_end(remove):
@@ -85,7 +85,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def named_errors(name: Path | str, part: Path | None = None) -> Iterator[None]:
-    """Errors of the system name this file if they name none or only its unfinished part."""
+    """Put this file's name into system errors that name no file, or only the temporary file."""
     try:
         yield
     except OSError as error:
@@ -97,10 +97,10 @@ def named_errors(name: Path | str, part: Path | None = None) -> Iterator[None]:
 @contextmanager
 def locked(path: Path) -> Iterator[IO[bytes]]:
     """
-    Open a file, which is created if it does not exist, and lock it until it is closed.
+    Open a file, or create it, and lock it until it is closed.
 
-    The system releases the lock when the process ends, however it ends. On a file system without
-    locks nothing is locked. If another run holds the lock, a ScanfabError says so.
+    The system releases the lock when the process ends in any way. A file system without locks
+    leaves the file unlocked. If another run holds the lock, ScanfabError is raised.
     """
     with named_errors(path):
         stream = open(path, "ab")  # noqa: SIM115
@@ -115,7 +115,7 @@ def locked(path: Path) -> Iterator[IO[bytes]]:
                 import fcntl
 
                 fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # the run that held the lock may just have ended and renamed the file
+            # the run that held the lock may have ended meanwhile and renamed the file
             is_free = path.exists() and os.path.samestat(os.fstat(stream.fileno()), path.stat())
         except OSError as error:
             is_free = not isinstance(error, BlockingIOError | PermissionError)
@@ -128,19 +128,19 @@ def locked(path: Path) -> Iterator[IO[bytes]]:
 
 
 def free_memory() -> int:
-    """Bytes that this process can still get: the least of machine, container and own limit."""
-    found = [sys.maxsize if (own := address_space()) is None else own]
+    """Bytes left for this process: the least of what machine, container and its limit allow."""
+    limits = [sys.maxsize if (own := address_space()) is None else own]
     with suppress(OSError):
         text = Path("/proc/meminfo").read_text("ascii")
-        found += [int(kB) << 10 for kB in re.findall(r"MemAvailable:\s*(\d+) kB", text)]
-    # without a container there is no such file, and without a limit it says "max"
+        limits += [int(kB) << 10 for kB in re.findall(r"MemAvailable:\s*(\d+) kB", text)]
+    # outside a container the file is missing; without a limit it holds the word "max"
     with suppress(OSError, ValueError):
-        found.append(int(CONTAINER.read_text("ascii")))
-    return max(min(found), 0)
+        limits.append(int(CONTAINER.read_text("ascii")))
+    return max(min(limits), 0)
 
 
 def address_space() -> int | None:
-    """Bytes that ``ulimit -v`` leaves to this process; None without this limit."""
+    """Bytes of address space that ``ulimit -v`` leaves to this process; None if unlimited."""
     try:
         import resource
 

@@ -1,4 +1,4 @@
-"""An option, declared once: command line, library, manifest, report and docs derive from it."""
+"""Options: each is declared once for command line, library, manifest, report and docs."""
 
 from __future__ import annotations
 
@@ -22,69 +22,69 @@ Floats = tuple[float, ...]
 P = ParamSpec("P")
 R = TypeVar("R")
 
-# in the order of the help
+# groups of options, in the order of the help
 GROUPS = ("reading", "sample", "window", "scan", "fabric", "output")
-# what the command line makes of a text, by the type of the field; of all other types a text
+# What the command line turns a text into, by the type of the field. Other types stay texts.
 KINDS: dict[str, type] = {"int": int, "float": float, "bool": bool, "Path": Path}
 
 
 def unusable(name: str, expected: str, found: object) -> SettingsError:
-    """The error for a value that an option cannot have."""
+    """The error for a value that an option does not accept."""
     return SettingsError(f"{name}: expected {expected}, found {found!r}")
 
 
 @dataclass(frozen=True)
 class Option:
     """
-    One option: an argument of the library, and an option of the command line.
+    One option: an argument of the library and an option of the command line.
 
-    A field of a dataclass declares it by :func:`option`; its help is the docstring below the field.
-    The help names other options by their arguments, in backquotes; the command line spells them as
-    it does: `rv_center` is ``--rv-center`` there.
+    A field of a dataclass declares an option by :func:`option`; the docstring below the field is
+    its help. The help names other options as Python spells them, in backquotes; the command line
+    replaces these names by its own spelling: `rv_center` becomes ``--rv-center``.
     """
 
     name: str
-    """Of the argument."""
+    """Name of the argument in Python."""
     kind: type
-    """What the command line makes of its text; bool is a switch."""
+    """Type that the command line turns its text into; bool is a switch."""
     help: str
-    """What it decides: in ``--help``, in docstrings and in a report."""
+    """What the option decides, for ``--help``, docstrings and reports."""
     group: str = "output"
-    """One of :data:`GROUPS`."""
+    """Group of the help, from :data:`GROUPS`."""
     default: Any = None
-    """As users write it."""
+    """Default value as users would write it."""
     parse: Parse = lambda name, value: value
-    """Makes what is kept of an option's name and value; it takes what is kept as well."""
+    """Function of name and value that checks and converts; converted values pass unchanged."""
     choices: Sequence[str] | Callable[[], Iterable[str]] = ()
-    """What a shell offers. Without a parser, no other words will do."""
+    """Words that a shell completes. An option without a parser accepts no others."""
     also: str = ""
-    """What it takes beside its choices, such as FILE: then a shell offers files too."""
+    """What is accepted beside the choices; for FILE a shell also completes file names."""
     metavar: str = ""
-    """The form of its value, where :attr:`form` would say too little."""
+    """Form of the value in the help, if :attr:`form` would say too little."""
     spelling: str = ""
-    """On the command line, where it does not follow from the name."""
+    """Flag of the command line, if it does not follow from the name."""
     several: bool = False
-    """Whether the command line takes it more than once."""
+    """Whether the command line accepts the option more than once."""
     first: bool = False
-    """Whether it stands among the few that most need."""
+    """Whether it is listed among the few options that most users need."""
     decides: bool = True
-    """Whether it decides a result: then the report lists it, and scanfab.toml may hold it."""
+    """Whether it decides a result; if so, the report lists it, and scanfab.toml may hold it."""
 
     @property
     def flag(self) -> str:
-        """As the command line spells it."""
+        """The option as the command line spells it."""
         return self.spelling or flag_of(self.name)
 
     @property
     def form(self) -> str:
-        """The form of its value, such as ``auto|cell|FILE``; empty if any will do."""
+        """Form of the value in the help, such as ``auto|cell|FILE``; empty for any form."""
         words = () if callable(self.choices) else (*self.choices, self.also)
         return self.metavar or "|".join(filter(None, words))
 
 
 def flag_of(name: str) -> str:
     """
-    An argument as the command line spells it; an underscore behind keeps it from being a keyword.
+    The flag of an argument; a trailing underscore, which avoids a keyword of Python, is dropped.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def flag_of(name: str) -> str:
 
 
 def option(parse: Parse | None = None, **declaration: Any) -> Any:
-    """A field of a dataclass that declares an option, by the attributes of :class:`Option`."""
+    """Declare an option as a field of a dataclass, with attributes of :class:`Option`."""
     choices = declaration.get("choices")
     if parse is None and isinstance(choices, tuple):
         parse = one_of(*choices)
@@ -105,27 +105,27 @@ def option(parse: Parse | None = None, **declaration: Any) -> Any:
     return field(default=declaration.get("default"), metadata=declaration)
 
 
-# options of each group of the help
+# these declare an option in one group of the help
 reading, sample, window, scan, fabric = (partial(option, group=group) for group in GROUPS[:5])
-# options that say how a command is run, and decide no result
+# declares an option that says how a command runs and decides no result
 running = partial(option, decides=False)
 
 
 def options_of(holder: type) -> tuple[Option, ...]:
-    """The options that the fields of a dataclass declare."""
+    """All options that the fields of a dataclass declare."""
     helps: dict[str, str] = {}
-    for one in reversed(holder.__mro__[:-1]):
-        helps |= _docstrings(one.__module__).get(one.__name__, {})
-    kinds = [KINDS.get(str(one.type).removesuffix(" | None"), str) for one in fields(holder)]
+    for base in reversed(holder.__mro__[:-1]):
+        helps |= _docstrings(base.__module__).get(base.__name__, {})
+    kinds = [KINDS.get(str(field.type).removesuffix(" | None"), str) for field in fields(holder)]
     return tuple(
-        Option(one.name, kind, helps[one.name], **one.metadata)
-        for one, kind in zip(fields(holder), kinds, strict=True)
+        Option(field.name, kind, helps[field.name], **field.metadata)
+        for field, kind in zip(fields(holder), kinds, strict=True)
     )
 
 
 @cache
 def _docstrings(module: str) -> dict[str, dict[str, str]]:
-    """The docstrings below the fields of each class of a module, which only the source has."""
+    """Docstrings below fields, by class and field; Python keeps them only in the source text."""
     return {
         holder.name: {
             ast.unparse(field.target): " ".join(ast.literal_eval(below.value).split())
@@ -138,7 +138,7 @@ def _docstrings(module: str) -> dict[str, dict[str, str]]:
 
 
 def refuse_unknown(what: str, given: Iterable[str], known: Sequence[str]) -> None:
-    """TypeError for a name that is no option; it names the nearest that is one."""
+    """Raise TypeError for a name that is no option; the message suggests the nearest option."""
     for name in given:
         if name not in known:
             near = get_close_matches(name, known, n=1)
@@ -148,12 +148,12 @@ def refuse_unknown(what: str, given: Iterable[str], known: Sequence[str]) -> Non
 
 def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """
-    A decorator for functions with options in their signature, where editors look for them.
+    Decorate a function whose signature lists options, which is where editors look for them.
 
-    The function refuses names that are no options, and in its docstring the help of the options, in
-    the order of the signature and with its types, stands in place of ``{options}``.
+    The decorated function refuses unknown names. In its docstring, ``{options}`` is replaced by the
+    help of the options, in the order and with the types of the signature.
     """
-    declared = {one.name: one for one in options}
+    declared = {option.name: option for option in options}
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         parameters = inspect.signature(function).parameters
@@ -164,8 +164,8 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
             return function(*args, **kwargs)
 
         helps = [
-            _documented(declared[name], one.annotation)
-            for name, one in parameters.items()
+            _documented(declared[name], parameter.annotation)
+            for name, parameter in parameters.items()
             if name in declared
         ]
         text = inspect.cleandoc(function.__doc__ or "")
@@ -176,59 +176,59 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
 
 
 def _documented(option: Option, annotation: str) -> str:
-    """An option as numpydoc writes a parameter."""
+    """The entry of an option in the parameters of a numpydoc docstring."""
     form = option.form
-    # a single word such as FILE says no more than the type does
+    # a form of a single word, such as FILE, would repeat the type
     written = f" Written as ``{form}``." if set("|:,") & set(form) else ""
     text = textwrap.fill(option.help + written, 92, break_on_hyphens=False)
     return f"{option.name} : {annotation}, optional\n{textwrap.indent(text, '    ')}"
 
 
 def number(expected: str, holds: Callable[[float], bool]) -> Parse:
-    """A parser of one number; any other value counts as not-a-number, for which nothing holds."""
+    """A parser of one number; any other value becomes NaN, which fails every condition."""
 
     def parse(name: str, value: Any) -> float:
         try:
-            found = float(value)
+            result = float(value)
         except (TypeError, ValueError):
-            found = math.nan
-        if not holds(found):
+            result = math.nan
+        if not holds(result):
             raise unusable(name, expected, value)
-        return found
+        return result
 
     return parse
 
 
 def whole(expected: str, holds: Callable[[int], bool]) -> Parse:
     """A parser of one whole number."""
-    parse_float = number(expected, lambda found: found.is_integer() and holds(int(found)))
+    parse_float = number(expected, lambda value: value.is_integer() and holds(int(value)))
 
     def parse(name: str, value: Any) -> int:
-        found = parse_float(name, value)
-        # a float would round a large integer
-        return value if isinstance(value, int) else int(found)
+        result = parse_float(name, value)
+        # the value itself is returned, as a float would round a large integer
+        return value if isinstance(value, int) else int(result)
 
     return parse
 
 
 def numbers(expected: str, holds: Callable[[Floats], bool]) -> Callable[[str, Any], Floats]:
-    """A parser of several finite numbers, in a text between commas or blanks or in a sequence."""
+    """A parser of several finite numbers: a sequence, or a text with commas or blanks."""
 
     def parse(name: str, value: Any) -> tuple[float, ...]:
         words = value.replace(",", " ").split() if isinstance(value, str) else value
         try:
-            found = tuple(map(float, words))
+            values = tuple(map(float, words))
         except (TypeError, ValueError):
-            found = (math.nan,)
-        if not all(map(math.isfinite, found)) or not holds(found):
+            values = (math.nan,)
+        if not all(map(math.isfinite, values)) or not holds(values):
             raise unusable(name, expected, value)
-        return found
+        return values
 
     return parse
 
 
 def one_of(*words: str) -> Parse:
-    """A parser of one word of a few."""
+    """A parser that accepts one of the given words."""
 
     def parse(name: str, value: Any) -> str:
         if value not in words:
@@ -239,5 +239,5 @@ def one_of(*words: str) -> Parse:
 
 
 def optional(parse: Parse) -> Parse:
-    """The same parser for an option that need not be given."""
+    """The same parser, which also accepts None for an option that is not given."""
     return lambda name, value: None if value is None else parse(name, value)

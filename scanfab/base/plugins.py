@@ -1,4 +1,4 @@
-"""Plugins that installed packages offer under an entry point."""
+"""Plugins: objects that installed packages offer under an entry point."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Offer(NamedTuple):
 
 def having(expected: str, **members: Any) -> Callable[[Any], Any]:
     """
-    A check of plugins: it raises TypeError for a class, or for an object without these members.
+    Make a check of plugins: it raises TypeError for a class or an object without these members.
 
     Examples
     --------
@@ -42,25 +42,25 @@ def having(expected: str, **members: Any) -> Callable[[Any], Any]:
 
 def load_plugins(group: str, what: str, make: Callable[[Any], Any]) -> dict[str, Offer]:
     """
-    The objects that packages offer, by name and in alphabetical order.
+    Load the plugins of an entry point, by name, in alphabetical order.
 
-    A plugin that cannot be loaded is left out with a warning, so that the others still work.
+    A plugin that cannot be loaded is skipped with a warning, so that the others still work.
 
     Parameters
     ----------
     group : str
-        The entry point, for instance ``scanfab.fabrics``.
+        Name of the entry point, for instance ``scanfab.fabrics``.
     what : str
-        How messages call such a plugin.
+        Word for a plugin in messages.
     make : callable
-        Makes a plugin of a loaded object, or raises if the object is none.
+        Turns a loaded object into a plugin, or raises an error if it is not suitable.
 
     Raises
     ------
     ScanfabError
-        If two packages use one name.
+        If two packages use the same name.
     """
-    found: dict[str, Offer] = {}
+    offers: dict[str, Offer] = {}
     for point in sorted(entry_points(group=group), key=lambda point: (point.name, point.value)):
         package = point.dist.name if point.dist is not None else "unknown package"
         try:
@@ -71,10 +71,10 @@ def load_plugins(group: str, what: str, make: Callable[[Any], Any]) -> dict[str,
                 f"{type(error).__name__}: {error}"
             )
             continue
-        if point.name in found:
+        if point.name in offers:
             raise ScanfabError(
                 f"two packages offer a {what} called {point.name!r}: "
-                f"{found[point.name].package} and {package}; remove one of them"
+                f"{offers[point.name].package} and {package}; remove one of them"
             )
-        found[point.name] = Offer(plugin, package)
-    return found
+        offers[point.name] = Offer(plugin, package)
+    return offers

@@ -1,4 +1,4 @@
-"""The shapes of windows, made from their sizes or from a surface."""
+"""Shapes of windows, from sizes or from a triangulated surface."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from scanfab.base.option import number
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray, IntArray
 
-# Numbers of 4 bytes, as STL has them, cannot tell places apart that are closer than this part of a
-# surface's size, or of its distance from the origin, whichever is larger.
+# Relative rounding of coordinates in STL files, which hold 4-byte numbers: points that are closer
+# than this, relative to the largest coordinate or the size of the surface, count as the same.
 TOLERANCE = 1e-6
-# each line is cut by all faces
+# Every line is cut by every face, so the faces must not be too many.
 MOST_FACES = 1000
 
 
@@ -33,14 +33,14 @@ def sphere(radius: float, space: Space = SPACE) -> Convex:
     Parameters
     ----------
     radius : float
-        Dump's length unit.
+        Radius in the dump's length unit.
     space : Space, optional
-        The coordinate plane of a circle, which holds what the sphere holds there.
+        The coordinate plane of a circle; default: three dimensions.
 
     Returns
     -------
     Convex
-        The shape of a :class:`scanfab.Window`, or the window of :class:`scanfab.Solids`.
+        Usable as the shape of a :class:`scanfab.Window` or the window of :class:`scanfab.Solids`.
 
     Raises
     ------
@@ -74,11 +74,11 @@ def box(
     Parameters
     ----------
     edges : sequence of 3 floats
-        Full lengths; of a rectangle 2.
+        Full lengths of the edges, dump's length unit; two for a rectangle.
     turn : array_like, shape (3, 3), optional
-        Orthonormal rows along which the edges lie; by default the coordinates in alphabetic order.
+        Orthonormal rows, the directions of the edges; default: the coordinates in alphabetic order.
     space : Space, optional
-        The coordinate plane of a rectangle.
+        The coordinate plane of a rectangle; default: three dimensions.
 
     Returns
     -------
@@ -91,7 +91,7 @@ def box(
     array([1. , 1.5, 2. ])
     """
     frame, body = _frame(np.multiply(0.5, edges), turn, space), SQUARE if space.is_plane else BLOCK
-    return image_of(body, frame, "box " + " x ".join(f"{one:g}" for one in edges))
+    return image_of(body, frame, "box " + " x ".join(f"{edge:g}" for edge in edges))
 
 
 def ellipsoid(
@@ -103,12 +103,12 @@ def ellipsoid(
     Parameters
     ----------
     semi_axes : sequence of 3 floats
-        Half of its diameters; of an ellipse 2.
+        Lengths of the semi-axes, dump's length unit; two for an ellipse.
     turn : array_like, shape (3, 3), optional
-        Orthonormal rows along which they lie, of an ellipse (2, 3); by default the coordinates in
-        alphabetic order.
+        Orthonormal rows, the directions of the semi-axes, shape (2, 3) for an ellipse; default: the
+        coordinates in alphabetic order.
     space : Space, optional
-        The coordinate plane of an ellipse.
+        The coordinate plane of an ellipse; default: three dimensions.
 
     Returns
     -------
@@ -121,14 +121,14 @@ def ellipsoid(
     array([2., 3., 4.])
     """
     name, body = ("ellipse", DISC) if space.is_plane else ("ellipsoid", BALL)
-    size = f"{name} of semi-axes {', '.join(f'{one:g}' for one in semi_axes)}"
+    size = f"{name} of semi-axes {', '.join(f'{axis:g}' for axis in semi_axes)}"
     return image_of(body, _frame(semi_axes, turn, space), size)
 
 
 def _frame(
     sizes: Sequence[float] | FloatArray, turn: npt.ArrayLike | None, space: Space
 ) -> FloatArray:
-    """Columns of these lengths along the rows of a turn; in a plane its normal is the last one."""
+    """Columns of the given lengths along the rows of a turn; in a plane, then its normal."""
     axes = np.eye(3)[sorted(space.along)] if turn is None else turn
     rows = np.multiply(np.asarray(sizes, dtype=float)[:, None], axes)
     return np.column_stack([*rows, *([space.normal] if space.is_plane else [])])
@@ -141,9 +141,9 @@ def cylinder(radius: float, height: float, axis: npt.ArrayLike = (0.0, 0.0, 1.0)
     Parameters
     ----------
     radius, height : float
-        The height is the distance of its ends.
+        Radius, and distance between the two ends, dump's length unit.
     axis : array_like, shape (3,), optional
-        Of any length.
+        Vector of any length along the axis; default: z.
 
     Returns
     -------
@@ -165,21 +165,21 @@ def cylinder(radius: float, height: float, axis: npt.ArrayLike = (0.0, 0.0, 1.0)
 
 def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatArray]:
     """
-    The convex polyhedron that a triangulated surface encloses, about its centroid.
+    The convex polyhedron inside a triangulated surface, moved so that its centroid is the origin.
 
     Parameters
     ----------
     points : ndarray, shape (N, 3)
-        Points at the same place count as one.
+        Corners, dump's length unit; several points may lie at the same place.
     triangles : ndarray of int, shape (T, 3)
-        Rows of the points, in either orientation.
+        Indices into the points, in either orientation.
 
     Returns
     -------
     Convex
         The region.
     ndarray, shape (3,)
-        The centroid, in the coordinates of the points.
+        The centroid in the coordinates of the points.
 
     Raises
     ------
@@ -200,7 +200,7 @@ def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatAr
     rows, triangles = np.unique(triangles, return_inverse=True)
     points = np.asarray(points, dtype=float)[rows]
     tolerance = TOLERANCE * float(np.abs(points).max(initial=0.0))
-    # coordinates about the middle lose less by rounding
+    # coordinates from the middle of the surface lose fewer digits by rounding
     middle = points.mean(axis=0) if len(points) else np.zeros(3)
     points = points - middle
     try:
@@ -209,33 +209,33 @@ def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatAr
         hull = None
     if hull is None or hull.volume < TOLERANCE * extent**3:
         raise SettingsError("the surface encloses no volume: it is flat, or has no faces")
-    # tetrahedra of the triangles with a place inside fill the hull, unless some are missing or
-    # lie within it
+    # The triangles span tetrahedra with a point inside. Together these fill the hull, unless the
+    # surface has holes or dents.
     filled = float(np.abs(np.linalg.det(points[triangles.reshape(-1, 3)])).sum()) / 6.0
     if abs(filled - hull.volume) > 10.0 * tolerance * hull.area:
         raise SettingsError(
-            f"the surface is not closed, or not convex: its faces span {filled / hull.volume:.6g} "
-            f"times the volume of its hull"
+            f"the surface is not closed, or not convex: its faces enclose "
+            f"{filled / hull.volume:.6g} times the volume of its convex hull"
         )
-    # triangles of one face have planes that coincide: the outermost of them is kept
+    # triangles of the same face have nearly the same plane, of which the outermost is kept
     planes = np.column_stack([hull.equations[:, :3], -hull.equations[:, 3]])
     left, kept = planes[np.argsort(-planes[:, 3], kind="stable")], []
     while len(left):
-        kept.append(left[0].copy())  # a view would keep all of what is left
+        kept.append(left[0].copy())  # a view would keep the whole array in memory
         apart = np.abs(left - left[0]) / [1.0, 1.0, 1.0, extent]
         left = left[apart.max(axis=1) > TOLERANCE]
     planes = np.array(kept)
     if len(planes) > MOST_FACES:
         raise SettingsError(
-            f"the surface has {len(planes)} faces, more than {MOST_FACES}, and each of them cuts "
-            f"every line: make it coarser"
+            f"the surface has {len(planes)} faces, expected at most {MOST_FACES}, because every "
+            f"line is cut by every face: make the surface coarser"
         )
-    # the hull as tetrahedra with the origin, which lies inside
+    # the hull is split into tetrahedra that meet at the origin, which lies inside
     corners = points[hull.simplices]
     volume = np.abs(np.linalg.det(corners))
     centroid = volume @ corners.sum(axis=1) / (4.0 * volume.sum())
     planes[:, 3] -= planes[:, :3] @ centroid
-    # each triangle belongs to the plane whose normal is nearest to its own
+    # each triangle is assigned to the plane with the most similar normal
     sides = corners[:, 1:] - corners[:, :1]
     each = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     face = np.argmax(hull.equations[:, :3] @ planes[:, :3].T, axis=1)

@@ -1,13 +1,13 @@
-"""Numbers in messages, as short as is still clear."""
+"""Numbers in messages: as short as possible, but still clear."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 
-def counted(number: int, one: str, several: str = "") -> str:
+def counted(number: int, singular: str, plural: str = "") -> str:
     """
-    A number with the word for what is counted.
+    A number and the word for what is counted, in singular or plural.
 
     Examples
     --------
@@ -15,12 +15,12 @@ def counted(number: int, one: str, several: str = "") -> str:
     >>> counted(1, "grain"), counted(1800, "grain"), counted(2, "axis", "axes")
     ('1 grain', '1800 grains', '2 axes')
     """
-    return f"{number} {one if number == 1 else several or one + 's'}"
+    return f"{number} {singular if number == 1 else plural or singular + 's'}"
 
 
 def shortest(value: float) -> str:
     """
-    The shortest text that reads back as the same number.
+    The shortest text that reads back to the same number.
 
     Examples
     --------
@@ -33,7 +33,7 @@ def shortest(value: float) -> str:
 
 def spelt_place(values: Iterable[float]) -> str:
     """
-    A point or vector to four digits.
+    The components of a point or vector, to four digits.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def spelt_place(values: Iterable[float]) -> str:
 
 def spelt_time(seconds: float) -> str:
     """
-    A time to wait, rounded to about a tenth.
+    A duration with a suitable unit, rounded to about a tenth.
 
     Examples
     --------
@@ -61,7 +61,7 @@ def spelt_time(seconds: float) -> str:
 
 def spelt_apart(value: float, limit: float) -> tuple[str, str]:
     """
-    Two numbers with two digits, or with as many as are needed to tell them apart.
+    Two numbers to two digits, or to as many digits as are needed to tell them apart.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Names for the arrays of the package; shapes and units stand where they are used."""
+"""Types of arrays; functions state shapes and units where they use these types."""
 
 from __future__ import annotations
 
@@ -12,6 +12,6 @@ IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 AnyArray = npt.NDArray[Any]
 Columns = dict[str, AnyArray]
-"""The columns of a table by their names: numbers or texts, a row for each grain or contact."""
+"""Columns by name, numbers or texts, with a row for each grain or contact."""
 RowArray = npt.NDArray[np.integer[Any]]
 """Whole numbers that may be stored in four bytes: rows of grains, images."""

@@ -24,12 +24,12 @@ def contact_fabric(normals: npt.ArrayLike, space: Space = SPACE) -> FabricTensor
     normals : array_like, shape (M, 3)
         Unit normals, dimensionless; their signs do not matter.
     space : Space, optional
-        The plane in which they lie, if the grains are discs.
+        The plane of the normals, if the grains are discs.
 
     Returns
     -------
     FabricTensor or None
-        None if there is no contact.
+        None without contacts.
 
     References
     ----------
@@ -51,10 +51,10 @@ def contact_fabric(normals: npt.ArrayLike, space: Space = SPACE) -> FabricTensor
 
 def axial_error(normals: npt.ArrayLike, axis: npt.ArrayLike, space: Space = SPACE) -> float | None:
     """
-    Standard error of the contact fabric's axial anisotropy, dimensionless.
+    Standard error of the contact fabric's axial anisotropy, for independent contacts.
 
-    The standard deviation of (3(a·n)² - 1)/2 over the contacts, in a plane of 2(a·n)² - 1, divided
-    by √N_c; None for fewer than two contacts.
+    It is the standard deviation of (3(a·n)² - 1)/2 over the contacts, in a plane of 2(a·n)² - 1,
+    divided by √N_c. Dimensionless; None for fewer than two contacts.
     """
     cosine = np.asarray(normals, dtype=np.float64) @ np.asarray(axis, dtype=np.float64)
     return error_of_mean(space.axial(cosine**2))

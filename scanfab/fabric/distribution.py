@@ -1,7 +1,7 @@
 """
-The directional distribution of a scan: an even function on the sphere fitted to the mean lengths.
+Directional distribution of a scan: an even function on the sphere, fitted to mean lengths.
 
-For discs it is an even function on the circle of their plane.
+For discs it is an even function on the unit circle of their plane.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.directions import direction_rule
 
 HIGHEST_DEGREE = 6
-# around a circle
+# number of points around a circle
 POINTS = 180
-# how unevenly directions may cover the sphere for a fit: the ratio of largest to smallest
-# singular value, 1 for even coverage
+# A degree is fitted only if the directions cover the sphere evenly enough: the ratio of largest to
+# smallest singular value, which is 1 for perfectly even coverage, must be below this.
 WORST_COVERAGE = 5.0
 
 
@@ -30,12 +30,12 @@ class EvenFunction:
 
     degree: int
     coefficients: FloatArray
-    """Of functions that are orthonormal on the sphere, the mean of whose squares is 1."""
+    """Coefficients of basis functions that are orthonormal: the mean of each square is 1."""
     space: Space = SPACE
-    """The plane in whose circle the directions lie, if they do."""
+    """The plane of the directions, if the grains are discs."""
 
     def __call__(self, directions: npt.ArrayLike) -> FloatArray:
-        """Values at unit vectors, shape (..., 3) to (...)."""
+        """Values at unit vectors of shape (..., 3); the result has the shape (...)."""
         flat = np.reshape(np.asarray(directions, dtype=np.float64), (-1, 3))
         orthonormal = _orthonormal(self.degree, self.space)
         values = even_polynomials(flat, self.degree, self.space) @ orthonormal @ self.coefficients
@@ -53,16 +53,16 @@ def fit_even(
     axes : ndarray, shape (M, 3)
         Unit vectors.
     values : ndarray, shape (M,)
-        In any unit.
+        Values at the axes, in any unit.
     weights : ndarray, shape (M,)
-        Proportional to the inverse variance of each value.
+        Weights, proportional to the inverse variance of each value.
     space : Space, optional
-        The plane in which the axes lie, if they do.
+        The plane of the axes, if the grains are discs.
 
     Returns
     -------
     EvenFunction
-        Of the highest degree, at most 6, that the axes are enough for.
+        The fit of the highest even degree, at most 6, that the number and spread of axes allow.
 
     Examples
     --------
@@ -77,7 +77,7 @@ def fit_even(
     for degree in range(HIGHEST_DEGREE, -1, -2):
         matrix = even_polynomials(axes, degree, space) @ _orthonormal(degree, space)
         matrix *= root[:, None]
-        # whether the axes are enough, and even enough
+        # are there enough axes, and do they cover the sphere evenly enough?
         if len(matrix) >= matrix.shape[1] and np.linalg.cond(matrix) < WORST_COVERAGE:
             break
     return EvenFunction(degree, np.linalg.lstsq(matrix, values * root, rcond=None)[0], space)
@@ -90,22 +90,22 @@ def mean_length_function(
     space: Space = SPACE,
 ) -> EvenFunction | None:
     """
-    ℓ(n), fitted to the sums of a scan.
+    Fit the mean length of void segments as a function of direction, ℓ(n).
 
     Parameters
     ----------
     axes : ndarray, shape (R, D, 3)
         Unit vectors of each replicate.
     length, segments : ndarray, shape (R, D)
-        Sum of the lengths (dump's unit) and number of one variant's kept segments. For the second
-        moment, sums of squared lengths and of lengths take the places of these two.
+        Total length (dump's unit) and number of the kept segments of a variant. For the second
+        moment, give the sums of squared lengths and of lengths instead.
     space : Space, optional
-        The plane in which the axes lie, if they do.
+        The plane of the axes, if the grains are discs.
 
     Returns
     -------
     EvenFunction or None
-        In the dump's length unit; None if no segment is kept.
+        Function in the dump's length unit; None if no segment is kept.
     """
     kept = segments > 0
     if not kept.any():
@@ -117,9 +117,9 @@ def mean_length_function(
 @cache
 def direction_points(space: Space = SPACE) -> tuple[FloatArray, FloatArray]:
     """
-    Points all over the unit sphere, or around the circle of a plane, and their weights of sum 1.
+    Points on the unit sphere, or on the unit circle of a plane, and their weights.
 
-    Shapes (974, 3) and (974,), or (180, 3) and (180,).
+    The weights sum to 1. Shapes are (974, 3) and (974,), in a plane (180, 3) and (180,).
     """
     if not space.is_plane:
         rule = direction_rule("lebedev:53")
@@ -131,16 +131,17 @@ def direction_points(space: Space = SPACE) -> tuple[FloatArray, FloatArray]:
 
 
 def harmonics_of(degree: int, space: Space) -> int:
-    """How many independent harmonics of a degree there are; of degree 2 those of a tensor."""
+    """Number of independent harmonics of a degree; degree 2 belongs to a second-order tensor."""
     return 2 if space.is_plane else 2 * degree + 1
 
 
 def even_polynomials(axes: FloatArray, degree: int, space: Space) -> FloatArray:
     """
-    A basis of the even functions up to a degree, at unit vectors, shape (M, 3) to (M, functions).
+    Values of a basis of even functions up to a degree, at unit vectors.
 
-    On the sphere the homogeneous polynomials of an even degree are the sums of the even harmonics
-    up to that degree, so monomials are enough; around a circle they are cosines and sines.
+    Shape (M, 3) gives (M, functions). On the sphere the basis is the monomials of the highest
+    degree, because homogeneous polynomials of an even degree span all even harmonics up to it. On
+    the circle the basis is cosines and sines.
     """
     if space.is_plane:
         u, v = space.basis[:2] @ axes.T
@@ -149,14 +150,14 @@ def even_polynomials(axes: FloatArray, degree: int, space: Space) -> FloatArray:
         return np.column_stack([np.ones(len(axes)), np.cos(angles), np.sin(angles)])
     powers = [(i, j, degree - i - j) for i in range(degree + 1) for j in range(degree + 1 - i)]
     i, j, k = np.array(powers).T
-    x, y, z = (np.vander(one, degree + 1, increasing=True) for one in axes.T)
+    x, y, z = (np.vander(coordinate, degree + 1, increasing=True) for coordinate in axes.T)
     design: FloatArray = x[:, i] * y[:, j] * z[:, k]
     return design
 
 
 @cache
 def _orthonormal(degree: int, space: Space) -> FloatArray:
-    """The matrix that makes the polynomials orthonormal on the sphere."""
+    """The matrix that makes the even polynomials orthonormal on the sphere or circle."""
     points, weights = direction_points(space)
     design = even_polynomials(points, degree, space) * np.sqrt(weights)[:, None]
     triangle = np.linalg.qr(design, mode="r")

@@ -1,9 +1,9 @@
 """
-Standard errors: of means, of a sample by a jackknife over its parts, and what they say of blocks.
+Standard errors of means and of samples, and a test whether a sample is homogeneous.
 
-The delete-one jackknife leaves out one part of the sample after the other, and asks how much a
-value moves. That says how far another sample of the same material would differ; the error of the
-scan says nothing of it. Efron and Stein (1981), doi:10.1214/aos/1176345462.
+The delete-one jackknife leaves out each part of the sample in turn and measures how much a value
+changes. This estimates how much other samples of the same material would differ, which the error of
+the scan does not include. Source: Efron and Stein (1981), doi:10.1214/aos/1176345462.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 
 from scanfab.base.typing import BoolArray, FloatArray
 
-# parts of a sample: octants about its centre; of discs the first four, quadrants of their plane
+# number of blocks of a sample: octants about its centre; discs use the first four, as quadrants
 BLOCKS = 8
-# parts of a block without which there is no telling how much they differ, and blocks likewise
+# fewest parts of a block for a standard error, and fewest blocks for the test of homogeneity
 FEWEST_PARTS, FEWEST_BLOCKS = 4, 3
 
 
@@ -28,18 +28,19 @@ def error_of_mean(values: FloatArray) -> float | None:
 
 def jackknife_variance(values: FloatArray, held: BoolArray | bool = True) -> FloatArray:
     """
-    Squared standard error from the values without each of P parts: (P - 1)/P Σ (θ_p - θ̄)².
+    Squared standard error by the delete-one jackknife: (P - 1)/P Σ (θ_p - θ̄)².
 
     Parameters
     ----------
     values : ndarray, shape (P, ...)
-        Without each part.
+        Values θ_p, each computed without one of the P parts.
     held : ndarray of bool, shape (P, ...), optional
-        Which parts hold anything; the others do not count. All by default.
+        Which parts are not empty; empty parts are ignored. Default: all.
 
     Returns
     -------
     ndarray, shape (...)
+        In the unit of the values squared.
 
     Examples
     --------
@@ -59,60 +60,60 @@ def jackknife_variance(values: FloatArray, held: BoolArray | bool = True) -> Flo
 
 def variance_without_noise(values: FloatArray, held: BoolArray | bool = True) -> FloatArray:
     """
-    Jackknife variance of the mean over replicates, without what their own noise adds.
+    Jackknife variance of the mean over replicates, minus the noise of the scan.
 
     Parameters
     ----------
     values : ndarray, shape (P, R, ...)
-        Without each of P parts, in each of R replicates, which have the parts in common.
+        Values without each of P parts, in each of R replicates of the scan.
     held : ndarray of bool, shape (P, ...), optional
-        Which parts hold anything; all by default.
+        Which parts are not empty. Default: all.
 
     Returns
     -------
     ndarray, shape (...)
-        Unbiased, so negative at times where the noise is the larger part. With one replicate the
-        noise is not known and stays in.
+        Unbiased variance, which may be negative if noise dominates. A single replicate does not
+        show its noise, so nothing is subtracted.
     """
     count = values.shape[1]
     of_mean = jackknife_variance(values.mean(axis=1), held)
     if count == 1:
         return of_mean
-    # of one replicate: the sample's scatter, and R times the noise that the mean has
+    # the variance of a single replicate has the sample's scatter plus R times the mean's noise
     in_each = held if isinstance(held, bool) else held[:, None]
     of_single = jackknife_variance(values, in_each).mean(axis=0)
     return np.asarray((count * of_mean - of_single) / (count - 1))
 
 
 class Jackknife(NamedTuple):
-    """A value of the sample without each of its P parts."""
+    """How a value of the sample changes when each of its P parts is left out."""
 
     shift: FloatArray
-    """By how much leaving out each part moves the value, shape (P,)."""
+    """Change of the value when each part is left out, shape (P,)."""
     error: float | None
-    """The standard error that follows; None if the scan's noise hides it."""
+    """Standard error due to the sample; None if it is hidden by the noise of the scan."""
     half: FloatArray
     """
-    How far the first replicate lies above the mean of all, without each part: of two replicates
-    half their difference. Shape (P,).
+    First replicate minus the mean of all replicates, without each part, shape (P,).
 
-    From these the noise of the scan is known in whatever is made of several frames, such as a
-    slope. 0 where nothing is scanned, as for contacts.
+    For two replicates this is half their difference. It shows the noise of the scan in results
+    from several frames, such as a slope. It is 0 for values that need no scan, as of contacts.
     """
 
 
 def jackknife(values: FloatArray) -> Jackknife:
     """
-    The standard error of the sample, from a value of the whole and without each part.
+    Standard error due to the sample, from values with and without each part.
 
-    The noise that the scan adds to the scatter between parts is known from its replicates, and
-    taken off. If nothing is left there is no error: the lines are too few to see it, which is no
-    proof that there is none.
+    The replicates show how much noise the scan adds to the scatter between parts; this noise is
+    subtracted. If nothing remains, the error is None: the scan has too few lines to resolve it,
+    which does not mean that it is 0.
 
     Parameters
     ----------
     values : ndarray, shape (1 + P, R)
-        Of the whole, then without each part, in each replicate; R is 1 where nothing is scanned.
+        Value of the whole sample, then without each part, in each replicate; R is 1 for values that
+        need no scan.
 
     Examples
     --------
@@ -132,19 +133,19 @@ def jackknife(values: FloatArray) -> Jackknife:
 
 def part_errors(values: FloatArray, held: BoolArray) -> FloatArray:
     """
-    Standard errors from the values without each part, without what the scan's noise adds.
+    Standard errors of blocks by a jackknife over their parts, without the noise of the scan.
 
     Parameters
     ----------
     values : ndarray, shape (R, B, P)
-        Of each replicate; all have the same parts.
+        Values of B blocks without each of their P parts, in R replicates of the scan.
     held : ndarray of bool, shape (B, P)
-        The parts that hold anything.
+        Which parts are not empty.
 
     Returns
     -------
     ndarray, shape (B,)
-        NaN where too few parts hold anything, or the noise hides the scatter.
+        NaN for a block with fewer than four filled parts, or if noise hides the scatter.
 
     Examples
     --------
@@ -157,12 +158,12 @@ def part_errors(values: FloatArray, held: BoolArray) -> FloatArray:
     True
     """
     variance = variance_without_noise(np.moveaxis(values, -1, 0), held.T)
-    known = (held.sum(axis=1) >= FEWEST_PARTS) & (variance > 0)
-    return np.sqrt(np.where(known, variance, np.nan))
+    usable = (held.sum(axis=1) >= FEWEST_PARTS) & (variance > 0)
+    return np.sqrt(np.where(usable, variance, np.nan))
 
 
 def ratio_with_errors(over: FloatArray, under: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Σ over / Σ under and its errors, shape (B,), from sums over each part, shape (B, P)."""
+    """Ratio of totals and its standard error, shape (B,), from sums over parts, shape (B, P)."""
     above, below = over.sum(axis=1, keepdims=True), under.sum(axis=1, keepdims=True)
     rest = ratio(above - over, below - under)
     held = (under > 0) & np.isfinite(rest)
@@ -170,7 +171,7 @@ def ratio_with_errors(over: FloatArray, under: FloatArray) -> tuple[FloatArray, 
 
 
 def ratio(over: FloatArray, under: FloatArray) -> FloatArray:
-    """NaN where there is nothing to divide by."""
+    """Quotient; NaN where the divisor is not above 0."""
     return np.where(under > 0, over / np.where(under > 0, under, 1.0), np.nan)
 
 
@@ -178,9 +179,9 @@ class Homogeneity(NamedTuple):
     """Whether blocks scatter more than their errors explain."""
 
     ratio: float
-    """Scatter of the blocks over what their errors explain; about 1 in homogeneous samples."""
+    """√F, the scatter of the blocks relative to their errors; about 1 in homogeneous samples."""
     chance: float
-    """Probability that the blocks of a homogeneous sample scatter as much or more."""
+    """p-value: the probability of at least this scatter if the sample is homogeneous."""
     blocks: int
     """Number of blocks."""
 
@@ -189,28 +190,29 @@ def homogeneity_of(
     values: FloatArray, variances: FloatArray, weights: FloatArray, freedom: float
 ) -> Homogeneity | None:
     """
-    Whether values of blocks scatter more than their errors explain: an analysis of variance.
+    Test whether blocks scatter more than their errors explain, by an analysis of variance.
 
     With weights w of the sum W, and x̄ = Σ w x / W, the variance ratio is
-    F = Σ w (x - x̄)² / Σ w (1 - w/W) v. Both sums have the same expectation where all blocks have
-    one and errors are right; F then follows Fisher's distribution (Fisher 1925) with B - 1 degrees
-    of freedom and those of the pooled errors, after Satterthwaite (1946), doi:10.2307/3002019.
+    The statistic is F = Σ w (x - x̄)² / Σ w (1 - w/W) v, with W = Σ w. Both sums have the same
+    expected value if all blocks have the same true value x and the errors are right. F then follows
+    Fisher's distribution (Fisher 1925). Its degrees of freedom are B - 1 and those of the pooled
+    errors, by Satterthwaite (1946), doi:10.2307/3002019.
 
     Parameters
     ----------
     values : ndarray, shape (B,)
-        Of the blocks.
+        Values x of the blocks.
     variances : ndarray, shape (B,)
-        Squared standard errors v; NaN where there is none: such blocks are left out.
+        Squared standard errors v; blocks with NaN are left out.
     weights : ndarray, shape (B,)
-        About proportional to what the inverse of v is expected to be.
+        Weights w, roughly proportional to the expected inverse of v.
     freedom : float
         Degrees of freedom of each variance.
 
     Returns
     -------
     Homogeneity or None
-        None of fewer than three blocks.
+        None for fewer than three blocks.
 
     Examples
     --------
@@ -224,11 +226,11 @@ def homogeneity_of(
     >>> homogeneity_of(shifted, *words).chance < 0.001
     True
     """
-    # imported here because few scans need it
+    # imported here because only maps need it
     from scipy.special import fdtrc
 
-    known = np.isfinite(values) & np.isfinite(variances) & (variances > 0) & (weights > 0)
-    values, variances, weights = values[known], variances[known], weights[known]
+    usable = np.isfinite(values) & np.isfinite(variances) & (variances > 0) & (weights > 0)
+    values, variances, weights = values[usable], variances[usable], weights[usable]
     count = len(values)
     if count < FEWEST_BLOCKS:
         return None
@@ -237,7 +239,7 @@ def homogeneity_of(
     parts = share * (1.0 - share) * variances
     within = float(parts.sum())
     pooled = freedom * within**2 / float(np.sum(parts**2))
-    # squares of variances that are themselves uncertain are too large by this in the mean
+    # the expected square of an estimated variance exceeds the square of the true one by this factor
     pooled *= 1.0 + 2.0 / freedom
     statistic = between / within
     return Homogeneity(np.sqrt(statistic), float(fdtrc(count - 1, pooled, statistic)), count)

@@ -1,11 +1,11 @@
 """
 Harmonics of orders 2 and 4 of void lengths and contact normals, and their fourth-order tensors.
 
-a_l = (2l + 1) <P_l(a·n)> about the loading axis a, with the Legendre polynomials P_l: the
-coefficients of the distribution E(n) = 1/4π (1 + a_2 P_2 + a_4 P_4 + ...). Of discs, at the angle θ
-to the axis, a_l = 2 <cos lθ>, of E = 1/2π (1 + a_2 cos 2θ + ...). For contacts the mean
-is over them, for voids it is weighted with ℓ(n). Kanatani (1984),
-doi:10.1016/0020-7225(84)90090-9, has the tensors of any order.
+The harmonics are a_l = (2l + 1) <P_l(a·n)> about the loading axis a, with the Legendre polynomials
+P_l. They are coefficients of the distribution E(n) = 1/4π (1 + a_2 P_2 + a_4 P_4 + ...). For discs,
+with θ the angle to the axis, a_l = 2 <cos lθ> and E = 1/2π (1 + a_2 cos 2θ + ...). The mean <...>
+runs over the contacts, or for voids over all directions with the weight ℓ(n). Source for the
+tensors: Kanatani (1984), doi:10.1016/0020-7225(84)90090-9.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from scanfab.fabric.errors import error_of_mean
 from scanfab.fabric.measured import Measured
 
 ORDERS = (2, 4)
-FOURTH = "Σ w ℓ nnnn / Σ w ℓ: 81 numbers, the last index counts fastest; in JSON only"
+FOURTH = "81 numbers, of which the last index changes fastest; in JSON only"
 
 
 def harmonic(order: int, cosine: FloatArray, space: Space = SPACE) -> FloatArray:
     """
-    What a_l has the mean of: the Legendre polynomial P_l, of discs cos lθ.
+    The function that a harmonic averages: the Legendre polynomial P_l, for discs cos lθ.
 
     Parameters
     ----------
     order : int
-        l, 2 or 4.
+        Order l, 2 or 4.
     cosine : ndarray
-        Of the angle to the axis.
+        Cosine of the angle between direction and axis, of any shape.
     space : Space, optional
-        The plane in which the directions lie, if they do.
+        The plane of the directions, if the grains are discs.
 
     Returns
     -------
     ndarray
-        Of the same shape.
+        Values, in the shape of the cosines.
 
     Examples
     --------
@@ -52,7 +52,7 @@ def harmonic(order: int, cosine: FloatArray, space: Space = SPACE) -> FloatArray
     (array([-0.5]), array([-1.]))
     """
     square = cosine**2
-    # P_2, in a plane cos 2θ
+    # P_2, or in a plane cos 2θ
     second: FloatArray = space.axial(square)
     if order == 4 and space.is_plane:
         return 2.0 * second**2 - 1.0
@@ -68,12 +68,12 @@ def tensor4(vectors: FloatArray, weights: FloatArray) -> FloatArray:
     vectors : ndarray, shape (M, 3)
         Unit vectors.
     weights : ndarray, shape (M,)
-        Of any sum.
+        Weights with any sum above 0.
 
     Returns
     -------
     ndarray, shape (3, 3, 3, 3)
-        Symmetric in all its indices; twice contracted it has trace 1.
+        Symmetric in all indices; the trace over both pairs of indices is 1.
 
     References
     ----------
@@ -88,12 +88,12 @@ def tensor4(vectors: FloatArray, weights: FloatArray) -> FloatArray:
     np.float64(0.5)
     """
     pairs = np.einsum("ci,cj->cij", vectors, vectors).reshape(-1, 9)
-    found: FloatArray = (weights[:, None] * pairs).T @ pairs / weights.sum()
-    return found.reshape(3, 3, 3, 3)
+    tensor: FloatArray = (weights[:, None] * pairs).T @ pairs / weights.sum()
+    return tensor.reshape(3, 3, 3, 3)
 
 
 class Harmonics:
-    """The columns of the harmonics; those of the tensors are in JSON alone."""
+    """Columns of the harmonics, and of the tensors, which only JSON can hold."""
 
     columns = (
         *numbers(
@@ -102,40 +102,38 @@ class Harmonics:
                 for name, what in (("vs", "the mean void lengths"), ("c", "the contact normals"))
                 for order in ORDERS
                 for suffix, meaning in (
-                    ("", f"order {order} of {what} about the axis"),
+                    ("", f"harmonic of order {order} of {what} about the loading axis"),
                     ("_se", "its standard error"),
                 )
             }
         ),
-        Column("vs_tensor4", list, "", f"void fabric tensor of fourth order, {FOURTH}"),
-        Column(
-            "c_tensor4", list, "", "contact fabric tensor of fourth order, likewise; in JSON only"
-        ),
+        Column("vs_tensor4", list, "", f"fourth-order void fabric Σ w ℓ nnnn / Σ w ℓ: {FOURTH}"),
+        Column("c_tensor4", list, "", f"fourth-order contact fabric (1/N_c) Σ nnnn: {FOURTH}"),
     )
 
     def values(self, measured: Measured) -> dict[str, Any]:
-        """All None of a fabric that does not exist."""
-        found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
+        """Values by column; None for a fabric that does not exist."""
+        row: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
         void, axis, space, normals = measured.void, measured.axis, measured.space, measured.normals
-        # what each order is the mean of
+        # values whose mean is a harmonic, by the name of its column
         each: dict[str, FloatArray] = {}
         if void is not None:
             weights = void.weights * void.mean_lengths
             weights = weights / weights.sum(axis=1, keepdims=True)
             for order in ORDERS:
-                # in a plane a rule of fewer steps cannot tell this order from others
+                # in a plane, a rule of too few angles mixes this order with others
                 if not space.is_plane or void.axes.shape[1] >= order // 2 + 2:
-                    # the error is that of the replicates, as for the tensor
+                    # the error follows from the scatter of the replicates, as for the tensor
                     means = np.sum(weights * harmonic(order, void.axes @ axis, space), axis=1)
                     each[f"vs_a{order}"] = harmonics_of(order, space) * means
             tensor = tensor4(void.axes.reshape(-1, 3), weights.ravel())
-            found["vs_tensor4"] = tensor.ravel().tolist()
+            row["vs_tensor4"] = tensor.ravel().tolist()
         if len(normals):
             for order in ORDERS:
-                # the error is that of a mean over independent contacts
+                # the error is that of the mean over independent contacts
                 values = harmonic(order, normals @ axis, space)
                 each[f"c_a{order}"] = harmonics_of(order, space) * values
-            found["c_tensor4"] = tensor4(normals, np.ones(len(normals))).ravel().tolist()
+            row["c_tensor4"] = tensor4(normals, np.ones(len(normals))).ravel().tolist()
         for name, values in each.items():
-            found |= {name: float(values.mean()), f"{name}_se": error_of_mean(values)}
-        return found
+            row |= {name: float(values.mean()), f"{name}_se": error_of_mean(values)}
+        return row

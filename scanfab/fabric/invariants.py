@@ -1,11 +1,11 @@
 """
 Invariants of the fabric tensors: F = 15/2 (G - I/3), a = √(3/2 F:F), principal values and axes, b.
 
-Of discs F = 4 (G - I/2), a = √(1/2 F:F), and there is no b.
+For discs F = 4 (G - I/2) and a = √(1/2 F:F), and b does not exist.
 
-Kanatani (1984), doi:10.1016/0020-7225(84)90090-9: F is the second order of the distribution of
-directions 1/4π (1 + n·F·n). a is never negative: in an isotropic sample it is what the scatter of
-its few contacts or segments makes it, and the columns ``_bias`` say how much that is.
+F is the second order of the distribution of directions 1/4π (1 + n·F·n) (Kanatani 1984,
+doi:10.1016/0020-7225(84)90090-9). The intensity a is never negative, so noise raises it: even in an
+isotropic sample it is above 0. The columns ``_bias`` give its expected value there.
 """
 
 from __future__ import annotations
@@ -22,20 +22,21 @@ from scanfab.fabric.errors import error_of_mean
 from scanfab.fabric.measured import Measured
 from scanfab.fabric.tensor import FABRICS, FabricTensor, of_both
 
-# By dimension: components of a tensor's deviator, and the variance of each of n⊗n, of a unit vector
-# n that has any direction alike.
+# By dimension: number of independent components of a tensor's deviator, and variance of each of
+# these components of n⊗n for a unit vector n of random direction.
 COMPONENTS_OF_DEVIATOR = {3: 5, 2: 2}
 CONTACT_VARIANCE = {3: 2.0 / 15.0, 2: 0.25}
-# b says nothing where largest and smallest principal value differ by less, over √N
+# b is not given if the largest and smallest principal value differ by less than this over √N
 LEAST_ALPHA = 3.0
 
 
 def bias_of(space: Space) -> float:
     """
-    What components of a standard deviation of 1 make of a in an isotropic sample.
+    Expected intensity a of an isotropic sample whose tensor components have standard error 1.
 
-    They are of equal variance, so that a is √(3/2) · 15/2 times the root of the sum of their
-    squares, which is the mean of chi with five degrees of freedom, 2.1277; in a plane with two.
+    The five components of the deviator have equal variance. The root of the sum of their squares
+    follows the chi distribution with five degrees of freedom, whose mean is 2.1277, and a is
+    √(3/2) · 15/2 times this root. In a plane there are two components.
     """
     freedom = COMPONENTS_OF_DEVIATOR[space.dimension]
     mean_chi = math.sqrt(2.0) * math.gamma(0.5 * (freedom + 1)) / math.gamma(0.5 * freedom)
@@ -44,14 +45,14 @@ def bias_of(space: Space) -> float:
 
 def fabric_deviator(matrix: FloatArray, space: Space = SPACE) -> FloatArray:
     """
-    F = 15/2 (G - I/3), of discs 4 (G - I/2).
+    The fabric deviator F = 15/2 (G - I/3), for discs F = 4 (G - I/2).
 
     Parameters
     ----------
     matrix : ndarray, shape (..., 3, 3)
-        Fabric tensors of trace 1.
+        Fabric tensors G of trace 1.
     space : Space, optional
-        The plane that they are of, if they are.
+        The plane of the tensors, if the grains are discs.
 
     Returns
     -------
@@ -73,21 +74,22 @@ def fabric_deviator(matrix: FloatArray, space: Space = SPACE) -> FloatArray:
 
 def intensity(matrix: FloatArray, space: Space = SPACE) -> float:
     """
-    a = √(3/2 F:F), which is 7.5 |alpha_axial| for transverse isotropy about the axis.
+    The intensity of anisotropy, a = √(3/2 F:F).
 
-    Of discs a = √(1/2 F:F), which is 2 alpha.
+    For transverse isotropy about the loading axis, a is 7.5 |alpha_axial|. For discs it is
+    a = √(1/2 F:F) = 2 alpha.
 
     Parameters
     ----------
     matrix : ndarray, shape (3, 3)
         Fabric tensor of trace 1.
     space : Space, optional
-        The plane that it is of, if it is.
+        The plane of the tensor, if the grains are discs.
 
     Returns
     -------
     float
-        0 or more.
+        Dimensionless, 0 or more.
 
     Examples
     --------
@@ -99,81 +101,83 @@ def intensity(matrix: FloatArray, space: Space = SPACE) -> float:
     return float(math.sqrt(space.intensity) * np.linalg.norm(fabric_deviator(matrix, space)))
 
 
-ERRORS = {"vs": "of the scan", "c": "if contacts were independent"}
-BIAS = {"vs": "the noise of this scan", "c": "as many independent contacts"}
-DISCS = "of discs √(1/2 F:F), F = 4 (G - I/2)"
+ERRORS = {"vs": "due to the scan", "c": "for independent contacts"}
+BIAS = {"vs": "from the noise of this scan", "c": "with as many independent contacts"}
+DISCS = "for discs √(1/2 F:F), F = 4 (G - I/2)"
 
 
 class Invariants:
-    """The columns of the invariants."""
+    """Columns of the invariants of both fabric tensors."""
 
     columns = (
         *of_both("f_{0}", f"a = √(3/2 F:F) of the {{1}}, F = 15/2 (G - I/3); {DISCS}"),
-        *of_both("f_{0}_bias", "what {1} would give f_{0} in the mean", BIAS),
+        *of_both("f_{0}_bias", "expected value of f_{0} in an isotropic sample {1}", BIAS),
         *numbers(
             {
-                f"g{one}_{k}": f"principal value of the {what}, {which}"
-                for one, what in FABRICS.items()
+                f"g{fabric}_{k}": f"principal value of the {what}, {which}"
+                for fabric, what in FABRICS.items()
                 for k, which in ((1, "the largest"), (2, "the middle one"), (3, "the smallest"))
             }
         ),
         *of_both(
             "b_{0}",
-            "(G2 - G3)/(G1 - G3) of the {1}, 0 to 1; empty where G1 - G3 is below 3/√N, and of "
-            "discs",
+            "(G2 - G3)/(G1 - G3) of the {1}, 0 to 1; empty if G1 - G3 is below 3/√N, and for discs",
         ),
         *numbers(
             {
                 f"{name}_se": f"standard error of {name}, {what}"
-                for one, what in ERRORS.items()
-                for name in (f"f_{one}", *(f"g{one}_{k}" for k in (1, 2, 3)))
+                for fabric, what in ERRORS.items()
+                for name in (f"f_{fabric}", *(f"g{fabric}_{k}" for k in (1, 2, 3)))
             }
         ),
     )
 
     def values(self, measured: Measured) -> dict[str, Any]:
-        """All None of a fabric that does not exist."""
-        found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
+        """Values by column; None for a fabric that does not exist."""
+        row: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
         space, void, contact = measured.space, measured.void, measured.contact
         if void is not None:
             tensors = void.replicates
-            found |= _values("vs", void.tensor, measured.segment_count, tensors)
+            row |= _values("vs", void.tensor, measured.segment_count, tensors)
             if len(tensors) > 1:
-                # all are of trace 1, so the components of the deviator share what there is of
-                # variance in the mean of the replicates
+                # All replicates have trace 1, so only the deviator scatters. Its independent
+                # components share the variance of the mean over the replicates.
                 freedom = COMPONENTS_OF_DEVIATOR[space.dimension]
                 variance = float(np.sum(np.var(tensors, axis=0, ddof=1))) / freedom / len(tensors)
-                found["f_vs_bias"] = bias_of(space) * math.sqrt(variance)
+                row["f_vs_bias"] = bias_of(space) * math.sqrt(variance)
         if contact is not None:
             n, count = measured.normals, len(measured.normals)
-            found |= _values("c", contact, count, np.einsum("ci,cj->cij", n, n))
+            row |= _values("c", contact, count, np.einsum("ci,cj->cij", n, n))
             variance = CONTACT_VARIANCE[space.dimension] / count
-            found["f_c_bias"] = bias_of(space) * math.sqrt(variance)
-        return found
+            row["f_c_bias"] = bias_of(space) * math.sqrt(variance)
+        return row
 
 
 def _values(
     name: str, tensor: FabricTensor, count: int, each: FloatArray
 ) -> dict[str, float | None]:
     """
-    a, the principal values and b with their errors.
+    Intensity, principal values and b of a tensor, with standard errors.
 
-    G is the mean of each tensor, shape (M, 3, 3), and to first order a and the principal values are
-    linear in G: values of a form A, A:G. ``count`` is the number of segments or contacts.
+    The tensor G is the mean of the tensors ``each``, shape (M, 3, 3). To first order, a and the
+    principal values are linear in G: each has a matrix A so that its change is A:dG. The standard
+    error is that of the mean of A:G over ``each``. ``count`` is the number of segments or contacts.
     """
     space, (largest, middle, smallest) = tensor.space, tensor.principal_values.tolist()
-    found: dict[str, float | None] = {
+    row: dict[str, float | None] = {
         f"f_{name}": intensity(tensor.matrix, space),
-        **{f"g{name}_{k}": one for k, one in enumerate((largest, middle, smallest), start=1)},
+        **{f"g{name}_{k}": value for k, value in enumerate((largest, middle, smallest), start=1)},
     }
     alpha = largest - smallest
     if count > 0 and not space.is_plane and alpha >= LEAST_ALPHA / math.sqrt(count):
-        found[f"b_{name}"] = (middle - smallest) / alpha
-    forms = {f"g{name}_{k}": np.outer(one, one) for k, one in enumerate(tensor.principal_axes, 1)}
+        row[f"b_{name}"] = (middle - smallest) / alpha
+    forms = {
+        f"g{name}_{k}": np.outer(axis, axis) for k, axis in enumerate(tensor.principal_axes, 1)
+    }
     deviator = fabric_deviator(tensor.matrix, space)
     size = float(np.linalg.norm(deviator))
     if size > 0.0:
         forms[f"f_{name}"] = math.sqrt(space.intensity) * space.second_order * deviator / size
     for of, form in forms.items():
-        found[f"{of}_se"] = error_of_mean(np.einsum("cij,ij->c", each, form))
-    return found
+        row[f"{of}_se"] = error_of_mean(np.einsum("cij,ij->c", each, form))
+    return row

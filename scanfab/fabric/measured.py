@@ -1,4 +1,4 @@
-"""What fabrics are computed from: the scan and the contacts of one frame, variant and cut-off."""
+"""Input of all fabrics: scan and contacts of one frame, variant and cut-off."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from scanfab.fabric.errors import Jackknife, jackknife
 from scanfab.fabric.tensor import FabricTensor, axial
 from scanfab.fabric.void import VoidFabric, void_fabric
 
-# of √(3/2 s:s), s the stress's deviator, to p, below which the stress has no direction
+# A stress with √(3/2 s:s) below this fraction of p, s its deviator, counts as isotropic.
 LEAST_RATIO = 0.02
 
 
@@ -24,51 +24,52 @@ class ContactForces(NamedTuple):
     """Forces and branches of the contacts of one variant."""
 
     branch: FloatArray
-    """From the first grain's centre to the second's, along the normal; shape (M,), a length."""
+    """Distance between the two grain centres along the normal, dump's length unit, shape (M,)."""
     force_n: FloatArray
-    """Normal force, compression positive; shape (M,), dump's force unit."""
+    """Normal force, compression positive, dump's force unit, shape (M,)."""
     force: FloatArray | None
-    """On the second grain, shape (M, 3); None where only its normal part is known."""
+    """Force on the second grain, shape (M, 3); None if the dump has only the normal part."""
 
 
 class BlockedSums(NamedTuple):
     """
-    A scan whose void segments are told apart by the block of the sample that their middle is in.
+    Sums of a scan over all blocks of the sample, and without each block.
 
-    Sums are lengths (dump's unit) and numbers of the kept segments, each of shape (R, D).
+    A void segment belongs to the block that its middle lies in. Sums are total length (dump's unit)
+    and number of the kept segments, each of shape (R, D).
     """
 
     axes: FloatArray
     """Unit vectors of each replicate, shape (R, D, 3)."""
     weights: FloatArray
-    """Of the direction rule, shape (D,)."""
+    """Weights of the direction rule, shape (D,)."""
     full: tuple[FloatArray, FloatArray | IntArray]
-    """Of all blocks."""
+    """Sums over all blocks."""
     without: list[tuple[FloatArray, FloatArray | IntArray]]
-    """Of all but one block, for each of them."""
+    """For each block, sums over all other blocks."""
 
 
 class SampleState(NamedTuple):
     """Void ratio, coordination and stress of the sample."""
 
     void_ratio: float | None
-    """Volume of the voids over that of the grains; None without a volume."""
+    """Volume of the voids over volume of the grains; None if the volume is unknown."""
     coordination_mechanical: float | None
-    """Mean number of contacts of the grains that have two or more."""
+    """Mean number of contacts of the grains with two or more contacts."""
     stress: FloatArray | None
-    """Shape (3, 3), compression positive; None without forces, or without a volume."""
+    """Stress, compression positive, shape (3, 3); None without forces or a volume."""
     space: Space = SPACE
-    """The plane of the sample, if its grains are discs: stress is a force over a length there."""
+    """The plane of the sample if its grains are discs; there stress is a force over a length."""
 
     @property
     def mean_stress(self) -> float:
-        """The pressure p."""
+        """The mean stress p."""
         assert self.stress is not None
         return float(np.trace(self.stress)) / self.space.dimension
 
     @property
     def direction(self) -> FloatArray | None:
-        """The stress deviator over its norm; None for a stress that is nearly isotropic."""
+        """The stress deviator over its norm, shape (3, 3); None if it is nearly isotropic."""
         if self.stress is None:
             return None
         mean = self.mean_stress
@@ -82,60 +83,60 @@ class SampleState(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What fabrics are computed from, and results that several of them share."""
+    """Input of all fabrics, and results that several fabrics share."""
 
     axis: FloatArray
     """Loading axis, a unit vector, shape (3,)."""
     axes: FloatArray
-    """Unit vectors along which each replicate was scanned, shape (R, D, 3)."""
+    """Unit vectors of the scan in each replicate, shape (R, D, 3)."""
     weights: FloatArray
-    """Of the direction rule, shape (D,)."""
+    """Weights of the direction rule, shape (D,)."""
     length: FloatArray
     """
-    Sum of the lengths of the kept void segments, shape (R, D), dump's length unit.
+    Total length of the kept void segments, shape (R, D), dump's length unit.
 
-    For the second moment (option `moment`) the sum of their squares, in that unit squared.
+    For the second moment (option `moment`), the sum of squared lengths, in that unit squared.
     """
     segments: FloatArray | IntArray
     """
     Number of the kept void segments, shape (R, D).
 
-    For the second moment the sum of their lengths, dump's length unit.
+    For the second moment, the sum of their lengths, dump's length unit.
     """
     meets_solids: bool
-    """Whether the lines may meet any solid: a window in which there is none has no void fabric."""
+    """Whether any solid lies where the lines run; without a solid there is no void fabric."""
     blocked: BlockedSums
-    """The same sums of other lines of the frame, without each block of the sample."""
+    """Sums without each block of the sample, from other lines in the same frame."""
     normals: FloatArray
     """Unit normals of the contacts, shape (M, 3)."""
     points: FloatArray
-    """Where these contacts are, shape (M, 3), dump's length unit."""
+    """Contact points, shape (M, 3), dump's length unit."""
     blocks: IntArray
-    """In which block of the sample each of these contacts is, from 0, shape (M,)."""
+    """Block of the sample that each contact point lies in, from 0, shape (M,)."""
     space: Space = SPACE
-    """The plane in which all lies, if the grains are discs."""
+    """The plane of the sample, if the grains are discs."""
     segment_count: int = 0
     """Number of the kept void segments of all replicates."""
     forces: ContactForces | None = None
-    """Forces of these contacts; None if they are unknown or not asked for."""
+    """Forces of the contacts; None if they are unknown or not needed."""
     state: SampleState | None = None
-    """Stress and void ratio, where they are asked for."""
+    """Stress and void ratio; None if they are not needed."""
 
     @cached_property
     def void(self) -> VoidFabric | None:
-        """The void fabric; None if there is none."""
+        """The void fabric; None if the lines meet no solid or some axis keeps no segment."""
         if not self.meets_solids:
             return None
         return void_fabric(self.axes, self.weights, self.length, self.segments, self.space)
 
     @cached_property
     def contact(self) -> FabricTensor | None:
-        """The contact fabric; None without a contact."""
+        """The contact fabric; None without contacts."""
         return contact_fabric(self.normals, self.space)
 
     @cached_property
     def void_scatter(self) -> Jackknife | None:
-        """The void fabric's anisotropy without each block; None if one lacks a fabric."""
+        """Axial anisotropy of the void fabric without each block; None if any does not exist."""
         if self.void is None:
             return None
         axes, weights, full, without = self.blocked
@@ -149,7 +150,7 @@ class Measured:
 
     @cached_property
     def contact_scatter(self) -> Jackknife | None:
-        """The contact fabric's anisotropy without each block; None if one has all contacts."""
+        """Axial anisotropy of contacts without each block; None if a block has all contacts."""
         count = 2**self.space.dimension
         along = self.space.axial((self.normals @ self.axis) ** 2)
         left = len(along) - np.bincount(self.blocks, minlength=count)

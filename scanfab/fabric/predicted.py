@@ -1,28 +1,31 @@
 """
-The void fabric without a scan: as the window alone gives it, and as the contacts predict it.
+Void fabric without a scan: as the window alone makes it, and as the contacts predict it.
 
-**The window.** A line that is clipped to a window W loses long segments, the more the shorter its
-piece in W is, so that ℓ(n) depends on the shape of W as it is seen along n. Freely overlapping
-grains (a Poisson medium, Matheron 1975, Random Sets and Integral Geometry) have segments of the
-mean length c + 1/β above a cut-off c, whatever the direction; clipped to W
+**Window.** Clipping a line to a window W cuts long segments short, especially if the piece of the
+line in W is short. Thus ℓ(n) depends on the shape of W along n even in an isotropic medium. In a
+medium of freely overlapping grains (Poisson medium, Matheron 1975, Random Sets and Integral
+Geometry) segments above a cut-off c have the mean length c + 1/β in every direction. Clipped to W,
+they have
 
     ℓ(n) = c + A₁ / (A₀ + β A₁),    A₁ = g(c; n),    A₀ = -dg/dz(c; n),
 
-with g(z; n) the volume that W has in common with itself moved by z n; in a plane the area.
+where g(z; n) is the volume (in a plane the area) that W shares with a copy moved by z n.
 
-**The contacts.** In a medium that is the same everywhere the mean length of void segments is
+**Contacts.** In a statistically homogeneous medium the mean length of void segments is
 
     ℓ(n; c) = c + L / N,    N(n; c) = (Σ π r² - Σ 2 π R* |μ| (c |μ| + δ)⁺) / V,
 
-with N the number of gaps of at least c along n, per volume and per cross-section of a line, and
-L = φ - ∫ N dc from 0 to c the share of the volume in which a segment of length c along n may begin,
-φ the porosity. The second sum goes over pairs of grains whose surfaces are near: μ = n·m with the
-normal m, overlap δ (below 0: a gap), R* = r1 r2 / (r1 + r2), x⁺ = max(x, 0). An overlap removes
-gaps, a contact adds short ones that the cut-off drops: both more along the normal than across it.
-Of discs the sums are Σ 2 r and Σ 2 |μ| √(2 R* (c |μ| + δ)⁺), over an area.
+where N is the number of gaps of at least c along n, per volume and per cross-section of a line.
+L = φ - ∫ N dc, from 0 to c and with the porosity φ, is the fraction of the volume in which a
+segment of length c along n may begin. The second sum runs over pairs of grains whose surfaces are
+near: μ = n·m with the normal m, overlap δ (negative: a gap), R* = r1 r2 / (r1 + r2) and
+x⁺ = max(x, 0). An overlap removes gaps, and a contact adds short gaps, which the cut-off drops;
+both happen more along the normal than across it. For discs the sums are Σ 2 r and
+Σ 2 |μ| √(2 R* (c |μ| + δ)⁺), over an area.
 
-The surfaces count as parabolas, so it holds for short gaps only: of sheared samples the anisotropy
-is right within 15 % without a cut-off, and a quarter too large at 0.3 of the smallest radius.
+The surfaces are approximated by parabolas, which holds for short gaps only. For sheared samples the
+anisotropy is right within 15 % without a cut-off, and 25 % too large at a cut-off of 0.3 times the
+smallest radius.
 """
 
 from __future__ import annotations
@@ -38,17 +41,18 @@ from scanfab.fabric.void import VoidFabric
 from scanfab.packing.search import NearPairs
 from scanfab.scan.directions import rule_of
 
-# in smallest radii: for longer ones the surfaces are no parabolas
+# longest cut-off, in smallest radii, for which the surfaces may be taken as parabolas
 LONGEST_GAP = 0.3
-# of the integral over all directions
+# number of axes for the integral over all directions
 AXES = 100
 
 WINDOW_ALPHA, PREDICTED_ALPHA = numbers(
     {
-        "window_alpha_vs_axial": "what the RV's shape alone would give an isotropic medium of the "
-        "same mean length, as alpha_vs_axial; 0 for a sphere; empty for the second moment",
-        "alpha_vs_axial_contacts": "alpha_vs_axial as overlaps and near contacts predict it, for "
-        "cut-offs up to 0.3 of the smallest radius; empty for an open whole and for clumps",
+        "window_alpha_vs_axial": "alpha_vs_axial of an isotropic medium of the same mean length in "
+        "this RV, due to the shape of the RV alone; 0 for a sphere; empty for the second moment",
+        "alpha_vs_axial_contacts": "alpha_vs_axial predicted from overlaps and near contacts, for "
+        "cut-offs up to 0.3 smallest radii; empty for a whole sample that is not periodic and for "
+        "clumps",
     }
 )
 
@@ -57,31 +61,32 @@ def window_alpha(
     window: Convex, fabric: VoidFabric, cutoff: float, axis: FloatArray
 ) -> float | None:
     """
-    Signed anisotropy of an isotropic medium with a fabric's mean length, in the same directions.
+    Signed anisotropy that the window alone gives an isotropic medium of the same mean length.
 
-    β follows from Σ w (c (A₀ + β A₁) + A₁) / Σ w (A₀ + β A₁) = mean length, sums over all axes.
+    The medium's β follows from Σ w (c (A₀ + β A₁) + A₁) / Σ w (A₀ + β A₁) = mean length, where the
+    sums run over the axes of the fabric.
 
     Parameters
     ----------
     window : Convex
-        What clips the lines.
+        The window that clips the lines.
     fabric : VoidFabric
-        Measured with that window; its first moment.
+        Void fabric measured in this window, of the first moment.
     cutoff : float
-        Dump's length unit.
+        Cut-off of the void segments, dump's length unit.
     axis : ndarray, shape (3,)
         Loading axis.
 
     Returns
     -------
     float or None
-        None if the mean length is that of no such medium.
+        Dimensionless; None if no isotropic medium has this mean length.
     """
     if window.is_sphere:
         return 0.0
     shared, slope = (
-        one.reshape(fabric.axes.shape[:2])
-        for one in window.overlap(fabric.axes.reshape(-1, 3), cutoff)
+        values.reshape(fabric.axes.shape[:2])
+        for values in window.overlap(fabric.axes.reshape(-1, 3), cutoff)
     )
     long, whole = float((shared @ fabric.weights).sum()), float((slope @ fabric.weights).sum())
     beyond = fabric.mean_length - cutoff
@@ -99,23 +104,23 @@ def predicted_alpha(
     pairs: NearPairs, porosity: float, cutoff: float, axis: npt.ArrayLike
 ) -> float | None:
     """
-    Signed anisotropy of the void fabric along an axis, from the near pairs alone.
+    Signed anisotropy of the void fabric along an axis, predicted from near pairs of grains.
 
     Parameters
     ----------
     pairs : NearPairs
-        All whose surfaces are no more than the cut-off apart.
+        All pairs of grains whose surfaces are at most the cut-off apart.
     porosity : float
-        φ, of the same region, dimensionless.
+        Porosity φ of the same region, dimensionless.
     cutoff : float
-        Of the void segments, dump's length unit.
+        Cut-off of the void segments, dump's length unit.
     axis : array_like, shape (3,)
         Unit vector.
 
     Returns
     -------
     float or None
-        Dimensionless. None if in some direction no gap is left, so that the formula does not hold.
+        Dimensionless; None if no gap is left in some direction, where the formula does not hold.
 
     References
     ----------
@@ -124,7 +129,7 @@ def predicted_alpha(
 
     Examples
     --------
-    A chain of spheres that overlap along z loses gaps along z: the others are longer.
+    Spheres that overlap along z have fewer gaps along z, so the remaining gaps are longer:
 
     >>> import numpy as np
     >>> from scanfab.fabric.predicted import predicted_alpha
@@ -148,7 +153,7 @@ def predicted_alpha(
 
 
 def _removed(pairs: NearPairs, cosine: FloatArray, cutoff: float) -> tuple[float, float]:
-    """Gaps shorter than the cut-off or closed by overlap along a line, and their integral to it."""
+    """Gaps along a line that cut-off or overlap remove, and their integral up to the cut-off."""
     opened = np.maximum(cutoff * cosine + pairs.overlap, 0.0)
     closed = np.maximum(pairs.overlap, 0.0)
     if pairs.space.is_plane:

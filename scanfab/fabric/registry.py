@@ -1,9 +1,9 @@
 """
-The fabrics of a table: each an object in one file, with its columns, formula and source.
+The fabrics of a table: each fabric is an object with columns and values.
 
-Those of this package stand in ``OWN_FABRICS``. Another package offers one under the entry point
-``scanfab.fabrics``; its columns come behind the own ones of every table that is computed, none of
-which it may replace.
+``OWN_FABRICS`` lists the fabrics of this package. Another package offers a fabric under the entry
+point ``scanfab.fabrics``. Its columns follow the columns of this package in every computed table,
+and it cannot replace any of these.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ GROUP = "scanfab.fabrics"
 
 
 class Fabric(Protocol):
-    """One fabric, or what is made of fabrics."""
+    """A fabric, or values derived from fabrics."""
 
     columns: tuple[Column, ...]
 
     def values(self, measured: Measured) -> dict[str, Any]:
-        """A value for each of its columns; None for one that does not exist."""
+        """A value for each of its columns; a missing value is None."""
         ...
 
 
-# in the order of their columns; a new one comes behind
+# in the order of the columns in tables; a new fabric is added at the end
 OWN_FABRICS: dict[str, Fabric] = {
     "void": Void(),
     "contact": Contact(),
@@ -44,7 +44,7 @@ OWN_FABRICS: dict[str, Fabric] = {
     "halves": Halves(),
 }
 
-# those of tables that are asked for with `with_`, by the names of the groups
+# groups of further columns, which the option `with_` adds, by name
 GROUPS: dict[str, Fabric] = {
     "invariants": Invariants(),
     "state": State(),
@@ -55,15 +55,15 @@ GROUPS: dict[str, Fabric] = {
 
 def load_fabrics(taken: Iterable[str]) -> dict[str, Fabric]:
     """
-    The fabrics of other packages by name; none as a rule.
+    Load the fabrics of other packages, by name; usually there are none.
 
-    One that is broken, or has a column whose name is ``taken`` by scanfab or by a fabric before it,
-    is left out with a warning.
+    A fabric that is broken, or that has a column whose name is ``taken`` by scanfab or by a fabric
+    before it, is skipped with a warning.
 
     Raises
     ------
     ScanfabError
-        If two packages use one name for a fabric.
+        If two packages use the same name for a fabric.
     """
     names = set(taken)
 
@@ -74,7 +74,7 @@ def load_fabrics(taken: Iterable[str]) -> dict[str, Fabric]:
             if not isinstance(column, Column) or column.kind not in (int, float, str):
                 raise TypeError(f"expected columns that hold int, float or str, found {column!r}")
             if column.name in names:
-                raise TypeError(f"there is a column {column.name!r} already: rename it")
+                raise TypeError(f"there is already a column {column.name!r}: rename it")
         names.update(column.name for column in plugin.columns)
         return plugin
 
@@ -83,26 +83,26 @@ def load_fabrics(taken: Iterable[str]) -> dict[str, Fabric]:
 
 def checked_values(name: str, fabric: Fabric, measured: Measured) -> dict[str, Any]:
     """
-    The values of another package's fabric by its columns; None for a number that is not finite.
+    Values of another package's fabric, by column; NaN and infinite numbers become None.
 
     Raises
     ------
     ScanfabError
-        If it fails, lacks a value, or gives one that its column cannot hold.
+        If the fabric fails, lacks a value, or gives a value that its column cannot hold.
     """
     columns = {column.name: column.kind for column in fabric.columns}
     try:
-        found = dict(fabric.values(measured))
-        if found.keys() != columns.keys():
-            raise ValueError(f"expected a value for each of {[*columns]}, found {found}")
+        values = dict(fabric.values(measured))
+        if values.keys() != columns.keys():
+            raise ValueError(f"expected a value for each of {[*columns]}, found {values}")
         for key, kind in columns.items():
-            value = found[key]
+            value = values[key]
             if value is None or (kind is not str and not math.isfinite(value)):
-                found[key] = None
+                values[key] = None
             elif kind(value) != value:
                 raise ValueError(f"{key}: expected {kind.__name__} or None, found {value!r}")
             else:
-                found[key] = kind(value)
-        return found
+                values[key] = kind(value)
+        return values
     except Exception as error:  # a foreign package may fail in any way
         raise ScanfabError(f"the fabric {name!r}: {type(error).__name__}: {error}") from error

@@ -1,4 +1,4 @@
-"""A fabric tensor: symmetric, second order, trace 1."""
+"""Fabric tensors: symmetric second-order tensors of trace 1."""
 
 from __future__ import annotations
 
@@ -22,21 +22,23 @@ def axial(tensor: npt.NDArray[np.float64], axis: npt.ArrayLike, space: Space = S
     """
     Signed anisotropy along an axis: a·G·a - (1 - a·G·a)/2, in a plane a·G·a - b·G·b.
 
-    Linear in G, so nearly unbiased where α is small: the quantity to plot and to correlate. It is
-    not the intensity when the principal axes turn. In a plane b lies in it, across a.
+    It is linear in G and so nearly unbiased for small anisotropy: plot and correlate this value. If
+    the principal axes turn away from the axis, it is less than the intensity. In a plane, b is the
+    unit vector normal to a.
 
     Parameters
     ----------
     tensor : ndarray, shape (..., 3, 3)
-        Fabric tensors of trace 1, dimensionless.
+        Fabric tensors G of trace 1, dimensionless.
     axis : array_like, shape (3,)
-        Unit vector.
+        Unit vector a.
     space : Space, optional
-        The plane that the tensors are of, if they are.
+        The plane of the tensors, if the grains are discs.
 
     Returns
     -------
     ndarray, shape (...)
+        Dimensionless.
 
     Examples
     --------
@@ -52,19 +54,19 @@ def axial(tensor: npt.NDArray[np.float64], axis: npt.ArrayLike, space: Space = S
 
 def weighted_tensors(axes: FloatArray, lengths: FloatArray) -> FloatArray:
     """
-    Σ w ℓ n⊗n / Σ w ℓ over the axes of each replicate.
+    Fabric tensors Σ w ℓ n⊗n / Σ w ℓ, with sums over the axes of each replicate.
 
     Parameters
     ----------
     axes : ndarray, shape (R, D, 3)
         Unit vectors n.
     lengths : ndarray, shape (R, D, ...)
-        w ℓ, of anything that is measured along the same axes.
+        Weighted mean lengths w ℓ of one or several regions along the axes.
 
     Returns
     -------
     ndarray, shape (R, ..., 3, 3)
-        Trace 1.
+        Dimensionless tensors of trace 1.
     """
     tensors = np.einsum("rd...,rdi,rdj->r...ij", lengths, axes, axes)
     tensors /= lengths.sum(axis=1)[..., None, None]
@@ -79,9 +81,9 @@ class FabricTensor:
     Parameters
     ----------
     matrix : ndarray, shape (3, 3)
-        Trace 1.
+        Components, with trace 1.
     space : Space, optional
-        The plane that it is of, if it is: all components across it are 0.
+        The plane of the tensor, if the grains are discs; components normal to it are 0.
 
     Examples
     --------
@@ -118,7 +120,7 @@ class FabricTensor:
 
     @property
     def major_axis(self) -> FloatArray:
-        """Unit vector of the largest principal value, shape (3,); of n and -n the upper one."""
+        """Unit vector of the largest principal value, shape (3,); of n and -n, the upper."""
         axis = self.principal_axes[0]
         leading = axis[np.flatnonzero(np.abs(axis) > 1e-12)[-1]]
         upper: FloatArray = axis * np.sign(leading)
@@ -131,7 +133,7 @@ class FabricTensor:
         Parameters
         ----------
         other : FabricTensor
-            The other one.
+            The second tensor.
 
         Returns
         -------
@@ -144,9 +146,9 @@ class FabricTensor:
     @property
     def alpha(self) -> float:
         """
-        α: largest minus smallest principal value; never negative, so noise raises it.
+        α: largest minus smallest principal value.
 
-        In a plane the smaller of its two.
+        It is never negative, so noise raises it. In a plane, only its two principal values count.
         """
         return float(self.principal_values[0] - self.principal_values[self.space.dimension - 1])
 
@@ -154,12 +156,13 @@ class FabricTensor:
         """
         Signed anisotropy along an axis: a·G·a - (1 - a·G·a)/2, in a plane a·G·a - b·G·b.
 
-        Linear in G, so nearly unbiased where α is small: the quantity to plot and to correlate.
+        It is linear in G and so nearly unbiased for small anisotropy: plot and correlate this
+        value.
 
         Parameters
         ----------
         axis : array_like, shape (3,)
-            Unit vector.
+            Unit vector a.
 
         Returns
         -------
@@ -182,17 +185,17 @@ def of_both(
     name: str, meaning: str, of: Mapping[str, str] = FABRICS, unit: str = ""
 ) -> tuple[Column, ...]:
     """
-    A column of the void fabric and one of the contact fabric.
+    Two columns: one of the void fabric and one of the contact fabric.
 
-    Braces in name and meaning are filled: {0} with ``vs`` or ``c``, {1} with what stands for it.
+    In name and meaning, {0} is replaced by ``vs`` or ``c``, and {1} by its words in ``of``.
 
     Examples
     --------
     >>> from scanfab.fabric.tensor import of_both
-    >>> [(one.name, one.meaning) for one in of_both("f_{0}", "a of the {1}")]
+    >>> [(column.name, column.meaning) for column in of_both("f_{0}", "a of the {1}")]
     [('f_vs', 'a of the void fabric'), ('f_c', 'a of the contact fabric')]
     """
-    return numbers({name.format(*one): meaning.format(*one) for one in of.items()}, unit)
+    return numbers({name.format(*words): meaning.format(*words) for words in of.items()}, unit)
 
 
 def tensor_columns(name: str, what: str) -> tuple[Column, ...]:
@@ -202,7 +205,7 @@ def tensor_columns(name: str, what: str) -> tuple[Column, ...]:
     Examples
     --------
     >>> from scanfab.fabric.tensor import tensor_columns
-    >>> [one.name for one in tensor_columns("c", "contact fabric")][4:]
+    >>> [column.name for column in tensor_columns("c", "contact fabric")][4:]
     ['gc_xz', 'gc_yz', 'alpha_c', 'alpha_c_axial']
     """
     components = {f"g{name}_{k}": f"{k} of the {what} tensor, whose trace is 1" for k in COMPONENTS}
@@ -218,9 +221,9 @@ def tensor_columns(name: str, what: str) -> tuple[Column, ...]:
 def tensor_values(
     name: str, tensor: FabricTensor | None, axis: npt.ArrayLike
 ) -> dict[str, float | None]:
-    """The values of these columns; all None without a tensor."""
+    """Values of the columns of :func:`tensor_columns`; all None without a tensor."""
     if tensor is None:
-        return dict.fromkeys(one.name for one in tensor_columns(name, ""))
+        return dict.fromkeys(column.name for column in tensor_columns(name, ""))
     return {
         **{f"g{name}_{place}": value for place, value in tensor.components().items()},
         f"alpha_{name}": tensor.alpha,

@@ -1,4 +1,4 @@
-"""The fabrics of every table: of voids and contacts, with both errors, and their major axes."""
+"""Fabrics of every table: voids and contacts, their standard errors, and their major axes."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from scanfab.fabric.measured import Measured
 from scanfab.fabric.tensor import FABRICS, of_both, tensor_columns, tensor_values
 
 ORDER = (
-    " (-x, -y, -z; x counts fastest; for an oblique loading axis the octants are turned so that "
-    "one of their axes lies along it)"
+    " (at -x, -y, -z; the numbers grow fastest along x; for an oblique loading axis the octants "
+    "are turned so that one of their axes lies along it)"
 )
-FROM_SCAN = "its standard error from the scan, by the scatter of the replicates"
-# the anisotropies, by the names of their columns
+FROM_SCAN = "its standard error due to the scan, from the scatter of the replicates"
+# columns of the signed anisotropies
 VOID, CONTACT = "alpha_vs_axial", "alpha_c_axial"
-INDEPENDENT = "if contacts were independent; too large by about half in relaxed dense packings"
+INDEPENDENT = "for independent contacts; too large by about half in relaxed dense packings"
 SCATTER = "by a jackknife over eight octants, in a plane four quadrants"
 ANGLE = "angle between the major axes of void and contact fabric, 0 to 90"
-HALF = "half their difference, which tells compare the scan's noise in a slope"
+HALF = "half their difference, which shows compare the scan's noise in a slope"
 
 
 class Void:
-    """The columns of the void fabric."""
+    """Columns of the void fabric."""
 
     columns = (
         *numbers({"mean_length": "mean length of the kept segments, Σ w·sum / Σ w·count"}, LENGTH),
@@ -34,7 +34,7 @@ class Void:
     )
 
     def values(self, measured: Measured) -> dict[str, Any]:
-        """All None if there is no void fabric."""
+        """Values by column; all None if there is no void fabric."""
         fabric, axis = measured.void, measured.axis
         if fabric is None:
             return dict.fromkeys(column.name for column in self.columns)
@@ -43,7 +43,7 @@ class Void:
 
 
 class Contact:
-    """The columns of the contact fabric."""
+    """Columns of the contact fabric."""
 
     columns = (
         *tensor_columns("c", "contact fabric"),
@@ -51,17 +51,18 @@ class Contact:
     )
 
     def values(self, measured: Measured) -> dict[str, Any]:
-        """All None without contacts."""
+        """Values by column; all None without contacts."""
         error = axial_error(measured.normals, measured.axis, measured.space)
         return {**tensor_values("c", measured.contact, measured.axis), f"{CONTACT}_se": error}
 
 
 class Scatter:
-    """The columns of the sample's own scatter: its error, and each anisotropy without a block."""
+    """Columns of the error due to the sample, and of each anisotropy without each block."""
 
     columns = (
         *of_both(
-            "alpha_{0}_axial_sample_se", f"the sample's own scatter of alpha_{{0}}_axial, {SCATTER}"
+            "alpha_{0}_axial_sample_se",
+            f"standard error of alpha_{{0}}_axial due to the sample, {SCATTER}",
         ),
         *numbers(
             {
@@ -74,22 +75,22 @@ class Scatter:
     )
 
     def values(self, measured: Measured) -> dict[str, Any]:
-        """All None where there is no fabric, or none without some block."""
-        found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
+        """Values by column; None if the fabric, or the fabric without some block, is missing."""
+        row: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
         void, axis = measured.void.tensor if measured.void else None, measured.axis
         for name, tensor, scatter in (
             (VOID, void, measured.void_scatter),
             (CONTACT, measured.contact, measured.contact_scatter),
         ):
             if tensor is not None and scatter is not None:
-                found[f"{name}_sample_se"] = scatter.error
+                row[f"{name}_sample_se"] = scatter.error
                 without = tensor.axial(axis) + scatter.shift
-                found |= {f"{name}_without_{k}": float(x) for k, x in enumerate(without, start=1)}
-        return found
+                row |= {f"{name}_without_{k}": float(x) for k, x in enumerate(without, start=1)}
+        return row
 
 
 class Halves:
-    """The columns of the scan's noise in the void fabric without each block."""
+    """Columns of the scan's noise in the void anisotropy without each block."""
 
     columns = numbers(
         {
@@ -99,22 +100,22 @@ class Halves:
     )
 
     def values(self, measured: Measured) -> dict[str, Any]:
-        """All None where there is no void fabric, or none without some block."""
+        """Values by column; None if the fabric, or the fabric without some block, is missing."""
         scatter = measured.void_scatter
         halves = [] if scatter is None else scatter.half.tolist()
-        # in a plane there are no blocks for the last columns
+        # a plane has only four blocks, so the last columns stay empty
         return dict(zip_longest((column.name for column in self.columns), halves))
 
 
 class Orientation:
-    """The columns of the major axes of both fabrics, and of the angle: are they coaxial?"""
+    """Columns of the major axes of both fabrics and of the angle between them."""
 
     columns = (
         *numbers(
             {
-                f"g{one}_axis_{k}": f"{k} of the direction of the {what}'s largest principal "
-                "value, a unit vector"
-                for one, what in FABRICS.items()
+                f"g{name}_axis_{k}": f"{k} of the unit vector along the largest principal value of "
+                f"the {what}"
+                for name, what in FABRICS.items()
                 for k in "xyz"
             }
         ),
@@ -122,14 +123,14 @@ class Orientation:
     )
 
     def values(self, measured: Measured) -> dict[str, Any]:
-        """Of what there is: an angle needs both fabrics."""
+        """Values by column; None for a missing fabric. The angle needs both fabrics."""
         void = measured.void.tensor if measured.void else None
         contact = measured.contact
-        found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
+        row: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
         for prefix, tensor in (("gvs", void), ("gc", contact)):
             if tensor is not None:
                 along = zip("xyz", tensor.major_axis.tolist(), strict=True)
-                found |= {f"{prefix}_axis_{one}": x for one, x in along}
+                row |= {f"{prefix}_axis_{letter}": x for letter, x in along}
         if void is not None and contact is not None:
-            found["coaxiality_deg"] = void.angle_to(contact)
-        return found
+            row["coaxiality_deg"] = void.angle_to(contact)
+        return row

@@ -3,7 +3,7 @@ Void fabric by scan lines: G_vs = Σ w ℓ n⊗n / Σ w ℓ, Eq. 1 of the 2017 p
 
 Theocharis, Vairaktaris and Dafalias (2017), Powders and Grains 2017, EPJ Web of
 Conferences 140, after Oda, Nemat-Nasser and Konishi (1985),
-doi:10.3208/sandf1972.25.3_85. As printed the weights w of the directions are 1; see docs/method.md.
+doi:10.3208/sandf1972.25.3_85. In the paper all weights w of directions are 1; see docs/method.md.
 """
 
 from __future__ import annotations
@@ -20,35 +20,36 @@ from scanfab.fabric.distribution import even_polynomials
 from scanfab.fabric.errors import error_of_mean, ratio
 from scanfab.fabric.tensor import FabricTensor, axial, weighted_tensors
 
-# Of the replicates' axes without a segment, above which there is no fabric: with more the filled
-# ones would look isotropic. A block's axes are filled with its own mean, which hides more.
+# Axes that keep no segment are filled with a mean length, which makes the tensor look isotropic.
+# If more than this fraction is empty, there is no fabric. The limit for the blocks of a map is
+# stricter, because their axes are filled with the mean of the block itself.
 MOST_FILLED, MOST_FILLED_IN_BLOCK = 0.5, 0.05
-# By dimension, the highest degree of the polynomial that mean lengths are compared with. Those of
-# discs vary faster with the direction, and a degree costs only two terms there.
+# Highest degree of the polynomial fitted to mean lengths, by dimension. For discs the mean lengths
+# vary faster with direction, and each even degree adds only two terms.
 MOST_EVEN = {3: 8, 2: 16}
 
 
 @dataclass(frozen=True, eq=False)
 class VoidFabric:
     """
-    Void fabric of one variant, with the scan's standard error.
+    Void fabric of a variant, with its standard error due to the scan.
 
     Attributes
     ----------
     tensor : FabricTensor
-        Mean over the replicates.
+        Fabric tensor, the mean over the replicates.
     mean_length : float
-        Σ w·sum / Σ w·count, dump's length unit.
+        Mean length of the kept segments, Σ w·sum / Σ w·count, dump's length unit.
     replicates : ndarray
-        The tensor of each replicate, shape (R, 3, 3).
+        Fabric tensor of each replicate, shape (R, 3, 3).
     axes : ndarray
         Unit vectors of each replicate, shape (R, D, 3).
     weights : ndarray
-        Of the direction rule, shape (D,).
+        Weights w of the direction rule, shape (D,).
     mean_lengths : ndarray
-        ℓ of each replicate and axis, shape (R, D), dump's length unit.
+        Mean length ℓ for each replicate and axis, shape (R, D), dump's length unit.
     filled : float
-        Fraction of a replicate's axes without any kept segment, given the mean of the others.
+        Fraction of axes that keep no segment in a replicate and take the other replicates' mean.
 
     Examples
     --------
@@ -77,9 +78,9 @@ class VoidFabric:
 
     def axial_error(self, axis: npt.ArrayLike) -> float | None:
         """
-        Standard error of the axial anisotropy, from the scatter of the replicates.
+        Standard error of the axial anisotropy due to the scan, from the scatter of the replicates.
 
-        It covers the scan alone (which lines were drawn), not the sample.
+        It covers the choice of lines, not the choice of the sample.
 
         Parameters
         ----------
@@ -89,30 +90,30 @@ class VoidFabric:
         Returns
         -------
         float or None
-            None for one replicate.
+            Dimensionless; None for a single replicate.
         """
         return error_of_mean(axial(self.replicates, axis, self.tensor.space))
 
     def expected_error(self, axis: npt.ArrayLike, degree: int | None = None) -> float | None:
         """
-        The same error from the scatter of the mean lengths about an even polynomial.
+        Standard error due to the scan, from the scatter of mean lengths about an even polynomial.
 
-        Far less noisy for few replicates, as every axis counts, but it depends on the polynomial:
-        good for planning a scan.
+        With few replicates it is far less noisy than :meth:`axial_error`, because every axis
+        counts. But it depends on the polynomial, so it serves to plan scans.
 
         Parameters
         ----------
         axis : array_like, shape (3,)
             Unit vector.
         degree : int, optional
-            The direction rule's: what it integrates exactly is no error, so the polynomial has the
-            highest even degree, from 4 to 8 (to 16 in a plane), whose product with n⊗n is
-            exact.
+            Degree that the direction rule integrates exactly. Lengths that the rule integrates
+            exactly cause no error, so the polynomial has the highest even degree, from 4 to 8 (in a
+            plane to 16), whose product with n⊗n is exact.
 
         Returns
         -------
         float or None
-            None if there are too few mean lengths.
+            Dimensionless; None if there are too few mean lengths for the polynomial.
         """
         count = len(self.mean_lengths)
         space = self.tensor.space
@@ -121,10 +122,10 @@ class VoidFabric:
         lengths, terms = self.mean_lengths.ravel(), design.shape[1]
         if len(lengths) < 3 * terms:
             return None
-        # with many more lengths than terms the normal equations suffice and are much faster
+        # there are many more lengths than terms, so the faster normal equations are accurate enough
         fit = np.linalg.lstsq(design.T @ design, design.T @ lengths, rcond=None)[0]
         variance = np.sum((lengths - design @ fit) ** 2) / (len(lengths) - terms)
-        # derivative of the axial anisotropy, a ratio of sums over the axes, by each mean length
+        # derivative of the axial anisotropy, a ratio of sums over axes, by each mean length
         along = space.axial((self.axes @ np.asarray(axis, dtype=float)) ** 2)
         slope = self.weights * (along - self.tensor.axial(axis))
         slope /= (self.mean_lengths @ self.weights)[:, None]
@@ -139,10 +140,11 @@ def void_fabric(
     space: Space = SPACE,
 ) -> VoidFabric | None:
     """
-    The void fabric from the sums of a scan.
+    Compute the void fabric from the sums of a scan.
 
-    In each replicate ℓ(n) is the length of an axis' kept segments divided by their number, over
-    all lines of the axis together: a mean of per-line means invents anisotropy.
+    In each replicate, the mean length ℓ(n) of an axis is the total length of its kept segments, on
+    all lines together, divided by their number. A mean of per-line means would be biased and show
+    anisotropy where there is none.
 
     Parameters
     ----------
@@ -151,18 +153,18 @@ def void_fabric(
     weights : ndarray, shape (D,)
         The direction rule's weights.
     length : ndarray, shape (R, D)
-        Sum of the lengths of the kept segments, dump's length unit.
+        Total length of the kept segments, dump's length unit.
     segments : ndarray, shape (R, D)
-        Number of the kept segments. For the second moment, sums of squared lengths and of lengths
-        take the places of these two.
+        Number of the kept segments. For the second moment, give the sums of squared lengths and of
+        lengths in place of length and number.
     space : Space, optional
-        The plane in which the axes lie, if the grains are discs.
+        The plane of the axes, if the grains are discs.
 
     Returns
     -------
     VoidFabric or None
-        None if some axis keeps no segment in all replicates together, or if most axes keep none in
-        their replicate: a tensor of directions that were filled in would look isotropic.
+        None if an axis keeps no segment in any replicate, or if more than half of all axes keep no
+        segment in their replicate, because the filled tensor would look isotropic.
 
     References
     ----------
@@ -185,7 +187,7 @@ def void_fabric(
     empty = segments == 0
     if empty.mean() > MOST_FILLED:
         return None
-    # an axis that kept nothing in one replicate takes its mean over the others
+    # an axis without segments in a replicate takes its mean length over the other replicates
     mean = np.where(empty, total_length / total_segments, length / np.where(empty, 1, segments))
     tensors = weighted_tensors(axes, weights * mean)
     return VoidFabric(
@@ -202,36 +204,36 @@ def void_fabric(
 @dataclass(frozen=True, eq=False)
 class BlockFabrics:
     """
-    The void fabrics of many blocks, or of each without its parts, in R replicates.
+    Void fabrics of many blocks, or of blocks without each part, in R replicates.
 
-    Unlike in :class:`VoidFabric`, an axis that keeps no segment takes the mean length of its block
-    in the same replicate. So sums need not be kept axis by axis; those of a thousand blocks would
-    be too many. ``(...)`` stands for the shape of the blocks.
+    Unlike in :class:`VoidFabric`, an axis without segments takes the mean length of its block in
+    the same replicate, so the sums of each axis need not be kept for all replicates: with a
+    thousand blocks they would fill the memory. ``(...)`` stands for the shape of the blocks.
     """
 
     tensors: FloatArray
-    """Fabric tensors, shape (R, ..., 3, 3); that of a block without anything is isotropic."""
+    """Fabric tensors, shape (R, ..., 3, 3); isotropic for a block without segments."""
     length: FloatArray
-    """Σ w·sum, dump's length unit, shape (R, ...)."""
+    """Weighted total length Σ w·sum, dump's length unit, shape (R, ...)."""
     number: FloatArray
-    """Σ w·count, shape (R, ...)."""
+    """Weighted number of segments Σ w·count, shape (R, ...)."""
     segments: FloatArray
-    """Kept segments, shape (R, ...)."""
+    """Number of kept segments, shape (R, ...)."""
     filled: FloatArray
-    """Fraction of the axes without any kept segment, shape (R, ...)."""
+    """Fraction of the axes without a kept segment, shape (R, ...)."""
 
     @property
     def is_met(self) -> BoolArray:
-        """Whether a block has any segment, shape (...)."""
+        """Whether each block has any segment, shape (...)."""
         return np.asarray(self.number.sum(axis=0) > 0)
 
     @property
     def exists(self) -> BoolArray:
-        """Whether a block has enough segments for a fabric, shape (...)."""
+        """Whether each block has enough segments for a fabric, shape (...)."""
         return np.asarray((self.filled.mean(axis=0) <= MOST_FILLED_IN_BLOCK) & self.is_met)
 
     def axial_errors(self, axis: FloatArray) -> FloatArray:
-        """Standard errors of the axial anisotropies by the scan; NaN for one replicate; (...)."""
+        """Standard errors of axial anisotropies due to the scan, (...); NaN with one replicate."""
         values = axial(self.tensors, axis)
         if len(values) < 2:
             return np.full(values.shape[1:], np.nan)
@@ -242,7 +244,7 @@ def block_fabrics(
     axes: FloatArray, weights: FloatArray, length: FloatArray, number: FloatArray
 ) -> BlockFabrics:
     """
-    The void fabrics of blocks from the sums of a scan.
+    Compute the void fabrics of blocks from the sums of a scan.
 
     Parameters
     ----------
@@ -251,10 +253,10 @@ def block_fabrics(
     weights : ndarray, shape (D,)
         The direction rule's weights.
     length, number : ndarray, shape (R, D, ...)
-        Of the kept segments, as :func:`scanfab.void_fabric` takes them.
+        Total length and number of the kept segments, as for :func:`scanfab.void_fabric`.
     """
     empty = number <= 0
-    over, under = (np.einsum("d,rd...->r...", weights, one) for one in (length, number))
+    over, under = (np.einsum("d,rd...->r...", weights, values) for values in (length, number))
     usual = np.where(under > 0, ratio(over, under), 1.0)
     mean = np.where(empty, usual[:, None], ratio(length, number))
     mean *= weights.reshape(-1, *[1] * (mean.ndim - 2))

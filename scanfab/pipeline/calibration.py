@@ -1,4 +1,4 @@
-"""How many lines are enough: one frame scanned with finer and finer settings, by ladders."""
+"""Calibration: scan one frame with finer and finer settings (ladders) to see what is enough."""
 
 from __future__ import annotations
 
@@ -30,24 +30,25 @@ from scanfab.table.row import Record
 
 LOGGER = logging.getLogger("scanfab")
 
-# of the 2017 paper, in r_min
+# spacing and cut-off of the 2017 paper, in r_min
 PAPER_SPACING, PAPER_CUTOFF = 0.1, 1.0
-# in r_min, down to the spacing of the paper
+# ladder of spacings, in r_min, down to the spacing of the paper
 SPACINGS = (4.0, 2.0, 1.0, 0.5, 0.2, PAPER_SPACING)
-# of the ladder of directions, in r_min: 16 replicates with lines r_min apart
+# spacing for the ladder of directions, in r_min: 16 replicates whose lines are r_min apart
 FIXED_SPACING = 0.25
+# ladder of directions: degrees of Lebedev rules
 DEGREES = (5, 9, 11, 17, 23, 31, 41)
-# the same in a plane: numbers of equal steps
+# ladder of directions in a plane: numbers of equal angles
 STEPS = (3, 5, 8, 16, 32, 64, 128)
 CUTOFFS = tuple(0.25 * k for k in range(13))
-# fractions of half the smallest extent
+# ladder of RVs: fractions of half the smallest extent
 RV_FRACTIONS = (0.4, 0.5, 0.6, 0.67, 0.7, 0.8)
-# the scan's error as a fraction of the sample's own: together they are 3 % above the latter
+# wanted error of the scan over the error of the sample: it raises the total error by 3 %
 OF_SAMPLE = 0.25
-# most directions to recommend, and how often recommended settings are tried and refined
+# most directions to recommend, and number of times that recommended settings are tried and refined
 MOST_DIRECTIONS, ROUNDS = 2905, 5
-# probability that two steps of a ladder differ by chance alone, and degrees of freedom of the
-# difference of two values with standard errors of 16 replicates each
+# significance level for a difference between steps of a ladder, and degrees of freedom of the
+# difference of two values whose standard errors come from 16 replicates each
 CHANCE, FREEDOM = 0.05, 30
 PAPER = {"spacing": " (the paper: 0.1)", "rv": " (the paper: 0.67 to 0.7)"}
 
@@ -57,39 +58,43 @@ class StepRow(Record):
     """One step of a ladder for one variant; lengths in the dump's unit."""
 
     source: Annotated[str, "the series as given"]
-    frame: Annotated[int, "index in the series, from 0"]
-    ladder: Annotated[str, "what is changed: spacing, directions, cutoff, rv; or recommended"]
+    frame: Annotated[int, "index of the frame in the series, from 0"]
+    ladder: Annotated[str, "what is varied: spacing, directions, cutoff, rv; or recommended"]
     value: Annotated[
         float, "spacing or cut-off in r_min, number of directions, RV over half the smallest extent"
     ]
     variant: Annotated[str, "as in the fabric table"]
     rule: Annotated[str, "the direction rule"]
     degree: Annotated[int | None, "of the polynomials that the rule integrates exactly"]
-    rule_bias: Annotated[float, "alpha_vs that the rule gives an isotropic sample"]
-    directions: Annotated[int | None, "axes of the rule, in each replicate"]
+    rule_bias: Annotated[float, "alpha_vs that the rule gives for an isotropic sample"]
+    directions: Annotated[int | None, "number of axes of the rule, in each replicate"]
     replicates: Annotated[int | None, "number of replicates"]
-    spacing: Annotated[float | None, "between lines of one direction, all replicates", LENGTH]
-    cutoff: Annotated[float | None, "shortest void segment kept", LENGTH]
-    rv_radius: Annotated[float | None, "radius of the ball that holds the RV; a, b: empty", LENGTH]
-    segments: Annotated[int | None, "void segments kept"]
-    seconds: Annotated[float, "time of the step, all variants (and all cut-offs) together", "s"]
+    spacing: Annotated[
+        float | None, "distance between lines of one direction, all replicates together", LENGTH
+    ]
+    cutoff: Annotated[float | None, "shortest void segment that is kept", LENGTH]
+    rv_radius: Annotated[
+        float | None, "radius of the ball that holds the RV; empty for a and b", LENGTH
+    ]
+    segments: Annotated[int | None, "number of kept void segments"]
+    seconds: Annotated[float, "time of the step for all variants (and all cut-offs)", "s"]
     mean_length: Annotated[float | None, "mean length of the kept segments", LENGTH]
     alpha_vs_axial: Annotated[float | None, "signed anisotropy of the void fabric along the axis"]
-    alpha_vs_axial_se: Annotated[float | None, "its standard error from the scan"]
-    alpha_vs_axial_sample_se: Annotated[float | None, "its standard error from the sample"]
+    alpha_vs_axial_se: Annotated[float | None, "its standard error due to the scan"]
+    alpha_vs_axial_sample_se: Annotated[float | None, "its standard error due to the sample"]
     steady: Annotated[
         int | None,
-        "1 if this step and all later ones differ by no more than chance makes of their standard "
-        "errors (of the scan; for rv also of the sample), else 0; empty for a cut-off, on which "
-        "alpha_vs depends by definition",
+        "1 if this step agrees with all later steps within the standard errors (of the scan; for "
+        "rv also of the sample), else 0; empty for a cut-off, because alpha_vs depends on it by "
+        "definition",
     ]
-    note: Annotated[str, "what makes the step doubtful"]
+    note: Annotated[str, "doubts about the step"]
 
 
 @dataclass(frozen=True)
 class Calibration:
     """
-    What :func:`calibrate` finds; ``Table(found.rows)`` shows all steps.
+    The result of :func:`calibrate`; ``Table(found.rows)`` shows all steps.
 
     Attributes
     ----------
@@ -98,7 +103,7 @@ class Calibration:
     findings : tuple of str
         One sentence for each ladder, and one for the recommended settings.
     options : dict
-        The recommended settings by the names of their options.
+        The recommended settings, by option.
 
     Examples
     --------
@@ -120,7 +125,7 @@ class Calibration:
 
     @property
     def plot(self) -> Plots:
-        """Its figure: ``found.plot.calibration(ax=ax, ladder="cutoff")``."""
+        """Figure of the calibration: ``found.plot.calibration(ax=ax, ladder="cutoff")``."""
         return Plots(self.rows, "calibration")
 
 
@@ -128,35 +133,35 @@ def calibrate(
     source: Source, *, frame: int = -1, variants: str = "cd", **options: Any
 ) -> Calibration:
     """
-    How the void fabric of one frame changes with the settings of the scan.
+    Measure how the void fabric of one frame depends on the settings of the scan.
 
     Parameters
     ----------
     source : Packing, Series or iterable of Packing
-        Lengths relative to radii and the RV come from the first frame of the series that has
+        The series. Lengths relative to radii, and the RV, come from its first frame that has
         grains, as for :func:`scanfab.compute`.
     frame : int, optional
-        Which frame, the last by default.
+        Number of the frame; default: the last.
     variants : str, optional
         Letters out of abcd.
     **options
-        Those of :func:`scanfab.compute`: ``directions`` are those of the ladder of spacings,
-        ``spacing`` that of the ladder of directions; the cut-offs and RVs are scanned to the
-        ``tolerance``.
+        Options of :func:`scanfab.compute`. ``directions`` is used for the ladder of spacings, and
+        ``spacing`` for the ladder of directions; cut-offs and RVs are scanned to the ``tolerance``.
 
     Returns
     -------
     Calibration
-        With recommended settings: the widest spacing and the fewest directions from which nothing
-        changes any more, and then as many directions as bring the scan's error below a quarter of
-        the sample's own (or to the tolerance, if that is larger).
+        Steps of all ladders, and recommended settings. These start from the widest spacing and the
+        fewest directions beyond which nothing changes. Directions are then added until the error
+        of the scan is below a quarter of the error of the sample, or at the tolerance if that is
+        larger.
 
     Raises
     ------
     SettingsError
         If there is no such frame, or no step has a void fabric.
     TypeError
-        If there is no such option; names the nearest that there is.
+        If there is no such option; the message suggests the most similar name.
 
     Examples
     --------
@@ -168,26 +173,26 @@ def calibrate(
     >>> sorted({row.ladder for row in found.rows})
     ['cutoff', 'directions', 'recommended', 'rv', 'spacing']
     """
-    refuse_unknown("calibrate", options, [one.name for one in options_of(Settings)])
+    refuse_unknown("calibrate", options, [option.name for option in options_of(Settings)])
     settings = Settings(variants=variants, **options)
     if settings.lists_gaps or len(settings.rvs) > 1:
-        raise SettingsError("calibrate: its ladders take neither cutoffs, moment nor several rv")
-    one = _OneFrame(source, settings, frame)
-    settings, cutoffs = one.settings, one.cutoffs()
-    spacings, directions, rvs = (one.ladder(name) for name in ("spacing", "directions", "rv"))
+        raise SettingsError("calibrate: leave out `cutoffs`, `moment` and all but one `rv`")
+    one_frame = _OneFrame(source, settings, frame)
+    settings, cutoffs = one_frame.settings, one_frame.cutoffs()
+    spacings, directions, rvs = (one_frame.ladder(name) for name in ("spacing", "directions", "rv"))
     ladders = {"spacing": spacings, "directions": directions, "cutoff": cutoffs, "rv": rvs}
     cutoff = settings.cutoff.value if settings.cutoff.unit == "rmin" else PAPER_CUTOFF
     at_cutoff = [row for row in cutoffs if row.value == cutoff] or cutoffs
     sample = _largest(at_cutoff, "alpha_vs_axial_sample_se")
     target = max(settings.tolerance, OF_SAMPLE * (sample or 0.0))
-    best, recommended = one.recommended(spacings, directions, target)
+    best, recommended = one_frame.recommended(spacings, directions, target)
     findings = [_finding(name, rows) for name, rows in ladders.items() if rows]
     reached, own = (
         "unknown" if error is None else f"{error:.2g}"
         for error in (_largest(best, "alpha_vs_axial_se"), sample)
     )
     findings.append(
-        f"recommended: scan's error {reached} (wanted {target:.2g}; the sample's own is {own}) "
+        f"recommended: error of the scan {reached} (wanted {target:.2g}; of the sample {own}) "
         f"in {best[0].seconds:.2g} s"
     )
     rows = [row for ladder in ladders.values() for row in ladder]
@@ -195,7 +200,7 @@ def calibrate(
 
 
 class _OneFrame:
-    """One frame, scanned with one choice of settings after the other."""
+    """One frame that is scanned repeatedly with different settings."""
 
     def __init__(self, source: Source, settings: Settings, frame: int) -> None:
         frames = Frames(source, replace(settings, frames=parse_frames(frame, "frame")))
@@ -203,7 +208,7 @@ class _OneFrame:
         # the first frame of the series that has grains makes the plan
         first = frames.first()
         if first is None:
-            raise PackingError("no frame has any grains: there is nothing to calibrate")
+            raise PackingError("no frame has grains, so there is nothing to calibrate")
         number, readable, self.first = first
         tell(frames.notes(readable, self.first))
         sample = self.first if number == self.number else frames.sample(self.number, wanted)
@@ -212,11 +217,11 @@ class _OneFrame:
         self.name, self.sample, self.space = frames.name, sample, self.first.packing.space
         self.settings = settings_in(settings, self.space)
         tell(sample.doubts_of_escaped(), f"frame {self.number}")
-        # these notes concern every step
+        # these notes hold for every step
         tell(make_plan(self.settings, self.first).notes)
 
     def ladder(self, name: str) -> list[StepRow]:
-        """The rows of a ladder, without the steps whose settings do not fit the sample."""
+        """Scan the steps of a ladder; skip steps whose settings do not fit the sample."""
         settings, space = self.settings, self.space
         steps: dict[float, dict[str, Any]] = {}
         if name == "spacing":
@@ -230,7 +235,7 @@ class _OneFrame:
                 rules = [rule_of(count, space) for count in STEPS]
             steps = {len(rule): {"spacing": spacing, "directions": rule} for rule in rules}
         elif settings.needs_window and settings.rv_shape in SHAPES:
-            # a surface that a file draws is an RV of one size
+            # a surface from a file has one size, so it has no ladder
             variants = "".join(variant for variant in settings.variants if variant in "cd")
             words = {"rv_radius": None, "rv_size": (), "variants": variants}
             steps = {value: {"rv": value, **words} for value in RV_FRACTIONS}
@@ -239,33 +244,33 @@ class _OneFrame:
             try:
                 rows += self.measured(name, value, replace(settings, **changed))[0]
             except SettingsError as error:
-                tell([Note("step_left_out", f"{name} {value:g} left out: {error}")])
+                tell([Note("step_left_out", f"{name} {value:g} is skipped: {error}")])
         return judged(rows, space.dimension)
 
     def cutoffs(self) -> list[StepRow]:
-        """One scan for all cut-offs; SettingsError if a variant has no void fabric at any."""
+        """Scan once for all cut-offs; SettingsError if a variant has no void fabric at any."""
         lengths = tuple(Length(value, "rmin") for value in CUTOFFS)
         rows, _ = self.measured("cutoff", None, replace(self.settings, cutoffs=lengths))
         for variant in self.settings.variants:
             if all(row.alpha_vs_axial is None for row in rows if row.variant == variant):
                 raise SettingsError(
-                    f"frame {self.number}: no cut-off leaves a void fabric in variant {variant}: "
-                    f"its grains are too few, or rattlers, or there is no void"
+                    f"frame {self.number}: variant {variant} has no void fabric at any cut-off: "
+                    f"it has too few grains, only rattlers, or no voids"
                 )
         return rows
 
     def measured(
         self, ladder: str, value: float | None, settings: Settings
     ) -> tuple[list[StepRow], Measurement]:
-        """The rows of one step, and their measurement; without a value each row has its cut-off."""
+        """Scan one step: its rows and its measurement. Without a value, rows take their cut-off."""
         begun = time.perf_counter()
         plan = make_plan(settings, self.first)
         shadow = self.space.shadow(self.sample.packing.radius[self.sample.grains])
         chords = self.space.lines(shadow, plan.spacing) * plan.replicates * len(plan.rule)
         if ladder in ("spacing", "directions") and chords > settings.max_chords:
             raise SettingsError(
-                f"it would cut {chords:.2g} chords from the grains, more than `max_chords` "
-                f"{settings.max_chords:g}"
+                f"it would cut {chords:.2g} chords from grains, more than `max_chords` allows "
+                f"({settings.max_chords:g})"
             )
         result = compute_frame(self.sample, plan, number=self.number, source=self.name)
         seconds = time.perf_counter() - begun
@@ -273,11 +278,11 @@ class _OneFrame:
         r_min = float(self.first.packing.radius[self.first.grains].min())
         rows, window = [], plan.window
         for row in result.rows:
-            # errors at other cut-offs than the scan's stand in the rows themselves
+            # notes on errors at other cut-offs are dropped: each row has its own error
             own = [n for n in result.notes if row.variant in n.variants and n.code != OTHER_CUTOFFS]
-            whole = [one for one in result.notes if one.code == TOLERANCE_MISSED]
+            whole = [note for note in result.notes if note.code == TOLERANCE_MISSED]
             step = StepRow(
-                **{one.name: row[one.name] for one in fields(StepRow) if one.name in row},
+                **{field.name: row[field.name] for field in fields(StepRow) if field.name in row},
                 ladder=ladder,
                 value=round(row.cutoff / r_min, 9) if value is None else value,
                 rule=plan.rule.name,
@@ -286,7 +291,7 @@ class _OneFrame:
                 rv_radius=window.radius if window and row.variant in "cd" else None,
                 seconds=seconds,
                 steady=None,
-                note="; ".join(one.text for one in (*own, *whole)),
+                note="; ".join(note.text for note in (*own, *whole)),
             )
             rows.append(step)
         return rows, result.measurements[0]
@@ -295,19 +300,22 @@ class _OneFrame:
         self, spacings: list[StepRow], directions: list[StepRow], target: float
     ) -> tuple[list[StepRow], dict[str, str]]:
         """
-        Steady spacing and directions, and more of the latter until the error is surely met.
+        Choose steady spacing and directions, and add directions until the error is surely met.
 
-        They are chosen along other lines than those that tell what they reach: whoever repeats the
-        scan with lines of their own must not find a larger error.
+        The choice uses other random lines than the final scan, whose error is reported. Otherwise
+        the settings would suit just these lines, and a user would find a larger error.
         """
         spacing = min(first_steady(spacings) or PAPER_SPACING, FIXED_SPACING)
         rule = rule_of(int(first_steady(directions) or len(usual_rule(self.space))), self.space)
         other_lines = replace(self.settings, tolerance=target, seed=self.settings.seed + 1)
         for _ in range(ROUNDS):
             trial = replace(other_lines, spacing=Length(spacing, "rmin"), directions=rule)
-            _, found = self.measured("recommended", len(rule), trial)
-            errors = [Goal().errors(found.sums, found.plan, one) for one in found.plan.variants]
-            missing = missing_work(errors, found.plan, found.sums.replicates)
+            _, measurement = self.measured("recommended", len(rule), trial)
+            errors = [
+                Goal().errors(measurement.sums, measurement.plan, name)
+                for name in measurement.plan.variants
+            ]
+            missing = missing_work(errors, measurement.plan, measurement.sums.replicates)
             if missing <= 1.0:
                 break
             wanted = len(rule) * missing
@@ -320,46 +328,46 @@ class _OneFrame:
 
 
 def judged(rows: Sequence[StepRow], dimension: int = 3) -> list[StepRow]:
-    """The rows of a ladder with ``steady`` filled in, variant by variant."""
+    """Fill in ``steady`` in the rows of a ladder, variant by variant."""
     from scipy.special import stdtrit
 
-    # by how many standard errors steps may differ by chance, given all pairs of a variant's
+    # standard errors by which steps may differ by chance, by Bonferroni's rule for all pairs
     pairs = sum(math.comb(count, 2) for count in Counter(row.variant for row in rows).values())
     most = float(stdtrit(FREEDOM, 1.0 - 0.5 * CHANCE / max(pairs, 1)))
-    found: list[StepRow] = []
+    judged_rows: list[StepRow] = []
     for row in reversed(rows):
-        later = [one for one in found if one.variant == row.variant]
+        later = [step for step in judged_rows if step.variant == row.variant]
         is_sound = None not in (row.alpha_vs_axial, row.alpha_vs_axial_se) and not row.note
-        agree = all(one.steady and _agree(row, one, most, dimension) for one in later)
-        found.append(replace(row, steady=int(is_sound and agree)))
-    return found[::-1]
+        agree = all(step.steady and _agree(row, step, most, dimension) for step in later)
+        judged_rows.append(replace(row, steady=int(is_sound and agree)))
+    return judged_rows[::-1]
 
 
-def _agree(one: StepRow, other: StepRow, most: float, dimension: int) -> bool:
+def _agree(row: StepRow, other: StepRow, most: float, dimension: int) -> bool:
     """
-    Whether two values differ by no more than so many standard errors of their difference.
+    Whether two values differ by at most ``most`` standard errors of their difference.
 
-    Of two RVs one lies in the other, and they have the grains of the smaller one in common. The
-    variance of a mean over grains falls with their number, so the sample's part in the variance of
-    the difference is the difference of the variances; both follow from the larger RV's, which is
-    the better known.
+    The smaller of two RVs lies inside the larger, so they share grains. The variance of a mean over
+    grains falls with their number. So the sample's part in the variance of the difference is the
+    difference of both variances, which follow from the error of the larger RV, as it is better
+    known.
     """
-    if one.alpha_vs_axial is None or other.alpha_vs_axial is None:
+    if row.alpha_vs_axial is None or other.alpha_vs_axial is None:
         return False
     nested = 0.0
-    if one.ladder == "rv":
-        small, large = sorted((one, other), key=lambda row: row.rv_radius or 0.0)
+    if row.ladder == "rv":
+        small, large = sorted((row, other), key=lambda step: step.rv_radius or 0.0)
         more = ((large.rv_radius or 0.0) / (small.rv_radius or 1.0)) ** dimension
         nested = (large.alpha_vs_axial_sample_se or 0.0) * math.sqrt(max(more - 1.0, 0.0))
-    error = math.hypot(one.alpha_vs_axial_se or 0.0, other.alpha_vs_axial_se or 0.0, nested)
-    return abs(one.alpha_vs_axial - other.alpha_vs_axial) <= most * error
+    error = math.hypot(row.alpha_vs_axial_se or 0.0, other.alpha_vs_axial_se or 0.0, nested)
+    return abs(row.alpha_vs_axial - other.alpha_vs_axial) <= most * error
 
 
 def first_steady(rows: Sequence[StepRow]) -> float | None:
     """
     The first value of a ladder at which all variants are steady; None if there is none.
 
-    The last one alone has nothing to agree with.
+    The last step does not count, because it has no later step to agree with.
     """
     steps = [list(step) for _, step in groupby(rows, key=lambda row: row.value)]
     return next((step[0].value for step in steps[:-1] if all(row.steady for row in step)), None)
@@ -370,21 +378,21 @@ def _largest(rows: Sequence[StepRow], name: str) -> float | None:
 
 
 def _finding(ladder: str, rows: list[StepRow]) -> str:
-    """What the rows of a ladder show, in one sentence."""
+    """Describe the result of a ladder in one sentence."""
     if ladder != "cutoff":
         steady = first_steady(rows)
-        said = "no step agrees with all later ones"
+        text = "no step agrees with all later ones"
         if steady is not None:
-            said = f"from {steady:g} on nothing changes within the errors"
-        return f"{ladder}: {said}{PAPER.get(ladder, '')}"
+            text = f"from {steady:g} on, nothing changes within the errors"
+        return f"{ladder}: {text}{PAPER.get(ladder, '')}"
     variant = rows[0].variant
     own = {row.value: row.alpha_vs_axial or 0.0 for row in rows if row.variant == variant}
     best = max(own, key=lambda value: abs(own[value]))
-    said = (
-        f"cut-off: it decides what is measured; in {variant} the anisotropy is largest "
+    text = (
+        f"cut-off: it decides what is measured; in variant {variant} the anisotropy is largest "
         f"({own[best]:.2g}) at {best:g} r_min"
     )
     paper = own.get(PAPER_CUTOFF)
     if paper:
-        said += f"; at the paper's 1 r_min it is {paper / own[best]:.0%} of that"
-    return said
+        text += f"; at the paper's 1 r_min it is {paper / own[best]:.0%} of that"
+    return text

@@ -1,4 +1,4 @@
-"""What a reader sees in each frame of a series, with nothing computed from it."""
+"""Inspect a series: what a reader finds in each frame, without computing a fabric."""
 
 from __future__ import annotations
 
@@ -27,93 +27,93 @@ class FrameReport(Record):
     """One frame as the reader sees it; lengths in the dump's unit."""
 
     source: Annotated[str, "the series as given"]
-    frame: Annotated[int, "index in the series, from 0"]
-    step: Annotated[int | None, "of the dump"]
-    time: Annotated[float | None, "of the dump", "time"]
-    format: Annotated[str, "the reader"]
-    grains: Annotated[int, "without boundary particles; a clump is one grain"]
+    frame: Annotated[int, "index of the frame in the series, from 0"]
+    step: Annotated[int | None, "time step of the dump"]
+    time: Annotated[float | None, "simulation time of the dump", "time"]
+    format: Annotated[str, "name of the reader"]
+    grains: Annotated[int, "number of grains, without boundary particles; a clump is one grain"]
     boundary: Annotated[int, "number of boundary particles"]
     radius_min: Annotated[float | None, "smallest radius of a grain", LENGTH]
     radius_max: Annotated[float | None, "largest radius of a grain", LENGTH]
-    contacts: Annotated[int, "listed or found by geometry, those with boundary particles too"]
-    contacts_from: Annotated[str, "file or geometric"]
-    rattlers: Annotated[int, "grains with too few contacts; of clumps, with too few neighbours"]
-    coordination: Annotated[float | None, "mean number of contacts, of clumps of neighbours"]
-    cell: Annotated[list[list[float]] | None, "the lattice vectors, by rows", LENGTH]
-    periodic: Annotated[list[bool] | None, "whether the sample repeats along each of them"]
-    columns: Annotated[list[str], "of the particles; those that are not standard by their names"]
-    warnings: Annotated[list[str], "what is doubtful"]
-    low: Annotated[list[float] | None, "corner of the box of the gathered grains' surfaces", LENGTH]
-    high: Annotated[list[float] | None, "the opposite corner", LENGTH]
+    contacts: Annotated[int, "number of contacts, including those with boundary particles"]
+    contacts_from: Annotated[str, "file: listed in the dump; geometric: found by geometry"]
+    rattlers: Annotated[int, "number of grains with too few contacts (clumps: neighbours)"]
+    coordination: Annotated[float | None, "mean number of contacts (clumps: neighbours) per grain"]
+    cell: Annotated[list[list[float]] | None, "lattice vectors as rows", LENGTH]
+    periodic: Annotated[list[bool] | None, "whether the sample repeats along each lattice vector"]
+    columns: Annotated[list[str], "names of the particle columns, standard columns first"]
+    warnings: Annotated[list[str], "doubts about the frame"]
+    low: Annotated[list[float] | None, "lower corner of the box around the grains", LENGTH]
+    high: Annotated[list[float] | None, "upper corner of the box around the grains", LENGTH]
     rv_center: Annotated[list[float] | None, "centre of the RV of the series", LENGTH]
     rv_radius: Annotated[float | None, "radius of the ball that holds the RV", LENGTH]
-    rv_shape: Annotated[str | None, "its shape and size in words"]
-    clumps: Annotated[int, "grains that are bodies of several spheres"]
-    spheres: Annotated[int, "that the grains are made of"]
+    rv_shape: Annotated[str | None, "shape and size of the RV in words"]
+    clumps: Annotated[int, "number of grains that are bodies of several spheres"]
+    spheres: Annotated[int, "number of spheres that the grains consist of"]
 
 
 def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
     """
-    Read the chosen frames and tell what is in them.
+    Read the chosen frames and report what is in them.
 
     Parameters
     ----------
     series : Series
         The frames.
     settings : Settings
-        ``boundary``, ``frames``, ``min_contacts``, ``rattlers``, ``min_force``,
-        ``contact_tolerance`` and the RV count.
+        Only ``boundary``, ``frames``, ``min_contacts``, ``rattlers``, ``min_force``,
+        ``contact_tolerance`` and the options of the RV are used.
 
     Raises
     ------
     ScanfabError
-        If a frame cannot be read, or no frame has any of the boundary's particles.
+        If a frame cannot be read, or no frame has boundary particles although they are named.
     """
-    frames, found = Frames(series, settings), False
+    frames, any_chosen = Frames(series, settings), False
     window: Window | None = None
     for number, frame in enumerate(series.whole):
         if number in frames.chosen:
-            found = True
-            sample, told = _read(frames, frame)
+            any_chosen = True
+            sample, doubts = _read(frames, frame)
             window = window or _rv(frames, sample)
-            yield _report(series.name, number, frame, sample, told, window)
+            yield _report(series.name, number, frame, sample, doubts, window)
         elif window is None:
             with suppress(PackingError, ReadError):
                 window = _rv(frames, _read(frames, frame)[0])
         if number >= frames.chosen.stop - 1:
             break
-    if not found:
+    if not any_chosen:
         raise frames.no_such_frames()
 
 
 def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
-    """A frame, and what is doubtful about it, also what makes it impossible to measure."""
-    told = []
+    """Read a frame and collect doubts, including errors that would prevent a measurement."""
+    doubts = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         sample = frames.read(frame)
-    for one in caught:
-        if issubclass(one.category, ScanfabNote):
-            warnings.warn(one.message, stacklevel=2)
+    for warning in caught:
+        if issubclass(warning.category, ScanfabNote):
+            warnings.warn(warning.message, stacklevel=2)
         else:
-            told.append(str(one.message))
+            doubts.append(str(warning.message))
     if len(sample.packing):
-        told += [one.text for one in boundary_hints(sample, frames.settings)]
+        doubts += [doubt.text for doubt in boundary_hints(sample, frames.settings)]
     try:
         refuse_impossible(sample)
     except PackingError as error:
-        told.append(str(error))
-    told += [one.text for one in doubts_of(sample, **frame.named)]
+        doubts.append(str(error))
+    doubts += [doubt.text for doubt in doubts_of(sample, **frame.named)]
     if no_cell := cell_doubt(sample, frame.carries):
-        told.append(no_cell)
+        doubts.append(no_cell)
     elif hint := cell_hint(sample, frame.carries):
         note(hint)
-    told += [one.text for one in sample.doubts_of_escaped()]
-    return sample, told
+    doubts += [doubt.text for doubt in sample.doubts_of_escaped()]
+    return sample, doubts
 
 
 def _rv(frames: Frames, sample: Sample) -> Window | None:
-    """The RV, the largest of several, and a word on the boundary, from the first frame with any."""
+    """The largest RV from a frame with grains, else None; also warns about the boundary."""
     if not sample.grains.any():
         return None
     tell(frames.check_boundary(sample))
@@ -121,7 +121,7 @@ def _rv(frames: Frames, sample: Sample) -> Window | None:
 
 
 def _report(
-    source: str, number: int, frame: Frame, sample: Sample, told: list[str], window: Window | None
+    source: str, number: int, frame: Frame, sample: Sample, doubts: list[str], window: Window | None
 ) -> FrameReport:
     packing, grains, cell = sample.packing, sample.grains, sample.packing.cell
     radius = packing.radius[grains]
@@ -143,7 +143,7 @@ def _report(
         cell=None if cell is None else cell.vectors.tolist(),
         periodic=None if cell is None else list(cell.periodic),
         columns=["id", "x", "y", "z", "radius", *packing.columns],
-        warnings=told,
+        warnings=doubts,
         low=None if box is None else box.low.tolist(),
         high=None if box is None else box.high.tolist(),
         rv_center=None if window is None else window.center.tolist(),

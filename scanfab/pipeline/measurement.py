@@ -1,4 +1,4 @@
-"""One frame scanned: its solids, and the sums that its lines give."""
+"""Scan one frame: its solids, and the sums over its lines."""
 
 from __future__ import annotations
 
@@ -26,53 +26,53 @@ from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Inner, Solids, margin_of, most_lines
 
-# Of the scan for the sample's scatter: its noise is known from the replicates, and taken off. Lines
-# at one distance in mean radii make as many segments for each grain of a small sample as of a large
-# one (about 900 in dense packings), so noise and scatter fall together as grains are added.
+# A separate scan measures the error due to the sample. Its replicates show its noise, which is
+# subtracted. A spacing in mean radii gives the same number of segments per grain in small and large
+# samples (about 900 in dense packings), so noise and scatter fall together as grains are added.
 BLOCK_REPLICATES = 2
-# Axes times grains: along the usual directions alone, the error of an RV of a few hundred grains
-# would scatter by a quarter of its value with the seed; along so many by a tenth or less.
+# Least number of axes times grains of this scan. With the usual directions, the error of an RV of a
+# few hundred grains would change with the seed by a quarter; with these, by a tenth or less.
 AXES_TIMES_GRAINS = 80_000
-# Chords that this scan may cut: in dense packings of like grains 1,250 a grain are needed. Where
-# grains overlap many times or differ much in size there would be more. Of samples of more than a
-# million grains the scatter is far below any tolerance in use.
+# Most chords of this scan. Dense packings of similar grains need 1,250 per grain; grains that
+# overlap many times or differ much in size would need more. For samples of more than a million
+# grains the error due to the sample is far below any tolerance in use.
 CHORDS_A_GRAIN = 2_000
 FEWEST_CHORDS, MOST_CHORDS = 3e7, 1e9
 
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """What the scans of one frame say."""
+    """The results of the scans of one frame."""
 
     sample: Sample
     plan: Plan
-    """With the rule and the spacing as they were in the end."""
+    """The plan with the final rule and spacing."""
     solids: Solids
-    """What the lines met; their origin is the centre of the RV, or of the grains without one."""
+    """The spheres that lines may meet; the origin is the centre of the RV, else of the grains."""
     sums: ScanSums
     gaps: GapSums | None
-    """All gaps of the same lines, where more than one cut-off or moment is asked for."""
+    """All gaps of the same lines; None unless several cut-offs or another moment need them."""
     blocked: GapSums
-    """Gaps of fewer lines, by the block of their middle."""
+    """Gaps of a second scan with fewer lines, by the block that their middle lies in."""
     block_rule: DirectionRule
-    """The directions of these lines."""
+    """Directions of the second scan."""
     blocks: tuple[Blocks, Blocks]
-    """Octants of the whole sample and of the window, of places in the dump's coordinates."""
+    """Octants of the whole sample and of the window, in the dump's coordinates."""
     notes: tuple[Note, ...] = ()
-    """On tolerances that the scan did not reach."""
+    """Notes on tolerances that the scan did not meet."""
 
     def kept(self, variant: str, place: int = 0) -> tuple[FloatArray, FloatArray | IntArray]:
-        """As :meth:`GapSums.kept`, at one of the plan's cut-offs, with the moment of the table."""
+        """Sums of kept segments as :meth:`GapSums.kept`, at the plan's cut-off number ``place``."""
         if self.gaps is None:
             return self.sums.kept(variant)
         return self.gaps.kept(variant, place, self.plan.moment)
 
     def spheres_of(self, variant: Variant) -> tuple[FloatArray, FloatArray, Convex | None]:
         """
-        What a few lines of a variant meet, for figures and views.
+        The spheres of a variant and the region of its lines, for figures and views.
 
-        Positions (N, 3) from the solids' origin and radii (N,) of its solids, and the region that
-        its lines are clipped to, if any. Of a periodic whole a part is shown, within a sphere.
+        Returns the positions (N, 3) from the solids' origin, the radii (N,), and the region that
+        clips the lines, if any. A periodic whole is shown in part, within a sphere.
         """
         solids, medium = self.solids, self.solids.medium
         position, radius, removed = solids.position, solids.radius, solids.removed
@@ -93,9 +93,9 @@ class Measurement:
 
 def measure(sample: Sample, plan: Plan, where: str = "the frame") -> tuple[Measurement, ...]:
     """
-    Scan one frame that has grains, each RV along the same lines.
+    Scan one frame that has grains; all RVs are scanned along the same lines.
 
-    The whole is measured with the first of them. ``where`` names the frame where progress is told.
+    The whole sample is measured together with the first RV. ``where`` names the frame in the log.
     """
     first = _measure(sample, plan, where)
     others = first.plan.along(first.sums.replicates)
@@ -111,13 +111,13 @@ def _measure(sample: Sample, plan: Plan, where: str) -> Measurement:
 def _with_gaps(
     sample: Sample, solids: Solids, sums: ScanSums, plan: Plan, notes: tuple[Note, ...]
 ) -> Measurement:
-    """Add the gaps of all lines, if the plan needs them, and those of fewer lines by octant."""
+    """Add the gaps of all lines, if the plan needs them, and gaps by octant of a second scan."""
     blocks = _octants(sample, plan)
     scan = gap_scan(solids, plan, blocks, plan.cutoffs)
     gaps = None
     if plan.lists_gaps:
         gaps = scan(plan.rule, spacing=plan.spacing, replicates=range(sums.replicates))
-    # the directions of an auto scan; more of them for fewer grains
+    # the directions of an auto scan, or more directions for few grains
     count = len(solids.grain_radius)
     rule = usual_rule(solids.space)
     if len(rule) * count < AXES_TIMES_GRAINS:
@@ -132,10 +132,10 @@ def gap_scan(
     solids: Solids, plan: Plan, blocks: tuple[Blocks, Blocks], cutoffs: Sequence[float]
 ) -> Callable[..., GapSums]:
     """
-    A scan of all gaps by blocks of the dump's coordinates, with the variants and seed of a plan.
+    Prepare a scan that lists all gaps by block, with the variants and seed of a plan.
 
-    What is left to name is the rule, spacing and replicates. Its steps are not limited: the scan
-    before it tells how long it takes.
+    Rule, spacing and replicates are still to be given. The number of steps is not limited, because
+    the scan before shows how many there are.
     """
     return partial(
         scan_gaps, solids,
@@ -145,7 +145,7 @@ def gap_scan(
 
 
 def _octants(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
-    """Octants about the middle of the sample (of the cell), and about the centre of the RV."""
+    """Octants about the middle of the sample or its cell, and about the centre of the RV."""
     packing, cell = sample.packing, sample.packing.cell
     position = compressed(sample.gathered, packing.position)
     low, high = position.min(axis=0), position.max(axis=0)
@@ -163,16 +163,16 @@ def _octants(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
 
 def coarse_spacing(solids: Solids, axes: int, before: ScanSums, plan: Plan, most: float) -> float:
     """
-    The spacing of a scan for errors: as close as is of use, but it cuts at most so many chords.
+    Spacing of a scan for errors: as close as is useful, but with at most ``most`` chords.
 
-    ``axes`` is the number of axes of all its replicates. The scan ``before`` tells how many steps
-    it takes to follow lines through a periodic medium.
+    ``axes`` is the number of axes in all its replicates. The scan ``before`` shows how many steps
+    are needed to follow lines through a periodic medium.
     """
     if not len(solids.grain_radius):
         return solids.reach
     spacing = NOISE[solids.space.dimension].close * float(solids.grain_radius.mean())
     steps = plan.space.lines(float(before.steps.mean()) / len(plan.rule), spacing / plan.spacing)
-    # a line costs as much as a chord, also if it meets nothing
+    # each line costs as much as a chord, even if it meets nothing
     chords = axes * (solids.chords(spacing) + most_lines(solids, spacing) + steps)
     return spacing * plan.space.apart(max(chords / most, 1.0))
 
@@ -186,28 +186,27 @@ def solids_of(
     Parameters
     ----------
     sample : Sample
-        Its grains are the solids, boundary particles never; its rattlers are those that b and d
-        remove.
+        Its grains are the solids; boundary particles are not. Variants b and d remove its rattlers.
     window : Window, optional
-        The RV, which the lines of c and d are clipped to; without one these have no lines.
+        The RV that clips the lines of c and d; without it c and d have no lines.
     variants : str, optional
-        Which of a, b, c, d are to be scanned. Without a and b, grains outside the window are left
-        out, and of a periodic packing the whole.
+        Variants to scan, letters out of abcd. Without a and b, grains outside the window are left
+        out.
     edge : {"clip", "start", "ends"}, optional
-        What counts at the window's surface.
+        How segments at the surface of the window count.
 
     Returns
     -------
     Solids
-        Positions relative to the window's centre; without one, to the mean of the grains' centres.
-        ``origin`` is that point.
+        Spheres with positions from ``origin``, which is the centre of the window, or without a
+        window the mean of the grain centres.
 
     Raises
     ------
     SettingsError
         If the window is wider than a period of the cell.
     PackingError
-        If the contacts, which tell the rattlers, are not known.
+        If the contacts, which decide what is a rattler, are unknown.
 
     Examples
     --------
@@ -235,7 +234,7 @@ def solids_of(
     removed = sample.rattlers[grains]
     origin = position.mean(axis=0) if window is None else window.center.copy()
     if space.across is not None:
-        # exactly in the plane, as the mean would not be
+        # the mean lies beside the plane by rounding
         origin[space.across] = packing.place_across
     position = np.ascontiguousarray(position - origin)
     shape = None if window is None else window.shape
@@ -243,16 +242,16 @@ def solids_of(
     if cell is not None and packing.is_periodic:
         vectors, periodic = cell.short_vectors, np.array(cell.periodic)
         if space.across is not None:
-            # the one across the plane comes last, as long as discs are wide: then what is expected
-            # of mean free paths in space holds here, too
+            # The vector across the plane comes last and gets the length of a mean diameter, so that
+            # estimates of mean free paths in three dimensions also hold for discs.
             order = np.argsort(vectors[:, space.across] != 0.0, kind="stable")
             vectors, periodic = vectors[order], periodic[order]
             vectors[2] = 2.0 * float(radius.mean()) * space.normal
-    every = CellGrains(position, radius, removed, vectors, periodic)
-    around = every if edge == START and shape is not None else None
+    all_grains = CellGrains(position, radius, removed, vectors, periodic)
+    around = all_grains if edge == START and shape is not None else None
     margin = 0.0 if around is None else margin_of(around)
     if cell is not None and packing.is_periodic:
-        medium = every if whole else None
+        medium = all_grains if whole else None
         reach = 0.0 if shape is None else shape.reach
         position, row = cell.images_near_origin(position, radius + reach + margin)
         radius, removed = radius[row], removed[row]
@@ -260,11 +259,11 @@ def solids_of(
         near = shape.may_meet(position, radius + margin)
         position, radius, removed = position[near], radius[near], removed[near]
     elif edge == ENDS and whole:
-        # where all grains of an open sample are known
+        # an ellipsoid inside an open sample, out of which no segment depends on what lies outside
         gathered = sample.gathered
         largest = float(packing.radius[gathered].max())
-        found = inner_ellipsoid(packing.position[gathered], largest, space)
-        inner = None if found is None else Inner(found.shape, found.center - origin)
+        ellipsoid = inner_ellipsoid(packing.position[gathered], largest, space)
+        inner = None if ellipsoid is None else Inner(ellipsoid.shape, ellipsoid.center - origin)
     return Solids(
         position, radius, removed, shape, medium, origin,
         edge=edge, around=around, inner=inner, space=space,

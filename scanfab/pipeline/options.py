@@ -1,4 +1,4 @@
-"""Every option that is declared, and the words of the command line for them."""
+"""All declared options, and how the command line spells them in messages."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from scanfab.pipeline.settings import Settings
 
 
 def _figures() -> list[str]:
-    """All that compute draws; those of compare are among them."""
-    # what looks for plugins takes a moment to load
+    """Names of the figures that compute and compare draw."""
+    # imported here because looking for plugins takes a moment
     from scanfab.table.plots import figures_of
 
     return [*figures_of("table"), *figures_of("frames")]
 
 
 def _columns() -> list[str]:
-    """The columns of compute and compare."""
+    """Names of the columns of compute and compare."""
     from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
     from scanfab.table.compare import FRAMES, SUMMARY
 
-    every = (*OWN_COLUMNS, *MORE_COLUMNS, *FRAMES, *SUMMARY)
-    return list(dict.fromkeys(one.name for one in every))
+    columns = (*OWN_COLUMNS, *MORE_COLUMNS, *FRAMES, *SUMMARY)
+    return list(dict.fromkeys(column.name for column in columns))
 
 
 @dataclass
 class Output:
-    """The options of ``compute`` and ``map`` that are neither of reading nor settings."""
+    """Options of ``compute`` and ``map`` about output and the run, not about the result."""
 
     output: Path | None = running(spelling="-o", first=True)
     """
@@ -45,30 +45,30 @@ class Output:
     fields: str | None = option(metavar="NAME,NAME,...", choices=_columns)
     """Which columns to write, in this order (default: all)."""
     digits: int = option(default=DEFAULT_DIGITS)
-    """Significant digits of numbers; 17 writes the shortest form that reads back the same."""
+    """Significant digits of numbers; 17: the shortest text that reads back to the same number."""
     follow: bool = running(default=False, group="reading")
     """
-    Wait for the frames of a running simulation, and compute each once its files are whole. Ctrl-C
-    or SIGTERM ends the run in order, a second one interrupts it.
+    Wait for the frames of a running simulation, and compute each frame when its files are complete.
+    Ctrl-C or SIGTERM finishes the frames under way and ends the run; a second signal interrupts it.
     """
     follow_for: float | None = running(group="reading", metavar="SECONDS")
-    """Same as `follow`, until so many seconds have passed without a new frame."""
+    """Same as `follow`, but stop after this many seconds without a new frame."""
     scheduler: str | None = running(group="scan", metavar="tcp://HOST:PORT")
     """
-    Send the frames to the workers of a Dask cluster, in place of `workers`. They must see the same
-    files by the same paths.
+    Send the frames to the workers of a Dask cluster, in place of `workers`. The workers must find
+    the same files at the same paths.
     """
     scheduler_file: Path | None = running(group="scan")
-    """Same as `scheduler`, by the file that dask scheduler, dask-mpi or dask-jobqueue writes."""
+    """Same as `scheduler`, from the file that dask scheduler, dask-mpi or dask-jobqueue writes."""
     resume: bool = running(default=False)
-    """Go on with the FILE.part of an interrupted run, or add missing frames to a complete FILE."""
+    """Continue the FILE.part of an interrupted run, or add missing frames to a complete FILE."""
     manifest: Path | None = running()
     """
     Write settings, seed, versions, and the size and hash of each input as JSON. With `output=FILE`
     they are always written to FILE.manifest.json.
     """
     vtk: Path | None = running(metavar="DIR")
-    """Write files for ParaView of each frame that this run computes."""
+    """Write files for ParaView into this folder, for each frame that this run computes."""
     plot: Path | None = running()
     """Draw a figure: .png .svg .pdf."""
     figure: str | None = running(metavar="NAME", choices=_figures)
@@ -87,43 +87,45 @@ def _writer_names() -> Iterable[str]:
 
 @dataclass
 class Other:
-    """Options of commands that compute no table."""
+    """Options of the other commands, which compute no table."""
 
     frame: int = reading(default=0, decides=False, metavar="K")
     """Which frame; a negative number counts from the end."""
     to: str | None = running(metavar="NAME", choices=_writer_names, first=True)
-    """Format to write (default: by the suffix of OUT); scanfab formats lists them."""
+    """Format to write (default: from the suffix of OUT); scanfab formats lists all formats."""
 
     strain_max: float | None = running(group="fabric")
     """Leave frames beyond this strain out of the fits."""
     labels: str | None = running(spelling="--label", several=True, metavar="NAME")
-    """Name of a table in place of its source; once for each table, in their order."""
+    """Name of a table, in place of its source. Repeat the option for each table, in order."""
     screenshot: Path | None = running(metavar="FILE.png")
-    """Write a picture instead of opening a window; this needs no screen."""
+    """Write a picture in place of opening a window; this needs no screen."""
 
 
-OPTIONS = {one.name: one for one in (*READING_OPTIONS, *options_of(Settings), *options_of(Output))}
-"""The options of compute by name."""
+OPTIONS = {
+    option.name: option for option in (*READING_OPTIONS, *options_of(Settings), *options_of(Output))
+}
+"""Options of compute, by name."""
 
 MAP_OPTIONS = {
-    one.name: one
-    for one in (*READING_OPTIONS, *options_of(MapSettings), *options_of(Output))
-    if one.name not in ("cutoffs", "figure", "with_")
+    option.name: option
+    for option in (*READING_OPTIONS, *options_of(MapSettings), *options_of(Output))
+    if option.name not in ("cutoffs", "figure", "with_")
 }
-"""Those of map."""
+"""Options of map, by name."""
 
-DECLARED = {**MAP_OPTIONS, **OPTIONS, **{one.name: one for one in options_of(Other)}}
-"""Those of the other commands too."""
+DECLARED = {**MAP_OPTIONS, **OPTIONS, **{option.name: option for option in options_of(Other)}}
+"""Options of all commands, by name."""
 NAMES = "|".join(DECLARED)
 
 
-def as_options(told: str | Exception) -> str:
+def as_options(message: str | Exception) -> str:
     """
-    What the library tells, which speaks of its arguments, in the words of the command line.
+    Rewrite a message of the library, which names Python arguments, for the command line.
 
-    What came by standard input is called that, and not by the file that it was copied to.
-    The argument whose value is wrong stands in front of a SettingsError. Any other text may begin
-    with the name of a file, which may be that of an option too.
+    Data from standard input is called so, not by the temporary file that holds it. A SettingsError
+    begins with the argument that is wrong. Other messages may begin with a file name that happens
+    to be the name of an option, so their first word stays.
 
     Examples
     --------
@@ -131,22 +133,22 @@ def as_options(told: str | Exception) -> str:
     >>> as_options('choose another `rv_center`, or name the `cell=(LX, LY, LZ)`')
     'choose another --rv-center, or name the --cell LX LY LZ'
     """
-    text = without_temporary(str(told))
-    if isinstance(told, SettingsError):
+    text = without_temporary(str(message))
+    if isinstance(message, SettingsError):
         text = re.sub(rf"^({NAMES}): ", r"`\1`: ", text)
     return re.sub(rf"`({NAMES})(=[^`]*)?`", _as_words, text)
 
 
-def _as_words(found: re.Match[str]) -> str:
-    """An option with its value in Python: `cell=(1, 2)` is --cell 1 2, `x={"a": "b"}` is -x a=b."""
-    flag, value = DECLARED[found[1]].flag, (found[2] or "")[1:]
+def _as_words(match: re.Match[str]) -> str:
+    """Spell an option with a Python value: `cell=(1, 2)` is --cell 1 2, `x={"a": "b"}` -x a=b."""
+    flag, value = DECLARED[match[1]].flag, (match[2] or "")[1:]
     if value.startswith("("):
         value = value.strip("()").replace(",", "")
     elif value.startswith("{"):
         value = value.strip("{}").replace('"', "").replace(": ", "=").replace(", ", ",")
-    # what a shell takes as it is needs no quotes
+    # quotes are dropped if a shell does not need them
     return " ".join([flag, re.sub(r'^"([\w.:/+-]*)"$', r"\1", value)]).strip()
 
 
-MEANINGS = {name: as_options(one.help) for name, one in OPTIONS.items() if one.decides}
-"""What each option decides that decides a result, in the words of the report."""
+MEANINGS = {name: as_options(option.help) for name, option in OPTIONS.items() if option.decides}
+"""For the report: the help of each option that decides a result, by name."""

@@ -1,4 +1,4 @@
-"""The plan of a series: settings turned into lengths, from its first frame that has grains."""
+"""The plan of a series: settings turned into lengths by its first frame that has grains."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from scanfab.pipeline.values import Vector
 from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.directions import DirectionRule, usual_rule
 
-# settings that a plan takes over unchanged
+# settings that a plan copies unchanged
 AS_ASKED = (
     "variants", "axis", "moment", "seed", "workers", "tolerance", "max_chords", "more_columns",
     "edge", "lists_gaps",
 )  # fmt: skip
-# replicates of a fixed scan, and at least of an auto scan
+# number of replicates of a fixed scan, and least number of an auto scan
 REPLICATES = 16
-# replicates at most of a scan that adds directions until its error, as they tell it, is small
+# most replicates of a scan that adds directions until the error between replicates is small
 MOST_REPLICATES = 64
-# with fewer lines along an axis, the mean lengths of a replicate are too uncertain to be of use
+# with fewer lines along an axis, the mean lengths of a replicate are too uncertain
 FEWEST_LINES = 30
-# the closest spacing, over the reach of what is scanned: nobody could wait for closer lines
+# closest spacing, relative to the reach of the scanned region; closer lines would take for ever
 CLOSEST = 1e-9
-# in mean radii: lines so far apart are independent of one another
+# in mean radii: lines at this distance are independent of one another
 WIDE = 3.0
 
 
@@ -45,49 +45,50 @@ class Noise(NamedTuple):
     """How many segments a scan needs for its error, as measured in dense packings."""
 
     segments: float
-    """Number for a standard error of 1, at a spacing of the mean radius."""
+    """Number of segments for a standard error of 1, at a spacing of the mean radius."""
     growth: float
-    """The number grows with this power of the spacing."""
+    """The number of segments grows with this power of the spacing."""
     close: float
-    """A spacing in mean radii: closer lines say little more than their neighbours do."""
+    """Spacing in mean radii below which closer lines add little information."""
 
 
-# By dimension. In dense packings of spheres whose radii are equal, or in the ratio 3 or 10, the
-# choice of directions is all that remains of the noise at a third of a radius. In dense packings of
-# discs, in the ratio 1.9 (sample_data/lammps_biaxial), it takes 0.025 to 0.039 segments at one
-# radius, 0.011 to 0.016 at 0.3 and 0.004 to 0.006 at 0.1, before shear and after.
+# By dimension. Spheres: measured in dense packings with equal radii and with radii in the ratio 3
+# and 10; at a spacing of a third of a radius, only the choice of directions adds noise. Discs:
+# measured in dense packings with radii in the ratio 1.9 (sample_data/lammps_biaxial) before and
+# after shear; 0.025 to 0.039 segments are needed at a spacing of one radius, 0.011 to 0.016 at 0.3
+# and 0.004 to 0.006 at 0.1.
 NOISE = {3: Noise(0.068, 0.75, 0.3), 2: Noise(0.032, 0.8, 0.1)}
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """All that the frames of a series need to be computed; lengths in the dump's unit."""
+    """Everything that is needed to compute the frames of a series; lengths in the dump's unit."""
 
     samples: SampleRule
-    """What is a grain, and what a rattler."""
+    """The rules that find boundary particles and rattlers."""
     strains: Strains
     variants: str
     axis: Vector
     """Loading axis, a unit vector."""
     moment: int
-    """1: ℓ is the mean length; 2: the mean of squares over the mean."""
+    """1: ℓ is the mean length; 2: ℓ is the mean squared length over the mean length."""
     seed: int
     workers: int
-    """Threads of a frame's scan."""
+    """Number of threads for the scan of a frame."""
     tolerance: float
-    """Of an auto scan: the wanted standard error of alpha_vs_axial."""
+    """Standard error of alpha_vs_axial that an auto scan aims at."""
     max_chords: float
-    """An auto scan stops before it cuts more."""
+    """An auto scan stops before it cuts more chords."""
     rvs: tuple[RV, ...]
     """
-    The RVs in ascending order: as they lie in the first frame that has grains, or, after
-    :meth:`in_frame`, in another one. The first is scanned until its tolerance holds, the others
-    along the same lines.
+    The RVs in ascending order, as they lie in the first frame that has grains, or, after
+    :meth:`in_frame`, in another frame. The first RV is scanned until its tolerance is met; the
+    others are scanned along the same lines.
     """
     more_columns: tuple[str, ...]
-    """Further columns of the table, behind those that every table has."""
+    """Names of columns beyond those of every table."""
     groups: tuple[str, ...]
-    """Of further columns, see :data:`scanfab.fabric.registry.GROUPS`."""
+    """Groups of further columns, from :data:`scanfab.fabric.registry.GROUPS`."""
     cutoffs: tuple[float, ...]
     """Cut-offs of the table's rows, in ascending order."""
     rule: DirectionRule
@@ -96,26 +97,26 @@ class Plan:
     edge: str
     """What counts at the window's surface, see :mod:`scanfab.scan.edges`."""
     lists_gaps: bool
-    """Whether sums for one cut-off do not suffice."""
+    """Whether all gaps must be listed, for several cut-offs or another moment."""
     map_settings: MapSettings | None
-    """Of a map; else None."""
+    """The settings of a map; None for other tables."""
     space: Space
-    """The plane in which all grains of the series lie, if they are discs."""
+    """The plane of the grains, if they are discs."""
     # the fields below are unknown for a series without grains
     cutoff: float = math.nan
-    """Cut-off of the scan that is to meet the tolerance."""
+    """Cut-off at which the scan must meet the tolerance."""
     spacing: float = math.nan
-    """Between the lines of one axis and replicate."""
+    """Distance between the lines of one axis and replicate."""
     replicates: int = 0
-    """Of a fixed scan; of the first round of an auto scan."""
+    """Number of replicates of a fixed scan, or of the first round of an auto scan."""
     auto: str = ""
     """What the scan may add to meet the tolerance: ``""``, ``replicates`` or ``directions``."""
     deformation: Deformation | None = None
-    """What the windows follow."""
+    """The deformation that the windows follow; None if they keep their shape."""
     map_blocks: MapBlocks | None = None
-    """Of a map whose series has grains: what its blocks tile."""
+    """The region that the blocks of a map tile; None for other tables."""
     notes: tuple[Note, ...] = ()
-    """What is doubtful about the settings, for a user who has chosen them."""
+    """Doubts about the settings, for the user who has chosen them."""
 
     @property
     def window(self) -> Window | None:
@@ -124,11 +125,11 @@ class Plan:
 
     @property
     def windows(self) -> list[Window]:
-        """All RVs."""
-        return [one.window for one in self.rvs if one.window is not None]
+        """The windows of all RVs."""
+        return [rv.window for rv in self.rvs if rv.window is not None]
 
     def rvs_of(self, variant: str) -> tuple[RV, ...]:
-        """The RVs that a variant has rows for; the whole has one entry without a window."""
+        """The RVs of a variant's rows; for the whole sample, one entry without a window."""
         return self.rvs if VARIANTS[variant].in_window else (RV(),)
 
     def in_frame(self, sample: Sample) -> Plan:
@@ -140,17 +141,17 @@ class Plan:
         return replace(self, rvs=tuple(RV(rv.fraction, window) for rv, window in rvs))
 
     def along(self, replicates: int) -> Iterator[Plan]:
-        """A plan for each of the other RVs, with the lines that the first was scanned along."""
-        variants = "".join(one for one in self.variants if VARIANTS[one].in_window)
+        """A plan for each further RV, with the same lines as for the first."""
+        variants = "".join(name for name in self.variants if VARIANTS[name].in_window)
         for rv in self.rvs[1:]:
             yield replace(self, rvs=(rv,), variants=variants, replicates=replicates, auto="")
 
 
 def plan_without_grains(settings: Settings, space: Space = SPACE) -> Plan:
     """
-    The plan as far as settings alone decide it.
+    The part of a plan that the settings alone decide.
 
-    A series without any grain keeps this plan: its frames have rows, but nothing is scanned.
+    It is the whole plan of a series without grains: its frames have rows, but nothing is scanned.
     """
     return Plan(
         samples=sample_rule(settings),
@@ -168,12 +169,12 @@ def plan_without_grains(settings: Settings, space: Space = SPACE) -> Plan:
 
 def make_plan(settings: Settings, sample: Sample) -> Plan:
     """
-    Resolve settings with the first frame that has grains.
+    Make the plan of a series from settings and the first frame that has grains.
 
     Parameters
     ----------
     settings : Settings
-        Later steps see only the plan.
+        Settings; all later steps use only the plan.
     sample : Sample
         The first frame that has grains.
 
@@ -192,7 +193,9 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     lengths = {"rmin": float(radii.min()), "rmean": float(radii.mean()), "rmax": float(radii.max())}
     box = SurfaceBox.of(packing, sample.gathered)
     windows = windows_of(sample, settings) if settings.needs_window else []
-    notes = [note for one in windows for note in doubts_of_rv(one, sample, box, lengths["rmax"])]
+    notes = [
+        note for window in windows for note in doubts_of_rv(window, sample, box, lengths["rmax"])
+    ]
     blocks: MapBlocks | None = None
     if isinstance(settings, MapSettings):
         blocks = MapBlocks.of(settings, sample)
@@ -205,23 +208,24 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     if settings.rv_follows != "none" and settings.needs_window:
         deformation = Deformation.since(sample, settings.strain, settings.axis)
     cutoff = settings.cutoff.resolve(lengths)
-    # of several RVs the first gets the share of all chords that its scan cuts at least
+    # The limit of chords holds for all RVs together. The first RV gets the fraction that its scan
+    # needs at least: its part of the total volume.
     share = 1.0
     if len(windows) > 1:
-        volumes = [one.shape.volume for one in windows]
+        volumes = [window.shape.volume for window in windows]
         share = volumes[0] / sum(volumes)
-        if any(not VARIANTS[one].in_window for one in settings.variants):
-            # its scan is that of the whole, too
+        if any(not VARIANTS[name].in_window for name in settings.variants):
+            # the scan of the first RV is also that of the whole sample
             share = 1.0 / len(windows)
     return replace(
         plan,
-        rvs=tuple(RV(rv.fraction, one) for rv, one in zip(plan.rvs, windows, strict=True)),
+        rvs=tuple(RV(rv.fraction, window) for rv, window in zip(plan.rvs, windows, strict=True)),
         strains=plan.strains.since(sample),
         deformation=deformation,
         max_chords=plan.max_chords * share,
         cutoff=cutoff,
-        # as many as were asked for, also if two are equal: all frames have the same number of rows
-        cutoffs=tuple(sorted(one.resolve(lengths) for one in settings.cutoffs)) or (cutoff,),
+        # equal cut-offs are kept, so that the number of rows is as the settings say
+        cutoffs=tuple(sorted(length.resolve(lengths) for length in settings.cutoffs)) or (cutoff,),
         map_blocks=blocks,
         notes=tuple(notes),
         **_lines(settings, len(plan.rule), box, windows[0].shape if windows else None, lengths),
@@ -231,11 +235,11 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
 def _lines(
     settings: Settings, axes: int, box: SurfaceBox, shape: Convex | None, lengths: dict[str, float]
 ) -> dict[str, Any]:
-    """How close the lines are, how many replicates there are, and what an auto scan may add."""
+    """Spacing of the lines, number of replicates, and what an auto scan may add."""
     space = box.space
-    # How large is what lines scan, the window, or of the whole half the smallest extent: its reach;
-    # the area that lines of one direction pierce, in the mean of all (in a plane a length); and
-    # three quarters of the mean length of the lines in it, of a sphere the radius.
+    # Size of the scanned region, which is the window, or the sphere of half the smallest extent of
+    # the whole. ``area`` is its projected area, averaged over directions (in a plane a length).
+    # ``depth`` is three quarters of the mean length of lines in it; for a sphere, the radius.
     reach = 0.5 * box.smallest_extent if shape is None else shape.reach
     area, depth = math.pi * reach**2, reach
     if space.is_plane or (shape is not None and not shape.is_sphere):
@@ -245,31 +249,31 @@ def _lines(
     if settings.spacing is None:
         spacing = _auto_spacing(settings, axes, area, depth, lengths["rmean"], space)
         return {"spacing": spacing, "replicates": REPLICATES, "auto": "replicates"}
-    asked = settings.spacing.resolve(lengths)
-    if not CLOSEST * reach <= asked <= 2.0 * reach:
+    spacing = settings.spacing.resolve(lengths)
+    if not CLOSEST * reach <= spacing <= 2.0 * reach:
         raise SettingsError(
             f"spacing: expected a length from {CLOSEST * reach:.2g} to {2.0 * reach:.4g}, the "
-            f"width of what is scanned, found {asked:g}: lengths are in the dump's unit; did you "
-            f"mean 1rmin ({lengths['rmin']:g})?"
+            f"width of the scanned region, found {spacing:g}: lengths are in the dump's unit; did "
+            f"you mean 1rmin ({lengths['rmin']:g})?"
         )
     auto = "directions" if settings.directions is None else ""
     fewest, most = (REPLICATES, MOST_REPLICATES) if auto else (1, REPLICATES)
-    replicates = int(min(max(space.lines(area, asked) / FEWEST_LINES, fewest), most))
-    return {"spacing": asked * space.apart(replicates), "replicates": replicates, "auto": auto}
+    replicates = int(min(max(space.lines(area, spacing) / FEWEST_LINES, fewest), most))
+    return {"spacing": spacing * space.apart(replicates), "replicates": replicates, "auto": auto}
 
 
 def _auto_spacing(
     settings: Settings, axes: int, area: float, depth: float, radius: float, space: Space
 ) -> float:
     """
-    Spacing of one replicate's lines at which the first round is likely to meet the tolerance.
+    Spacing of the lines in one replicate at which the first round probably meets the tolerance.
 
-    The spacing is never so wide that a replicate has too few lines, nor so close that more
-    directions would tell more.
+    The spacing is limited: if it is too wide, a replicate has too few lines; if it is too close,
+    more directions would reduce the error more.
     """
     noise = NOISE[space.dimension]
     segments_per_line = max(depth / (3.0 * radius), 1.0)
-    # lines * segments_per_line = segments, and lines are so many axes' area / spacing²
+    # the needed number of lines per axis and replicate, which is area / spacing²
     lines = noise.segments / settings.tolerance**2 / (REPLICATES * axes * segments_per_line)
     # each block of a map gets its share of the lines
     lines *= settings.blocks

@@ -1,4 +1,4 @@
-"""The RVs of a series: where settings put them in the first frame, and in deformed frames."""
+"""RVs of a series: their place in the first frame, and in deformed frames."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import cell_of, centers_of, strain_mode
 from scanfab.pipeline.values import Vector
 
-# in radii of the smallest grain: a smaller RV is a mistake
+# in radii of the smallest grain: a smaller RV is refused as a mistake
 SMALLEST = 1e-9
 
 
@@ -30,34 +30,34 @@ class RV(NamedTuple):
     """One of the RVs of a series."""
 
     fraction: float | None = None
-    """Its size as a fraction of the sample's, where there are several to be told apart."""
+    """Size as a fraction of the sample; None unless there are several RVs."""
     window: Window | None = None
-    """Its place and shape; None in a series without grains."""
+    """Place and shape; None in a series without grains."""
 
 
 def sizes_of(settings: Settings) -> tuple[RV, ...]:
-    """The RVs of a series, without their windows; none if no variant needs one."""
+    """The RVs of a series without their windows; empty if no variant needs an RV."""
     if not settings.needs_window:
         return ()
-    return tuple(RV(one if len(settings.rvs) > 1 else None) for one in settings.rvs)
+    return tuple(RV(fraction if len(settings.rvs) > 1 else None) for fraction in settings.rvs)
 
 
 def windows_of(sample: Sample, settings: Settings) -> list[Window]:
     """
-    The RVs that settings put into the first frame that has grains, in ascending order.
+    Windows of the RVs in the first frame that has grains, in ascending order.
 
     Raises
     ------
     SettingsError
-        If one is far smaller than any grain or lies beside the plane of the discs, or if its
-        surface is that of no convex body.
+        If an RV is far smaller than any grain, lies beside the plane of the discs, or has a surface
+        that is not convex.
     ReadError
-        If the file of its surface cannot be read.
+        If the file of the surface cannot be read.
     """
     packing, space = sample.packing, sample.packing.space
     surfaces = SurfaceBox.of(packing, sample.gathered)
     smallest = float(packing.radius[sample.grains].min())
-    found = []
+    windows = []
     for fraction in settings.rvs:
         shape, center = _shape(settings, fraction * (0.5 * surfaces.extents), space)
         if settings.rv_center is not None:
@@ -74,15 +74,15 @@ def windows_of(sample: Sample, settings: Settings) -> list[Window]:
             center[space.across] = packing.place_across
         if 0.5 * (shape.high - shape.low)[list(space.along)].min() < SMALLEST * smallest:
             raise SettingsError(
-                f"rv: the {shape} is nothing beside the smallest grain (radius {smallest:g}): "
+                f"rv: the {shape} is far too small for the smallest grain (radius {smallest:g}): "
                 f"choose a larger `rv`, `rv_radius` or `rv_size`"
             )
-        found.append(Window(center, shape))
-    return found
+        windows.append(Window(center, shape))
+    return windows
 
 
 def _shape(settings: Settings, part: FloatArray, space: Space) -> tuple[Convex, FloatArray | None]:
-    """The shape, in a plane a flat one, and its centre if a file says where it is."""
+    """The shape (flat in a plane), and its centre if a file gives it, else None."""
     kind, sizes = settings.rv_shape, settings.rv_size
     part = part[sorted(space.along)]
     if kind == "sphere":
@@ -107,10 +107,10 @@ def _shape(settings: Settings, part: FloatArray, space: Space) -> tuple[Convex, 
 
 def _cylinder_within(half: FloatArray, axis: Vector) -> tuple[float, float]:
     """
-    Radius and height of the cylinder that fills a box of these half edges.
+    Radius and height of the cylinder that fills a box with the given half edges.
 
-    Its half height and its radius are the half lengths of lines through the middle of the box,
-    along the axis and across it. If the axis is oblique, the cylinder shrinks until its rims fit.
+    Radius and half height are the distances from the middle of the box to its surface, across the
+    axis and along it. If the axis is oblique, the cylinder shrinks until its rims fit.
     """
     along = np.abs(np.array(axis))
     across = np.sqrt(np.maximum(1.0 - along**2, 0.0))
@@ -122,12 +122,12 @@ def _cylinder_within(half: FloatArray, axis: Vector) -> tuple[float, float]:
 
 def doubts_of_rv(window: Window, sample: Sample, box: SurfaceBox, largest: float) -> list[Note]:
     """
-    Check the place of an RV, and note if it comes near the sample's surface.
+    Check the place of an RV, and add a note if it lies near the surface of the sample.
 
     Raises
     ------
     SettingsError
-        If it holds no grain, reaches too far beyond the sample, or overlaps its own image.
+        If the RV holds no grain, reaches too far beyond the sample, or overlaps its own image.
     """
     packing, grains = sample.packing, sample.grains
     window.check_fits(packing)
@@ -135,21 +135,21 @@ def doubts_of_rv(window: Window, sample: Sample, box: SurfaceBox, largest: float
     meets = window.may_meet(packing.position, packing.radius, packing)
     if not np.any(meets & grains):
         raise SettingsError(
-            f"the {window} holds no grain: choose another `rv_center` or a larger one "
+            f"the {window} holds no grain: choose another `rv_center`, or a larger RV "
             f"(`rv_radius`, `rv_size`)"
         )
     if room < -2 * largest:
         raise SettingsError(
-            f"the {window} reaches {-room:g} beyond the sample, that is more than two of its "
-            f"largest radii ({largest:g}): choose another `rv_center` or a smaller `rv`, "
+            f"the {window} reaches {-room:g} beyond the sample, which is more than twice the "
+            f"largest radius ({largest:g}): choose another `rv_center` or a smaller `rv`, "
             f"{RV_MEANING}" + ("" if window.shape.is_sphere else ", or a smaller `rv_size`")
         )
     if room >= largest:
         return []
     text = (
-        f"the {window} comes within one of the largest radii ({largest:g}) of the sample's "
-        f"surface: it cuts the outermost layer of grains, which a boundary arranges: choose a "
-        f"smaller `rv`, or use more grains"
+        f"the {window} comes closer to the sample's surface than the largest radius ({largest:g}), "
+        f"so it cuts the outermost layer of grains, which the boundary arranges: choose a smaller "
+        f"`rv`, or use more grains"
     )
     return [Note("rv_at_surface", text)]
 
@@ -157,11 +157,12 @@ def doubts_of_rv(window: Window, sample: Sample, box: SurfaceBox, largest: float
 @dataclass(frozen=True, eq=False)
 class Deformation:
     """
-    How the sample is deformed since its first frame that has grains, as far as an RV follows it.
+    The affine deformation that an RV follows, relative to the first frame that has grains.
 
-    The place x of that frame lies at o + F (x - o₀) in another, F = H H₀⁻¹. With the cell, H has
-    its vectors as columns and o is its origin; with boundary or grains, H has the extents of their
-    centres along x, y, z on its diagonal, and o is the lower corner.
+    A point x of that frame lies at o + F (x - o₀) in another frame, with F = H H₀⁻¹. If the RV
+    follows the cell, H has the cell's vectors as columns and o is its origin. If it follows
+    boundary or grains, the diagonal of H holds the extents of their centres along x, y, z, and o is
+    the lower corner.
     """
 
     mode: str
@@ -174,40 +175,42 @@ class Deformation:
     @classmethod
     def since(cls, sample: Sample, mode: str, axis: Vector) -> Deformation:
         """
-        From a frame on, by what the strain is measured by.
+        Start the deformation at a frame; ``mode`` says what the strain is measured by.
 
         Raises
         ------
         SettingsError
-            If there is nothing to measure, or it is flat.
+            If there is nothing to measure the deformation by, or if it has no volume.
         """
         mode = strain_mode(sample, mode, axis)
         if not mode:
             raise SettingsError(
-                "rv_follows: there is neither a periodic cell nor a boundary that tells how the "
+                "rv_follows: there is neither a periodic cell nor a boundary to measure how the "
                 'sample deforms: choose `strain="grains"`, or leave out `rv_follows`'
             )
         origin, edges = _edges(sample, mode)
         space = sample.packing.space
         scale = float(np.abs(edges[list(space.along)]).max())
         if abs(np.linalg.det(edges)) <= 1e-9 * scale**space.dimension:
-            raise SettingsError(f"rv_follows: the {mode} it is to follow has no volume")
+            raise SettingsError(f"rv_follows: the {mode} to follow has no volume")
         return cls(mode, origin, edges)
 
     def windows_in(self, sample: Sample, windows: Sequence[Window]) -> list[Window]:
-        """Windows of the first frame as they lie in another."""
+        """The windows of the first frame as they lie in another frame."""
         origin, edges = _edges(sample, self.mode)
         if np.array_equal(origin, self.origin) and np.array_equal(edges, self.edges):
             return list(windows)
         gradient = edges @ np.linalg.inv(self.edges)
         return [
-            Window(origin + gradient @ (one.center - self.origin), one.shape.deformed(gradient))
-            for one in windows
+            Window(
+                origin + gradient @ (window.center - self.origin), window.shape.deformed(gradient)
+            )
+            for window in windows
         ]
 
 
 def _edges(sample: Sample, mode: str) -> tuple[FloatArray, FloatArray]:
-    """Origin and edges, as columns, of what an RV follows; across a plane nothing changes."""
+    """Origin and edges (columns) of the cell or extents; constant along a plane's normal."""
     space = sample.packing.space
     if mode == "cell":
         cell = cell_of(sample)

@@ -1,4 +1,4 @@
-"""Settings of a computation: each option declared once, checked when they are made, frozen."""
+"""Settings of a computation: each option is declared once, checked at once and then fixed."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from scanfab.scan.directions import DirectionRule
 
 
-# one to two minutes of one processor, some hundred times what a frame of a dense packing needs for
-# the default tolerance
+# This takes one processor one to two minutes, and is some hundred times what a frame of a dense
+# packing needs for the default tolerance.
 MAX_CHORDS = 1e10
-# options that mean something only if another option has this value
+# options that have a meaning only if another option has this value
 NEEDS = {
     "rv_radius": ("rv_shape", "sphere"),
     "rv_axis": ("rv_shape", "cylinder"),
@@ -35,15 +35,14 @@ NEEDS = {
 @dataclass(frozen=True, init=False)
 class Settings:
     """
-    What to compute, and how.
+    What to compute, and how: the checked options of :func:`scanfab.compute`.
 
-    Settings are made of the options of :func:`scanfab.compute`, written as there; the attributes
-    are what they mean, with lengths in the dump's unit.
+    The attributes hold what the options mean, for instance a :class:`Length` for ``"0.5rmin"``.
 
     Parameters
     ----------
     **options
-        Those of :func:`scanfab.compute`.
+        Options of :func:`scanfab.compute`.
 
     Raises
     ------
@@ -65,7 +64,7 @@ class Settings:
     """
     Size of the representative volume (RV), relative to the sample: the radius of a sphere as a
     fraction of half the smallest extent of the grains, the sizes of other shapes as fractions of
-    half the extents. Several fractions give a row each, all from the same lines.
+    half the extents. Each of several fractions gives a row of its own, from the same lines.
     """
     rv_radius: float | None = window(values.parse_radius, metavar="L")
     """Radius of the spherical RV in the dump's units, instead of `rv`."""
@@ -84,14 +83,14 @@ class Settings:
     """Axis of the cylinder (default: `axis`)."""
     rv_follows: str = window(default="none", choices=("none", "strain"))
     """
-    none: the RV keeps its shape. strain: it deforms with the sample, by what `strain` is measured
-    from: with the cell, or with the extents of boundary or grains along x, y, z.
+    none: the RV keeps its shape. strain: it deforms with the sample, that is with whatever `strain`
+    is measured by: the cell, or the extents of boundary or grains along x, y, z.
     """
     edge: str = window(default=CLIP, choices=EDGES)
     """
-    How void segments count that the surface of the RV cuts. clip: by their part inside; start: by
-    their full length, one half for each end inside; ends: by their part inside and the number of
-    their ends inside, which corrects for the cut.
+    How to count void segments that the surface of the RV cuts. clip: their part inside counts;
+    start: their full length counts, one half for each end inside; ends: their part inside and the
+    number of their ends inside count, which corrects for the cut.
     """
     variants: str = sample(values.parse_variants, default="abcd", metavar="LETTERS", first=True)
     """
@@ -112,8 +111,8 @@ class Settings:
     """
     cutoffs: tuple[Length, ...] = scan(values.parse_lengths, metavar="FROM:TO:STEP|L,L,...")
     """
-    Several cut-offs, with a row for each, from one pass over the void segments; `cutoff` is then
-    the one at which the scan meets the tolerance.
+    Several cut-offs, with a row for each, from one pass over the void segments; the scan then meets
+    the tolerance at `cutoff`.
     """
     moment: int = fabric(values.parse_moment, default=1, choices=("1", "2"))
     """
@@ -139,9 +138,9 @@ class Settings:
     """
     max_chords: float = scan(values.parse_work, default=MAX_CHORDS, metavar="N")
     """
-    Limit for the work of an auto scan: in each frame it stops before it cuts more chords from
-    grains than this (a line counts like a chord). The default takes one or two minutes of one
-    processor.
+    Limit for the work of an auto scan: in each frame it stops before it cuts more than this number
+    of chords from grains (each line also counts as a chord). The default takes one processor one or
+    two minutes.
     """
     min_contacts: int = sample(values.parse_count, default=2)
     """A grain with fewer contacts (a clump: with fewer neighbours) is a rattler."""
@@ -185,36 +184,37 @@ class Settings:
     """What to do when a frame cannot be read."""
 
     def __init__(self, **options: Any) -> None:
-        """Check what users write, and keep what it means."""
+        """Check the options as users write them, and keep what they mean."""
         declared = options_of(type(self))
-        refuse_unknown("Settings", options, [one.name for one in declared])
-        for one in declared:
-            value = one.parse(one.name, options.get(one.name, one.default))
-            object.__setattr__(self, one.name, value)
+        refuse_unknown("Settings", options, [option.name for option in declared])
+        for option in declared:
+            value = option.parse(option.name, options.get(option.name, option.default))
+            object.__setattr__(self, option.name, value)
         for problem in self._clashes():
             raise SettingsError(problem)
-        # whether the grains are discs is not known before a frame is read
+        # Only a cylinder is checked here: other shapes may be those of discs, which a frame tells.
         if self.rv_shape == "cylinder":
             self.check_sizes(3)
 
     def __repr__(self) -> str:
         chosen = [
-            f"{one.name}={as_written(getattr(self, one.name))!r}"
-            for one in options_of(type(self))
-            if as_written(getattr(self, one.name)) != as_written(one.parse(one.name, one.default))
+            f"{option.name}={as_written(getattr(self, option.name))!r}"
+            for option in options_of(type(self))
+            if as_written(getattr(self, option.name))
+            != as_written(option.parse(option.name, option.default))
         ]
         return f"{type(self).__name__}({', '.join(chosen)})"
 
     def _clashes(self) -> Iterator[str]:
-        """What does not go together, each with what to do."""
+        """Messages about options that contradict each other, each with what to do."""
         shape, takes = self.rv_shape, SHAPES.get(self.rv_shape)
         sizes = {"rv_radius": self.rv_radius, "rv_size": self.rv_size, "rv_shape": takes is None}
         for name in (name for name, given in sizes.items() if given and len(self.rvs) > 1):
             several = f"`rv` asks for {len(self.rvs)}"
-            yield f"{name}: gives the RV one size, but {several}: leave out one of the two"
+            yield f"{name}: gives the RV one size, but {several}: leave out one of the two options"
         if self.rv_size and not takes:
-            instead = "choose `rv_radius`" if takes == "" else "its file says how large it is"
-            yield f"rv_size: the shape {shape} takes none: {instead}"
+            instead = "choose `rv_radius`" if takes == "" else "its file gives the size"
+            yield f"rv_size: the shape {shape} takes no sizes: {instead}"
         for name, (other, needed) in NEEDS.items():
             found = getattr(self, other)
             if getattr(self, name) and found != needed:
@@ -227,12 +227,24 @@ class Settings:
             )
         if self.edge == ENDS and self.moment != 1:
             yield (
-                "moment: `edge=ends` counts only what lies inside the window, which does not give "
+                "moment: `edge=ends` counts only the parts inside the window, which do not give "
                 "the second moment of the full lengths: choose `edge=start`, or `moment=1`"
             )
 
     def check_sizes(self, dimension: int) -> None:
-        """DimensionError if the RV has too many sizes for so many dimensions, or too few."""
+        """
+        Check that the number of the RV's sizes fits the dimension of the sample.
+
+        Parameters
+        ----------
+        dimension : int
+            2 for discs, 3 for spheres.
+
+        Raises
+        ------
+        SettingsError
+            If there are too many sizes, or too few.
+        """
         shape, takes = self.rv_shape, SHAPES.get(self.rv_shape)
         if not self.rv_size or not takes:
             return
@@ -246,12 +258,12 @@ class Settings:
 
     @property
     def rvs(self) -> tuple[float, ...]:
-        """The sizes of the RVs, one or several."""
+        """The sizes of all RVs."""
         return self.rv if isinstance(self.rv, tuple) else (self.rv,)
 
     @property
     def more_columns(self) -> tuple[str, ...]:
-        """Columns that the table has because these settings ask for more than the default."""
+        """Names of columns that only these settings add to the default columns."""
         # to print the help of a command needs no fabric
         from scanfab.fabric.registry import GROUPS
 
@@ -259,34 +271,37 @@ class Settings:
         several = len(self.rvs) > 1
         of_window = {RV_COLUMN.name: several, "window_alpha_vs_axial": shaped}
         columns = [name for name, asked in of_window.items() if asked and self.needs_window]
-        columns += [one.name for one in EDGE_COLUMNS if self.edge != CLIP]
+        columns += [column.name for column in EDGE_COLUMNS if self.edge != CLIP]
         columns += ["alpha_vs_axial_contacts"] * bool(self.cutoffs)
-        return (*columns, *(one.name for group in self.with_ for one in GROUPS[group].columns))
+        return (
+            *columns,
+            *(column.name for group in self.with_ for column in GROUPS[group].columns),
+        )
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """Of the table."""
+        """All columns of the table."""
         from scanfab.table.columns import table_columns
 
         return table_columns(self.more_columns)
 
     @property
     def lists_gaps(self) -> bool:
-        """Whether sums for one cut-off do not suffice."""
+        """Whether the scan must list all gaps, for several cut-offs or another moment."""
         return bool(self.cutoffs) or self.moment != 1
 
     @property
     def blocks(self) -> int:
-        """How many parts of the sample a frame tells apart, each with rows of its own."""
+        """Number of parts of the sample that have rows of their own; a map has more than one."""
         return 1
 
     @property
     def rows_per_frame(self) -> int:
-        """Rows of each frame: one for each variant, RV and cut-off."""
+        """Number of rows per frame: one for each variant, RV and cut-off."""
         windows = sum(len(self.rvs) if variant in "cd" else 1 for variant in self.variants)
         return windows * max(len(self.cutoffs), 1)
 
     @property
     def needs_window(self) -> bool:
-        """Whether a variant of the RV is asked for."""
+        """Whether any variant needs the RV."""
         return "c" in self.variants or "d" in self.variants

@@ -1,4 +1,4 @@
-"""Void ratio, stress and mechanical coordination of a frame: what `with=state` is made of."""
+"""Void ratio, stress and mechanical coordination of a frame, for `with=state`."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from scanfab.packing.sample import Sample, Variant
 from scanfab.packing.window import Window
 from scanfab.scan.directions import direction_rule, plane_rule
 
-# points that stand for a grain that is cut by the surface of an RV, unless that is a sphere
+# number of points that fill a grain to measure its part inside an RV that is no sphere
 POINTS = 2048
-# grains whose points are handled at a time: some tens of megabytes
+# number of grains whose points are tested at once: some tens of megabytes
 CHUNK = 256
 
 
 def refuse_forces(sample: Sample, groups: Collection[str]) -> None:
-    """PackingError if forces are asked for but missing, or if one is no finite number."""
+    """Raise PackingError if needed forces are missing, or if a force is not a finite number."""
     contacts = sample.contacts
     if contacts.force_n is not None and not np.isfinite(contacts.force_n).all():
-        one, two = sample.packing.id[contacts.pairs[np.argmin(np.isfinite(contacts.force_n))]]
+        first, second = sample.packing.id[contacts.pairs[np.argmin(np.isfinite(contacts.force_n))]]
         raise PackingError(
-            f"the contact of the grains {one} and {two} has a force that is no finite number"
+            f"the contact of the grains {first} and {second} has a force that is no finite number"
         )
     if contacts.force_n is None and len(contacts) and "forces" in groups:
         found = "are found by geometry" if contacts.source == "geometric" else "have none"
         raise PackingError(
             f'`with_="forces"` needs the forces of contacts, but these {found}: name a file that '
-            f"lists contacts with their forces (`contacts`), or which of its columns they are "
+            f"lists contacts with their forces (`contacts`), or the columns that hold the forces "
             f"(`contact_columns`)"
         )
 
@@ -57,10 +57,10 @@ def contact_forces(sample: Sample, chosen: BoolArray) -> ContactForces | None:
 
 def sample_state(sample: Sample, variant: Variant, window: Window | None) -> SampleState:
     """
-    The state of the RV, or without a window of the whole sample.
+    The state of the RV, or without a window the state of the whole sample.
 
-    Void ratio and stress are the same with and without rattlers: rattlers are solid, and all
-    contacts bear stress. The coordination is that of the variant's grains.
+    Void ratio and stress are the same with and without rattlers, because rattlers are solid and all
+    contacts carry stress. The coordination is that of the variant's grains.
     """
     counted = sample.once(sample.counted(variant, window) & ~sample.removed(variant))
     numbers = sample.numbers_of(variant)[counted]
@@ -74,17 +74,17 @@ def sample_state(sample: Sample, variant: Variant, window: Window | None) -> Sam
 
 
 def doubts_of_state(sample: Sample, window: Window | None) -> dict[str, str]:
-    """Notes, by code, on why there is no stress, or on forces that it leaves out."""
+    """Notes, by code, that say why the stress is missing or incomplete."""
     contacts, packing = sample.contacts, sample.packing
     if len(contacts) and contacts.force is None:
-        known = "no forces" if contacts.force_n is None else "the normal part of forces only"
+        present = "no forces" if contacts.force_n is None else "the normal part of forces only"
         return {
-            "no_stress": f"the contacts have {known}: stress, and what follows from it, is empty"
+            "no_stress": f"the contacts have {present}: all columns that need the stress are empty"
         }
     if _volume(packing, window) is None:
         return {
-            "no_volume": "void ratio and stress of the whole are empty: they need a volume, which "
-            "is that of a cell that repeats along all its vectors, or of an RV"
+            "no_volume": "void ratio and stress of the whole are empty: they need the volume of an "
+            "RV, or of a cell that is periodic along all its vectors"
         }
     at_walls = packing.position[(packing.wall_contacts > 0) & sample.grains]
     if window is not None:
@@ -92,8 +92,8 @@ def doubts_of_state(sample: Sample, window: Window | None) -> dict[str, str]:
     if packing.wall_forces is not None or not len(at_walls):
         return {}
     return {
-        "wall_stress": "grains touch walls, and the forces of these contacts are not known (they "
-        "are read from LIGGGHTS' wall/gran/local and YADE's O.save): the stress leaves them out; "
+        "wall_stress": "grains touch walls, but the forces of these contacts are unknown (they are "
+        "read from LIGGGHTS' wall/gran/local and YADE's O.save), so the stress leaves them out: "
         "choose an RV away from the walls"
     }
 
@@ -107,9 +107,9 @@ def _volume(packing: Packing, window: Window | None) -> float | None:
 
 def _places_and_branches(packing: Packing) -> tuple[FloatArray, FloatArray]:
     """
-    The place of each sphere, (N, 3), and from the first grain's place to the second's, (M, 3).
+    Centres of grains, (N, 3), and vectors from the first grain of a contact to the second, (M, 3).
 
-    Of a clump the place of its image next to the sphere.
+    A sphere of a clump has the centre of the clump's image next to it.
     """
     places, bodies, contacts = packing.position, packing.bodies, packing.contacts
     assert contacts is not None
@@ -119,29 +119,29 @@ def _places_and_branches(packing: Packing) -> tuple[FloatArray, FloatArray]:
 
 
 def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
-    """The stress of all contacts of grains; None without forces or a volume."""
+    """The stress from all contacts of grains; None without forces or a volume."""
     packing, contacts = sample.packing, sample.contacts
     volume = _volume(packing, window)
     if contacts.force is None or volume is None:
         return None
-    one, two = contacts.pairs.T
+    first, second = contacts.pairs.T
     places, branch = _places_and_branches(packing)
-    start, end = places[one], places[one] + branch
-    # boundary is a wall: the branch of such a contact ends where the grain does
-    start = np.where(sample.boundary[one][:, None], contacts.point, start)
-    end = np.where(sample.boundary[two][:, None], contacts.point, end)
+    start, end = places[first], places[first] + branch
+    # boundary particles act as a wall, so the branch of such a contact ends at the contact point
+    start = np.where(sample.boundary[first][:, None], contacts.point, start)
+    end = np.where(sample.boundary[second][:, None], contacts.point, end)
     branch = end - start
-    chosen = ~(sample.boundary[one] & sample.boundary[two]) & branch.any(axis=1)
+    chosen = ~(sample.boundary[first] & sample.boundary[second]) & branch.any(axis=1)
     start, branch, force = start[chosen], branch[chosen], contacts.force[chosen]
     walls = packing.wall_forces
     if walls is not None:
-        # the branch from where a grain touches a wall to its place
+        # the branch runs from the contact point at the wall to the centre of the grain
         ours = sample.grains[walls.row]
         start = np.concatenate([start, walls.point[ours]])
         branch = np.concatenate([branch, places[walls.row[ours]] - walls.point[ours]])
         force = np.concatenate([force, walls.force[ours]])
     if window is not None:
-        # the part of each branch that lies in the window, of all its images together
+        # only the part of each branch inside the window counts, over all its periodic images
         longest = float(np.linalg.norm(branch, axis=1).max(initial=0.0))
         origin, shifts = window.images(start, packing, longest)
         share = sum(window.shape.share(origin + shift, branch) for shift in shifts)
@@ -150,13 +150,13 @@ def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
 
 
 def _void_ratio(sample: Sample, window: Window | None) -> float | None:
-    """(1 - ν)/ν with the volumes of grains summed up; None without a volume or grains."""
+    """(1 - ν)/ν, where ν sums the volumes of grains; None without a volume or grains."""
     packing, space = sample.packing, sample.packing.space
     volume = _volume(packing, window)
     if volume is None:
         return None
     position, radius = packing.position[sample.grains], packing.radius[sample.grains]
-    # what several spheres of a clump share counts once
+    # overlaps between the spheres of a clump count once
     share = np.ones_like(radius)
     if packing.bodies is not None:
         share = own_shares(packing, partial(_rays, space=space))[sample.grains]
@@ -177,27 +177,27 @@ def cut_volumes(
     places: FloatArray, radius: FloatArray, shape: Convex, space: Space = SPACE
 ) -> FloatArray:
     """
-    Volumes that spheres share with a region about the origin, shape (N,).
+    Volumes of the parts of spheres inside a region about the origin, shape (N,).
 
-    Exact for a region that is a sphere; else by points that fill each sphere evenly.
+    They are exact for a spherical region; else points that fill each sphere evenly are counted.
     """
     if shape.is_sphere:
         return lens_volumes(np.linalg.norm(places, axis=1), radius, shape.reach, space)
     points = _points_in_ball(space)
-    # A convex region that holds the ball of radius ρ about the origin and the place x / (1 - r/ρ)
-    # also holds the sphere of radius r about x.
+    # A convex region that contains the ball of radius ρ about the origin and the point
+    # x / (1 - r/ρ) also contains the sphere of radius r about x.
     curved = float(np.linalg.eigvalsh(shape.quadric.form)[-1])
     ball = math.sqrt(shape.quadric.level / curved) if curved > 0.0 else math.inf
     room = 1.0 - radius / min([ball, *shape.planes[:, 3]])
     scaled = places / np.where(room > 0.0, room, 1.0)[:, None]
-    found = ((room > 0.0) & shape.contains(scaled)).astype(np.float64)
-    cut = np.flatnonzero(found == 0.0)
+    share = ((room > 0.0) & shape.contains(scaled)).astype(np.float64)
+    cut = np.flatnonzero(share == 0.0)
     for first in range(0, len(cut), CHUNK):
         rows = cut[first : first + CHUNK]
         spread = places[rows, None] + radius[rows, None, None] * points
         inside = shape.contains(spread.reshape(-1, 3)).reshape(-1, len(points))
-        found[rows] = inside.mean(axis=1)
-    return space.volume(radius, found)
+        share[rows] = inside.mean(axis=1)
+    return space.volume(radius, share)
 
 
 def _rays(count: int, space: Space = SPACE) -> FloatArray:

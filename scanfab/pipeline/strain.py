@@ -1,4 +1,4 @@
-"""Strains of a frame: axial, 1 - L/L0 along the loading axis; and the shear of a periodic cell."""
+"""Strains: axial strain 1 - L/L0, and shear and volumetric strain of a periodic cell."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from scanfab.packing.sample import Sample
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import STRAIN_MODES, Vector
 
-# programs flip a cell when it leans by half a length, or a little later
+# simulation programs flip a cell when it leans by half a length, or slightly more
 MOST_TILT = 0.61
 
 
 def axial_length(sample: Sample, mode: str, axis: Vector) -> float | None:
     """
-    The length L whose change is the axial strain.
+    The length L in the axial strain 1 - L/L0.
 
     Parameters
     ----------
     sample : Sample
-        One frame.
+        A frame.
     mode : str
         ``cell``: the diagonal entry of the cell along the axis; ``boundary`` and ``grains``: the
-        extent of those particles' centres (without grains that have escaped); ``auto``: the cell
-        if it is periodic along the axis, else the boundary if there is one, else none.
+        extent of the centres of these particles, without escaped grains; ``auto``: the cell if it
+        is periodic along the axis, else the boundary if there is one.
     axis : three floats
-        Unit vector.
+        Loading axis, a unit vector.
 
     Returns
     -------
     float or None
-        In the dump's length unit; None where ``auto`` finds nothing to measure.
+        Dump's length unit; None if ``auto`` finds nothing to measure.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def axial_length(sample: Sample, mode: str, axis: Vector) -> float | None:
 
 
 def strain_mode(sample: Sample, mode: str, axis: Vector) -> str:
-    """The mode, with ``auto`` replaced by what it finds in a frame; empty if it finds nothing."""
+    """The mode, with ``auto`` replaced by what the frame has; empty if it has neither."""
     if mode != "auto":
         return mode
     cell, along = sample.packing.cell, _coordinate_of(axis)
@@ -64,20 +64,20 @@ def strain_mode(sample: Sample, mode: str, axis: Vector) -> str:
 
 
 def _coordinate_of(axis: Vector) -> int | None:
-    """Which of x, y, z the axis is; None for an oblique one."""
+    """Index of the coordinate along the axis; None for an oblique axis."""
     along = int(np.argmax(np.abs(axis)))
     return along if abs(axis[along]) > 1 - 1e-12 else None
 
 
 def cell_of(sample: Sample) -> Cell:
-    """The cell that the strain is measured by; SettingsError without one."""
+    """The cell of a frame; SettingsError if there is none."""
     if sample.packing.cell is None:
         raise SettingsError("strain: cell was asked for, but the dump has no cell")
     return sample.packing.cell
 
 
 def centers_of(sample: Sample, mode: str) -> FloatArray:
-    """The centres of boundary or grains, shape (K, 3); SettingsError without any."""
+    """Centres of boundary particles or grains, shape (K, 3); SettingsError if there are none."""
     chosen = sample.boundary if mode == "boundary" else sample.gathered
     if not chosen.any():
         raise SettingsError(
@@ -89,19 +89,20 @@ def centers_of(sample: Sample, mode: str) -> FloatArray:
 
 def shear_strain(cell: Cell | None, first: Cell | None) -> float | None:
     """
-    How much a periodic cell was sheared, whichever way.
+    Shear strain of a periodic cell since the first frame, in any direction.
+
+    It is √(2/3 e:e) of the deviator e of the logarithmic strain, in a plane √(1/2 e:e), and is
+    work-conjugate to the deviator stress. The vectors of both cells must correspond to each other.
 
     Parameters
     ----------
     cell, first : Cell or None
-        Of this frame and of the first.
+        Cell of this frame and of the first frame.
 
     Returns
     -------
     float or None
-        √(2/3 e:e) of the deviator e of the logarithmic strain, in a plane √(1/2 e:e):
-        dimensionless, never negative, and what the deviator stress works on. None unless both cells
-        repeat along all vectors. Each vector is taken for the one that it was in the first frame.
+        Dimensionless, never negative; None unless both cells are periodic along all vectors.
 
     Examples
     --------
@@ -116,9 +117,9 @@ def shear_strain(cell: Cell | None, first: Cell | None) -> float | None:
     now, before = cell.own_vectors, first.own_vectors
     if np.array_equal(now, before):
         return 0.0
-    # H = F H0 with lattice vectors as columns; here they are rows
+    # deformation gradient F from H = F H0; the lattice vectors are rows here, so this is transposed
     gradient = np.linalg.solve(before, now)
-    # ln B has twice the logarithms of the stretches as principal values
+    # the logarithmic principal strains are the logarithms of the singular values of F
     stretch = np.log(np.linalg.svd(gradient, compute_uv=False))
     dimension = cell.space.dimension
     of_norm = np.sqrt((dimension - 1.0) / dimension)
@@ -127,17 +128,18 @@ def shear_strain(cell: Cell | None, first: Cell | None) -> float | None:
 
 def volumetric_strain(cell: Cell | None, first: Cell | None) -> float | None:
     """
-    How much a periodic cell was compressed: -ln(V/V0), the trace of the logarithmic strain.
+    Volumetric strain of a periodic cell since the first frame: -ln(V/V0).
 
     Parameters
     ----------
     cell, first : Cell or None
-        Of this frame and of the first.
+        Cell of this frame and of the first frame.
 
     Returns
     -------
     float or None
-        Dimensionless, positive in compression; None unless both cells repeat along all vectors.
+        Dimensionless, positive in compression; None unless both cells are periodic along all
+        vectors.
 
     Examples
     --------
@@ -148,17 +150,17 @@ def volumetric_strain(cell: Cell | None, first: Cell | None) -> float | None:
     """
     if cell is None or first is None or not (cell.is_endless and first.is_endless):
         return None
-    now, before = (np.linalg.det(one.own_vectors) for one in (cell, first))
-    # written so that an unchanged cell gives 0.0, not -0.0
+    now, before = (np.linalg.det(box.own_vectors) for box in (cell, first))
+    # this form gives 0.0 for an unchanged cell; the other sign would give -0.0
     return float(np.log(abs(before / now)))
 
 
 def is_flipped(cell: Cell | None, before: Cell | None) -> bool:
     """
-    Whether a cell seems to be described by other vectors of its lattice than in the frame before.
+    Whether a cell seems to be flipped, that is described by other vectors of the same lattice.
 
-    It is if whole vectors, added to its own, bring these nearer to the vectors before, and if
-    neither cell leans further than to the point where programs flip them.
+    The cell is flipped if adding whole lattice vectors to its vectors brings them nearer to the
+    vectors of the frame before, and if neither cell leans more than programs allow before a flip.
     """
     if cell is None or before is None or not (cell.is_endless and before.is_endless):
         return False
@@ -166,7 +168,7 @@ def is_flipped(cell: Cell | None, before: Cell | None) -> bool:
     if np.array_equal(change, np.eye(len(change))) or round(abs(np.linalg.det(change))) != 1:
         return False
     for vectors in (cell.own_vectors, before.own_vectors):
-        # by how many lengths of another vector each vector leans
+        # lean of each vector along every other vector, in lengths of the latter
         leaning = (vectors @ vectors.T) / np.linalg.norm(vectors, axis=1) ** 2
         if np.abs(np.tril(leaning, -1)).max() > MOST_TILT:
             return False
@@ -175,21 +177,21 @@ def is_flipped(cell: Cell | None, before: Cell | None) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Strains:
-    """What the strains of a series are measured by, since its first frame that has grains."""
+    """Reference of the strains of a series: its first frame that has grains, or a file."""
 
     mode: str
-    """As for :func:`axial_length`; unused if there is a file."""
+    """Mode of :func:`axial_length`; unused if there is a file."""
     axis: Vector
     file: FrameFile | None = None
     length: float | None = None
-    """Of the first frame that has grains, dump's length unit."""
+    """Length L0 in the first frame that has grains, dump's length unit."""
     cell: Cell | None = None
-    """Of that frame."""
+    """Cell of the first frame that has grains."""
 
     @classmethod
     def of(cls, settings: Settings) -> Strains:
         """
-        Before the first frame is known.
+        Start from settings, before the first frame is read.
 
         Raises
         ------
@@ -201,12 +203,12 @@ class Strains:
         return cls(settings.strain, settings.axis, file)
 
     def since(self, sample: Sample) -> Strains:
-        """From a frame on; raises as :func:`axial_length`."""
+        """Set the reference frame; raises the errors of :func:`axial_length`."""
         length = axial_length(sample, self.mode, self.axis) if self.file is None else None
         return replace(self, length=length, cell=sample.packing.cell)
 
     def at(self, number: int, sample: Sample) -> dict[str, float | None]:
-        """Axial, shear and volumetric strain of a frame, by the names of their columns."""
+        """Axial, shear and volumetric strain of a frame, by column."""
         axial, has_grains = None, sample.grains.any()
         if self.file is not None:
             (axial,) = self.file.at(number, sample.packing.step) or (None,)
@@ -222,21 +224,21 @@ class Strains:
 
 
 class Flips:
-    """Whether the cell of a series is flipped from one of its chosen frames to the next."""
+    """Finds frames of a series between which the cell is flipped."""
 
     def __init__(self, step: int | None) -> None:
-        """Frames are chosen with a step, as in a slice."""
+        """``step`` is the step of the slice that chooses the frames."""
         self.step = abs(step or 1)
         self.before: tuple[int, Cell | None] = -self.step, None
 
     def notes(self, number: int, cell: Cell | None) -> list[Note]:
-        """What to tell of the cell of one more frame; frames come in their order."""
+        """Notes on the cell of the next frame; frames must come in order."""
         (early, before), self.before = self.before, (number, cell)
         if early != number - self.step or not is_flipped(cell, before):
             return []
         text = (
             f"the cell seems to be flipped between the frames {early} and {number}: from there on "
-            f"its vectors are others than in the first frame, and shear_strain is not the strain "
-            f"since then (LAMMPS: fix deform ... flip no)"
+            f"its vectors do not correspond to those of the first frame, so shear_strain is wrong "
+            f"(LAMMPS: use fix deform ... flip no)"
         )
         return [Note("flipped_cell", text)]

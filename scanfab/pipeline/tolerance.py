@@ -1,4 +1,4 @@
-"""An auto scan: closer lines, more directions, more replicates, until the tolerance holds."""
+"""Auto scans: add closer lines, directions or replicates until the tolerance is met."""
 
 from __future__ import annotations
 
@@ -24,25 +24,26 @@ from scanfab.scan.solids import Solids, is_affordable, most_lines
 LOGGER = logging.getLogger("scanfab")
 
 TOLERANCE_MISSED = "tolerance_missed"
-"""The code of a note: an auto scan ended before its tolerance was met."""
+"""Code of the note that an auto scan ended before its tolerance was met."""
 
-# beyond these there is more overhead than scan
+# larger numbers would cost more overhead than scanning
 MAX_REPLICATES, MAX_DIRECTIONS = 16_384, 3_000
-# Closer lines and a finer rule need fewer segments in all than more replicates do. A scan starts
-# afresh with them if its lines must grow by AFRESH_FROM; its rule grows by FINER_UP_TO at most.
+# With closer lines and a finer rule, fewer segments suffice than with more replicates. So a scan
+# starts again with both if it needs AFRESH_FROM times as many lines or more. The number of axes of
+# its rule grows by FINER_UP_TO at most.
 AFRESH_FROM, FINER_UP_TO = 2.0, 8.0
-# A round multiplies the work by GROWTH at most, as early estimates of the error are uncertain, and
-# by SMALLEST_ROUND at least, so that there is something to do for several threads.
+# A round multiplies the work by at most GROWTH, because early estimates of the error are uncertain,
+# and by at least SMALLEST_ROUND, so that all threads have work.
 GROWTH, SMALLEST_ROUND = 4.0, 1.1
-# The expected error must lie below the tolerance by a margin. Then the error by the replicates,
-# which is reported, is seldom above the tolerance, and the scan seldom ends at an error that is too
-# small by chance. MARGIN holds where replicates can be added, which makes the error surer. Where
-# their number R is fixed, the error is uncertain by the part 1/√(2(R - 1)): the margin is then
-# SIGMAS times that.
+# The expected error must be smaller than the tolerance by a margin. Then the reported error, from
+# the replicates, seldom exceeds the tolerance, and the scan seldom ends at an error that is too
+# small by chance. The margin is the factor MARGIN if replicates can be added, which makes the error
+# more certain. For a fixed number R of replicates the error has the relative uncertainty
+# 1/√(2(R - 1)), and the margin is 1 plus SIGMAS times this.
 MARGIN, SIGMAS = 1.1, 2.5
-# of the smallest radius: directions that are empty with lines so close cannot be filled
+# in smallest radii: a direction that is empty at this spacing stays empty with closer lines
 CLOSEST = 0.05
-# fraction of the directions of a replicate that may keep no segment before lines are set closer
+# lines are set closer if a larger fraction of the directions of a replicate keeps no segment
 MOST_EMPTY = 0.005
 # FEW_KEPT: a variant that keeps less than this share of its grains is hardly a packing. HELD_BACK:
 # it no longer counts for the tolerance once it needs this many times the lines of the others.
@@ -50,39 +51,39 @@ FEW_KEPT, HELD_BACK = 0.1, 10.0
 
 
 class Errors(NamedTuple):
-    """Standard errors of the axial anisotropy by the scan; infinite without a void fabric."""
+    """Standard errors of the axial anisotropy due to the scan; infinite without a void fabric."""
 
     reported: float
-    """By the scatter of the replicates, as in the table."""
+    """Error from the scatter of the replicates, as in the table."""
     expected: float
-    """Less noisy, to plan by."""
+    """Less noisy error for planning."""
     empty: float
-    """Share of the axes of all replicates that keep no segment."""
+    """Fraction of the axes of all replicates that keep no segment."""
 
     @property
     def is_patchy(self) -> bool:
-        """Whether the variant keeps segments, but none in too many directions of a replicate."""
+        """Whether some axes keep segments, but too many axes keep none."""
         return MOST_EMPTY < self.empty < 1.0
 
 
 class Goal:
     """
-    What a scan adds up, and which error is to meet the tolerance: here that of each variant.
+    What a scan sums, and which error must meet the tolerance: here the error of each variant.
 
-    The goal of a map is a subclass whose sums also have the fabric of each block.
+    Maps use a subclass, whose sums also hold the fabric of each block.
     """
 
     def scan(
         self, solids: Solids, plan: Plan, replicates: range, most_steps: float = math.inf
     ) -> Any:
-        """The sums of some replicates."""
+        """Scan some replicates and return their sums."""
         return scan_lines(
             solids, plan.rule, spacing=plan.spacing, cutoff=plan.cutoff, variants=plan.variants,
             replicates=replicates, seed=plan.seed, workers=plan.workers, most_steps=most_steps,
         )  # fmt: skip
 
     def errors(self, sums: Any, plan: Plan, variant: str) -> Errors:
-        """The standard error by the scatter of the replicates and by the fit of a polynomial."""
+        """Standard errors from the scatter of replicates, and from the fit of a polynomial."""
         length, segments = sums.kept(variant)
         empty = float(np.mean(segments == 0))
         fabric = void_fabric(sums.axes, plan.rule.weights, length, segments, plan.space)
@@ -95,23 +96,23 @@ class Goal:
 
 def missing_work(errors: Iterable[Errors], plan: Plan, replicates: int) -> float:
     """
-    By what factor the number of lines must grow until these errors meet the tolerance; 1: done.
+    Factor by which the number of lines must grow to meet the tolerance; 1 if it is met.
 
-    ``auto`` scans and the settings that a calibration recommends follow the same rule.
+    Auto scans and calibrations use the same rule.
     """
     margin = MARGIN
     if plan.auto != "replicates" and replicates > 1:
         margin = 1.0 + SIGMAS / math.sqrt(2.0 * (replicates - 1))
     missing = expected = 0.0
-    for one in errors:
-        if math.isfinite(one.reported):
-            missing = max(missing, (one.reported / plan.tolerance) ** 2)
-            expected = max(expected, (margin * one.expected / plan.tolerance) ** 2)
-        elif one.empty < 1.0 and plan.auto == "replicates" and replicates < 256:
-            # a direction without any segment may still get one
+    for error in errors:
+        if math.isfinite(error.reported):
+            missing = max(missing, (error.reported / plan.tolerance) ** 2)
+            expected = max(expected, (margin * error.expected / plan.tolerance) ** 2)
+        elif error.empty < 1.0 and plan.auto == "replicates" and replicates < 256:
+            # more replicates may find segments in directions that have none yet
             return GROWTH
-    # The scatter of the replicates is what the table reports, but it is too noisy to decide alone:
-    # a scan that ends at its first low value would claim too small an error.
+    # The table reports the error from the scatter of replicates. It is too noisy to decide alone:
+    # a scan that ended at its first low value would report too small an error.
     if max(missing, expected) <= 1.0:
         return 1.0
     return max(expected, min(missing, 1.1))
@@ -121,18 +122,18 @@ def scan_to_tolerance(
     solids: Solids, plan: Plan, where: str = "the frame", goal: Goal | None = None
 ) -> tuple[Any, Plan, list[Note]]:
     """
-    Scan one frame as planned, and where the plan is ``auto``, on until the tolerance holds.
+    Scan one frame as planned; an auto scan continues until the tolerance is met.
 
-    Progress goes to the logger ``scanfab``, where ``where`` names the frame.
+    Progress is written to the logger ``scanfab``; ``where`` names the frame there.
 
     Returns
     -------
     sums
-        Of all replicates, as the goal scans them; without one a ScanSums.
+        Sums of all replicates as the goal defines them; ScanSums for the default goal.
     Plan
-        With the rule and the spacing of each replicate as they were in the end.
+        The plan with the final rule and the final spacing of each replicate.
     list of Note
-        What was not reached.
+        Notes on tolerances that were not met.
     """
     goal = goal or Goal()
     if not plan.auto:
@@ -151,14 +152,14 @@ class _AutoScan:
     goal: Goal
     sums: Any = None
     errors: dict[str, Errors] = field(default_factory=dict)
-    """Of each variant."""
+    """Errors of each variant."""
     spent: float = 0.0
-    """Chords; a line costs as much as a chord, also if it meets nothing."""
+    """Chords cut so far; each line counts as one more chord, even if it meets nothing."""
     left: float = 0.0
-    """How many more replicates the budget allows."""
+    """Number of further replicates that the budget allows."""
 
     def run(self, where: str) -> list[Note]:
-        """Scan until the tolerance holds or nothing can be added; the notes say what was missed."""
+        """Scan until the tolerance is met or nothing can be added; return notes on what failed."""
         planned, begun = self.plan.spacing, time.perf_counter()
         start, stop, missed = 0, self.plan.replicates, []
         while True:
@@ -171,7 +172,7 @@ class _AutoScan:
                 worst = max(self.errors[name].reported for name in counted)
                 reached, tolerance = spelt_apart(worst, self.plan.tolerance)
                 LOGGER.info("%s: error %s of %s, about %s", where, reached, tolerance, seconds)
-            # not if the lines of this round had to be wider than planned
+            # a better plan is of no use if lines already had to be wider than planned
             if start == 0 and self.plan.spacing <= planned:
                 better = self._better_plan(missing, counted)
                 if better is not None:
@@ -188,7 +189,7 @@ class _AutoScan:
         return [*missed, *self._dropped(counted)]
 
     def _scan(self, start: int, stop: int) -> None:
-        """Scan some replicates and add them to those before; the first round starts afresh."""
+        """Scan some replicates and add their sums; the first round starts with new sums."""
         if start == 0:
             batch = self.sums = self._first_round()
         else:
@@ -199,22 +200,22 @@ class _AutoScan:
         self.spent += float(batch.work.sum()) + lines * batch.replicates
         each = float(self.sums.work.mean()) + lines
         self.left = (plan.max_chords - self.spent) / max(each, 1.0)
-        self.errors = {one: self.goal.errors(self.sums, plan, one) for one in plan.variants}
+        self.errors = {name: self.goal.errors(self.sums, plan, name) for name in plan.variants}
 
     def _first_round(self) -> Any:
         """
-        The first replicates, with wider lines if following them takes more steps than allowed.
+        Scan the first replicates, with wider lines if they take more steps than allowed.
 
-        Only a scan can tell how far lines go through a periodic medium, so one replicate goes
-        ahead, and ends when it has used its share.
+        Only a scan can tell how far lines run through a periodic medium. So one replicate is
+        scanned first, and stops when it has used its share of the steps.
         """
-        every, most = self.plan.replicates, self.plan.max_chords
+        replicates, most = self.plan.replicates, self.plan.max_chords
         if self.solids.medium is None:
-            return self.goal.scan(self.solids, self.plan, range(every))
+            return self.goal.scan(self.solids, self.plan, range(replicates))
         while True:
             try:
-                first = self.goal.scan(self.solids, self.plan, range(1), most / every)
-                rest = self.goal.scan(self.solids, self.plan, range(1, every), most)
+                first = self.goal.scan(self.solids, self.plan, range(1), most / replicates)
+                rest = self.goal.scan(self.solids, self.plan, range(1, replicates), most)
                 return concatenated([first, rest])
             except FollowedTooFarError:
                 wider = 2.0 * self.plan.spacing
@@ -228,15 +229,16 @@ class _AutoScan:
 
     def _counted(self) -> str:
         """
-        The variants that the scan goes on for.
+        The variants whose errors decide when the scan ends.
 
-        A variant that keeps but a few grains does not hold back the others, nor does one whose
-        tolerance the budget cannot reach. If that leaves none, all count.
+        A variant that keeps few grains, or whose tolerance the budget cannot reach, does not
+        decide, so that the others need not wait for it. If no variant remains, all decide.
         """
         missing = {name: self._missing(name) for name in self.plan.variants}
         few = [name for name in missing if _kept_grains(self.solids, name) < FEW_KEPT]
         usual = max((missing[name] for name in missing if name not in few), default=math.inf)
-        # closer lines tell more than more of them; and early estimates of the error are uncertain
+        # closer lines reduce the error more than further replicates do; and early estimates of the
+        # error are uncertain, hence the factor GROWTH
         across = self.plan.space.dimension - 1
         growth = 1.0 + NOISE[across + 1].growth / across
         reach = GROWTH * (1.0 + self.left / self.sums.replicates) ** growth
@@ -249,7 +251,7 @@ class _AutoScan:
         return counted or self.plan.variants
 
     def _better_plan(self, missing: float, counted: str) -> Plan | None:
-        """A plan to start afresh with after the first round, if it is worth it and affordable."""
+        """A better plan to start again with after the first round; None if it does not pay."""
         plan = better = self.plan
         space, radius = plan.space, self.solids.grain_radius
         is_patchy = any(self.errors[name].is_patchy for name in counted)
@@ -265,7 +267,7 @@ class _AutoScan:
             closest = min(noise.close * float(radius.mean()), plan.spacing)
             spacing = max(plan.spacing / missing ** (1.0 / power), closest)
             better = replace(plan, spacing=spacing)
-            # if closer lines do not suffice, more directions are added, too
+            # if closer lines do not suffice, directions are added too
             missing /= (plan.spacing / spacing) ** power
             if missing > 1.0 and not plan.rule_is_asked_for:
                 axes = math.ceil(min(missing, FINER_UP_TO) * len(plan.rule))
@@ -278,48 +280,48 @@ class _AutoScan:
     def _missed(self, factor: float) -> Note:
         text = (
             f"the scan stopped after {self.spent:.2g} chords before the tolerance "
-            f"{self.plan.tolerance:g} was met: alpha_vs_axial_se is what it reached; about "
-            f"{factor:.2g} times as many lines would be needed (`max_chords`, `tolerance`)"
+            f"{self.plan.tolerance:g} was met: alpha_vs_axial_se holds the error that it reached; "
+            f"about {factor:.2g} times as many lines would be needed (`max_chords`, `tolerance`)"
         )
         steps, work = self.sums.steps.sum(), self.sums.work.sum()
         if 2 * steps > work:
             text += (
                 f"; {steps / work:.0%} of the work was to follow long void segments through the "
-                f"images of the cell: is it too large, or periodic where the sample is not "
+                f"images of the cell: is the cell too large, or periodic where the sample is not "
                 f"(`cell`, `periodic`)?"
             )
         return Note(TOLERANCE_MISSED, text)
 
     def _dropped(self, counted: str) -> Iterator[Note]:
-        """Notes on the variants that did not count, with the error that they reached."""
+        """Notes on the variants that did not decide and missed the tolerance."""
         for name, errors in self.errors.items():
             if name in counted or errors.reported <= self.plan.tolerance:
                 continue
-            said = "there is no void fabric yet"
+            text = "there is no void fabric yet"
             if math.isfinite(errors.reported):
                 reached, tolerance = spelt_apart(errors.reported, self.plan.tolerance)
-                said = f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}"
-            said += ": it keeps few grains, or would need far more lines than the others "
-            yield Note("variant_dropped", f'{said}(`variants="{name}"` scans it alone)', (name,))
+                text = f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}"
+            text += ": it keeps few grains, or would need far more lines than the others "
+            yield Note("variant_dropped", f'{text}(`variants="{name}"` scans it alone)', (name,))
 
 
 def _within_budget(plan: Plan, solids: Solids) -> Plan:
-    """The plan, with wider lines if its first round alone would cut more chords than allowed."""
+    """The plan, with wider lines if its first round would cut more chords than allowed."""
     axes = len(plan.rule) * plan.replicates
     chords = axes * (solids.chords(plan.spacing) + most_lines(solids, plan.spacing))
     if chords <= plan.max_chords:
         return plan
     if plan.auto != "replicates" or plan.max_chords < axes:
         raise SettingsError(
-            f"max_chords: {plan.max_chords:g} chords are fewer than the {chords:.2g} that "
-            f"{plan.replicates} replicates of {len(plan.rule)} directions would cut: choose a "
-            f"wider `spacing` or fewer `directions`, or allow more"
+            f"max_chords: expected at least the {chords:.2g} chords that {plan.replicates} "
+            f"replicates of {len(plan.rule)} directions cut, found {plan.max_chords:g}: choose a "
+            f"wider `spacing`, fewer `directions` or a larger `max_chords`"
         )
     return replace(plan, spacing=plan.spacing * plan.space.apart(chords / plan.max_chords))
 
 
 def _kept_grains(solids: Solids, variant: str) -> float:
-    """The fraction of the grains in a variant's window that are solid in the variant."""
+    """Fraction of the grains in a variant's window that are no removed rattlers."""
     removed = solids.removed
     if variant in "ac":
         return 1.0

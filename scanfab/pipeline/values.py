@@ -1,4 +1,4 @@
-"""Values of options: what users write, and what it means."""
+"""Parsers of option values: from what users write to what it means."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from scanfab.base.option import number, numbers, one_of, optional, unusable, who
 from scanfab.base.spelling import shortest
 
 if TYPE_CHECKING:
-    # their modules need numpy, for which the help of a command does not wait
+    # these modules load numpy, which would delay the help of commands
     from scanfab.packing.boundary import BoundaryRule
     from scanfab.scan.directions import DirectionRule
 
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 Vector = tuple[float, float, float]
 STRAIN_MODES = ("auto", "cell", "boundary", "grains")
 MOST_CUTOFFS = 1000
-# of further columns, in their order in the table
+# groups of further columns, in the order of the table
 GROUP_NAMES = ("invariants", "state", "forces", "harmonics")
-# of windows, with the sizes that each takes
+# shapes of windows, each with the sizes that it takes
 SHAPES = {
     "sphere": "",
     "box": "A,B,C, full edges",
@@ -46,7 +46,7 @@ parse_tolerance = number(
 
 
 class Axis(NamedTuple):
-    """A unit vector; a vector of three numbers is made one by :func:`parse_axis`, once."""
+    """A unit vector; :func:`parse_axis` makes it from any three numbers."""
 
     x: float
     y: float
@@ -54,7 +54,7 @@ class Axis(NamedTuple):
 
 
 class UsualAxis(Axis):
-    """The loading axis where none is given: z, or in a plane its second axis."""
+    """The default loading axis: z, or in a plane its second axis."""
 
     __slots__ = ()
 
@@ -76,7 +76,7 @@ class Length:
 
 def as_written(value: Any) -> Any:
     """
-    What users write for a value of an option, from which the same is read again.
+    The text or numbers that users would write for a value of an option.
 
     Examples
     --------
@@ -94,14 +94,14 @@ def as_written(value: Any) -> Any:
     if isinstance(value, Axis):
         return next((name for name, axis in AXES.items() if axis == value), tuple(value))
     if isinstance(value, tuple):
-        return [as_written(one) for one in value]
-    # of a boundary rule its text, of a rule of directions its name
+        return [as_written(item) for item in value]
+    # a boundary rule is written as its text, a direction rule as its name
     return getattr(value, "text", getattr(value, "name", value))
 
 
 def parse_length(name: str, text: str | float | Length) -> Length:
     """
-    A length of 0 or more as users write it: ``0.5``, ``1rmin``, ``0.2rmean``.
+    Parse a length of 0 or more, such as ``0.5``, ``1rmin`` or ``0.2rmean``.
 
     Examples
     --------
@@ -109,16 +109,16 @@ def parse_length(name: str, text: str | float | Length) -> Length:
     >>> parse_length("cutoff", "0.5rmin")
     Length(value=0.5, unit='rmin')
     """
-    found = re.fullmatch(r"\s*(.+?)\s*(rmin|rmean|rmax)?\s*", str(as_written(text)))
+    match = re.fullmatch(r"\s*(.+?)\s*(rmin|rmean|rmax)?\s*", str(as_written(text)))
     expected = "a length such as 0.0005 or 1rmin (rmin, rmean, rmax), not negative"
     parse = number(expected, lambda value: 0 <= value < math.inf)
-    if found is None:
+    if match is None:
         raise unusable(name, expected, text)
-    return Length(parse(name, found[1]), found[2] or "")  # type: ignore[arg-type]
+    return Length(parse(name, match[1]), match[2] or "")  # type: ignore[arg-type]
 
 
 def parse_spacing(name: str, value: Any) -> Length | None:
-    """A length above 0; None for ``auto``."""
+    """Parse a length above 0; ``auto`` gives None."""
     if value is None or value == "auto":
         return None
     length = parse_length(name, value)
@@ -129,7 +129,7 @@ def parse_spacing(name: str, value: Any) -> Length | None:
 
 def parse_lengths(name: str, text: Any) -> tuple[Length, ...]:
     """
-    Lengths as ``FROM:TO:STEP``, both ends included, as ``L,L,...``, or one by one.
+    Parse lengths: ``FROM:TO:STEP`` with both ends, ``L,L,...``, or a sequence.
 
     Examples
     --------
@@ -151,13 +151,13 @@ def parse_lengths(name: str, text: Any) -> tuple[Length, ...]:
     first, last, step = (length.value for length in lengths)
     count = math.floor((last - first) / step + 1e-9) + 1
     if not 1 <= count <= MOST_CUTOFFS:
-        raise unusable(name, f"1 to {MOST_CUTOFFS} lengths, and not {count}", text)
-    # not by adding steps, whose rounding would show
+        raise unusable(name, f"1 to {MOST_CUTOFFS} lengths (these are {count})", text)
+    # multiples of the step are exact after rounding; adding steps one by one would not be
     return tuple(Length(round(first + k * step, 12), *units) for k in range(count))
 
 
 def parse_axis(name: str, text: str | Iterable[float] | None) -> Axis:
-    """A unit vector from ``x``, ``y``, ``z`` or three numbers; the usual one if none is given."""
+    """Parse ``x``, ``y``, ``z`` or three numbers into a unit vector; None gives the default."""
     if text is None:
         return UsualAxis(*AXES["z"])
     if isinstance(text, Axis):
@@ -169,13 +169,13 @@ def parse_axis(name: str, text: str | Iterable[float] | None) -> Axis:
     return Axis(*(part / math.hypot(*vector) for part in vector))
 
 
-# of a cylinder, which has the loading axis if none is given
+# axis of a cylinder; None stands for the loading axis
 parse_rv_axis = optional(parse_axis)
 
 
 def parse_fractions(name: str, value: Any) -> float | tuple[float, ...]:
     """
-    Sizes of RVs: one as a number; several, each once, in ascending order.
+    Parse sizes of RVs: one becomes a number, several a tuple in ascending order.
 
     Examples
     --------
@@ -187,22 +187,22 @@ def parse_fractions(name: str, value: Any) -> float | tuple[float, ...]:
         "a fraction above 0, or several such as 0.4,0.5,0.6",
         lambda sizes: len(sizes) > 0 and min(sizes) > 0,
     )
-    found = sorted(parse(name, [value] if isinstance(value, int | float) else value))
-    if len(set(found)) < len(found):
+    fractions = sorted(parse(name, [value] if isinstance(value, int | float) else value))
+    if len(set(fractions)) < len(fractions):
         raise unusable(name, "fractions that differ", value)
-    return found[0] if len(found) == 1 else tuple(found)
+    return fractions[0] if len(fractions) == 1 else tuple(fractions)
 
 
 def parse_sizes(name: str, value: Any) -> tuple[float, ...]:
-    """Two or three lengths; none if not given."""
+    """Parse two or three lengths; a value that is not given becomes an empty tuple."""
     if value is None or value in ((), []):
         return ()
     expected = "two or three lengths above 0, such as 2,3,4"
-    return numbers(expected, lambda found: len(found) in (2, 3) and min(found) > 0)(name, value)
+    return numbers(expected, lambda sizes: len(sizes) in (2, 3) and min(sizes) > 0)(name, value)
 
 
 def parse_shape(name: str, value: Any) -> str:
-    """The shape of a window: a word, or a file with its surface that exists."""
+    """Parse the shape of a window: a word, or an existing file with a surface."""
     if str(value) in SHAPES:
         return str(value)
     from scanfab.io.surface import SUFFIXES
@@ -215,16 +215,16 @@ def parse_shape(name: str, value: Any) -> str:
 
 
 def parse_variants(name: str, letters: object) -> str:
-    """Letters out of abcd, each once and in this order."""
+    """Parse letters out of abcd; each is kept once, in alphabetical order."""
     if not isinstance(letters, str) or not letters or not set(letters) <= set("abcd"):
         raise unusable(name, "letters out of abcd", letters)
     return "".join(variant for variant in "abcd" if variant in letters)
 
 
 def parse_groups(name: str, groups: Any) -> tuple[str, ...]:
-    """Groups of columns, in a text between commas or blanks; each once, in the table's order."""
-    given = groups.replace(",", " ").split() if isinstance(groups, str) else groups
-    words = tuple(given) if isinstance(given, Iterable) else () if given is None else (given,)
+    """Parse groups of columns, a text with commas or blanks, into the order of the table."""
+    groups = groups.replace(",", " ").split() if isinstance(groups, str) else groups
+    words = tuple(groups) if isinstance(groups, Iterable) else () if groups is None else (groups,)
     for word in words:
         if word not in GROUP_NAMES:
             raise unusable(name, f"groups of columns out of {', '.join(GROUP_NAMES)}", word)
@@ -232,7 +232,7 @@ def parse_groups(name: str, groups: Any) -> tuple[str, ...]:
 
 
 def parse_boundary(name: str, rules: Any) -> tuple[BoundaryRule, ...]:
-    """Rules from one expression or several."""
+    """Parse boundary rules from one or several expressions."""
     from scanfab.packing.boundary import BoundaryRule
 
     several = rules if isinstance(rules, tuple | list) else [rules]
@@ -243,7 +243,7 @@ def parse_boundary(name: str, rules: Any) -> tuple[BoundaryRule, ...]:
 
 
 def parse_directions(name: str, value: Any) -> DirectionRule | None:
-    """A rule whose axes do not all lie in one plane; None for ``auto``."""
+    """Parse a direction rule, whose axes must not lie in one plane; ``auto`` gives None."""
     from scanfab.scan.directions import DirectionRule, direction_rule
 
     if value is None or value == "auto":
@@ -251,33 +251,33 @@ def parse_directions(name: str, value: Any) -> DirectionRule | None:
     rule = value if isinstance(value, DirectionRule) else direction_rule(str(value))
     if rule.is_flat:
         raise SettingsError(
-            f"{name}: the {len(rule)} axes of {rule.name} lie in one plane, across which they "
-            f"say nothing: take more of them"
+            f"{name}: the {len(rule)} axes of {rule.name} lie in one plane, so nothing is measured "
+            f"across it: choose more axes"
         )
     return rule
 
 
 def direction_rules() -> list[str]:
-    """How the rules for directions begin."""
+    """The beginnings of direction rules, for shell completion."""
     from scanfab.scan.directions import RULES
 
     return ["auto", *(f"{name}:" for name in RULES)]
 
 
 def rattler_rules() -> Iterable[str]:
-    """The names of the rules that are installed."""
+    """Names of the installed rattler rules."""
     from scanfab.packing.rattlers import installed_rules
 
     return installed_rules()
 
 
 def parse_rattlers(name: str, value: Any) -> str:
-    """The name of a rule that is installed."""
+    """Parse the name of an installed rattler rule."""
     return str(one_of(*rattler_rules())(name, value))
 
 
 def parse_strain(name: str, value: Any) -> str:
-    """Where the axial strain comes from: a word, or a file that exists."""
+    """Parse the source of the axial strain: a word, or an existing file."""
     is_path = isinstance(value, str | os.PathLike)
     if not is_path or (str(value) not in STRAIN_MODES and not Path(value).is_file()):
         found = str(value) if is_path else value
@@ -286,6 +286,6 @@ def parse_strain(name: str, value: Any) -> str:
 
 
 def parse_workers(name: str, value: Any) -> int:
-    """A number of threads: all cores if not given."""
+    """Parse a number of workers; None stands for all cores."""
     count = (os.cpu_count() or 1) if value is None else value
     return int(whole("1 or more", lambda count: count >= 1)(name, count))

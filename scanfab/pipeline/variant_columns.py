@@ -1,4 +1,4 @@
-"""The columns of the fabric table that one variant and cut-off fill, from a frame's scans."""
+"""Values of the fabric table for one variant and cut-off, from the scans of a frame."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Solids
 from scanfab.table.columns import installed_fabrics, table_columns
 
-# share of the segments that may leave the sample before a user is told
+# the user is warned if a larger fraction of the segments leaves the sample
 MOST_LEFT_OUT = 0.01
 NO_INNER_WINDOW = (
-    "the sample is flat or too small: by the rule `edge=ends` the whole is measured in the "
-    "ellipsoid that lies a largest radius within the hull of its centres, and there is none"
+    "the sample is flat or too small for `edge=ends`: the whole is then measured in an ellipsoid "
+    "that lies one largest radius inside the hull of the grain centres, and none fits"
 )
 
 
 class VariantColumns:
-    """The columns of one variant and cut-off."""
+    """Computes the columns of one variant and cut-off."""
 
     def __init__(self, measurement: Measurement, variant: Variant, place: int) -> None:
         self.measurement, self.variant, self.place = measurement, variant, place
@@ -43,30 +43,30 @@ class VariantColumns:
         self.window = self.plan.window if variant.in_window else None
         self.cutoff = self.plan.cutoffs[place]
         self.rv = self.plan.rvs_of(variant.name)[0].fraction
-        """The size of the variant's RV, where there are several."""
+        """Size of the variant's RV; None unless there are several RVs."""
         self.edge = edge_of(variant, self.plan, measurement.solids)
-        self.which = "abcd".index(variant.name)
-        kept = float(self.sums.segments[:, self.which].sum())
+        self.index = "abcd".index(variant.name)
+        kept = float(self.sums.segments[:, self.index].sum())
         self.left_out = left_out_of(self.sums, variant, self.edge, kept)
 
     def columns(self) -> dict[str, Any]:
-        """The values of all columns but those that are the same in all rows of a frame."""
+        """Values by column, without the columns that are the same in all rows of a frame."""
         plan, measured = self.plan, self.measured
-        found = sample_values(self.sample, self.variant, self.window, len(measured.normals))
-        found |= {
+        row = sample_values(self.sample, self.variant, self.window, len(measured.normals))
+        row |= {
             "solid_fraction": self.solid_fraction,
             "directions": len(plan.rule),
             "replicates": self.sums.replicates,
-            "lines": int(self.sums.lines[:, self.which].sum()),
+            "lines": int(self.sums.lines[:, self.index].sum()),
             "segments": measured.segment_count,
-            # of all replicates together, as users choose it for a fixed scan
+            # spacing of all replicates together, as users give it for a fixed scan
             "spacing": plan.spacing / plan.space.apart(self.sums.replicates),
             "cutoff": self.cutoff,
         }
         for fabric in OWN_FABRICS.values():
-            found |= fabric.values(measured)
+            row |= fabric.values(measured)
         for name, fabric in installed_fabrics().items():
-            found |= checked_values(name, fabric, measured)
+            row |= checked_values(name, fabric, measured)
         more: dict[str, Any] = {
             RV_COLUMN.name: self.rv,
             "edge": self.edge,
@@ -78,22 +78,22 @@ class VariantColumns:
             more[predicted.PREDICTED_ALPHA.name] = self.predicted_alpha
         for group in plan.groups:
             more |= GROUPS[group].values(measured)
-        return found | {name: more[name] for name in plan.more_columns if name in more}
+        return row | {name: more[name] for name in plan.more_columns if name in more}
 
     @cached_property
     def measured(self) -> Measured:
-        """What the fabrics are computed from."""
-        sample, plan, found = self.sample, self.plan, self.measurement
+        """Input of the fabrics."""
+        sample, plan, measurement = self.sample, self.plan, self.measurement
         name, groups = self.variant.name, plan.groups
-        length, segments = found.kept(name, self.place)
-        count = self.sums.segments[:, self.which].sum()
-        if found.gaps is not None:
-            count = found.gaps.in_blocks(name, self.place)[1].sum()
+        length, segments = measurement.kept(name, self.place)
+        count = self.sums.segments[:, self.index].sum()
+        if measurement.gaps is not None:
+            count = measurement.gaps.in_blocks(name, self.place)[1].sum()
         chosen = sample.fabric_contacts(self.variant, self.window)
         points = compressed(chosen, sample.contacts.point)
         places = points
         if self.window is not None:
-            # next to the centre of the RV
+            # images of the points next to the centre of the RV
             places = self.window.center + self.window.branches(points, sample.packing)
         state = sample_state(sample, self.variant, self.window) if "state" in groups else None
         words = name, self.place, plan.moment
@@ -105,14 +105,17 @@ class VariantColumns:
             segments=segments,
             meets_solids=bool(sample.solids(self.variant, self.window).any()),
             blocked=BlockedSums(
-                found.blocked.axes,
-                found.block_rule.weights,
-                found.blocked.kept(*words),
-                [found.blocked.kept(*words, without=one) for one in range(2**plan.space.dimension)],
+                measurement.blocked.axes,
+                measurement.block_rule.weights,
+                measurement.blocked.kept(*words),
+                [
+                    measurement.blocked.kept(*words, without=block)
+                    for block in range(2**plan.space.dimension)
+                ],
             ),
             normals=compressed(chosen, sample.contacts.normal),
             points=points,
-            blocks=in_parts(found.blocks[self.variant.in_window].of, places),
+            blocks=in_parts(measurement.blocks[self.variant.in_window].of, places),
             space=plan.space,
             segment_count=int(count),
             forces=contact_forces(sample, chosen) if "forces" in groups else None,
@@ -121,17 +124,17 @@ class VariantColumns:
 
     @cached_property
     def solid_fraction(self) -> float | None:
-        """1 - void length / line length in the window, weighted like the directions."""
+        """1 - void length / line length in the window, weighted over the directions."""
         cell, weights = self.sample.packing.cell, self.plan.rule.weights
         if self.window is None and not (cell is not None and cell.is_endless):
             return None
-        length = float(weights @ self.sums.line_length[:, self.which].sum(axis=0))
-        void = float(weights @ self.sums.void[:, self.which].sum(axis=0))
+        length = float(weights @ self.sums.line_length[:, self.index].sum(axis=0))
+        void = float(weights @ self.sums.void[:, self.index].sum(axis=0))
         return None if length == 0 else 1.0 - void / length
 
     @property
     def predicted_alpha(self) -> float | None:
-        """What contacts predict for a small cut-off, if the porosity of the region is known."""
+        """Anisotropy predicted from contacts; None if the formula does not hold."""
         solid, packing = self.solid_fraction, self.sample.packing
         longest = predicted.LONGEST_GAP * float(packing.radius[self.sample.grains].min())
         if solid is None or packing.bodies is not None or self.plan.moment != 1:
@@ -143,7 +146,7 @@ class VariantColumns:
 
     @property
     def window_alpha(self) -> float | None:
-        """The anisotropy that the window alone would make; 0 if its edge cuts no segments."""
+        """Anisotropy due to the window alone; 0 if the edge rule cuts no segments."""
         fabric = self.measured.void
         if self.window is None or fabric is None:
             return None
@@ -155,7 +158,7 @@ class VariantColumns:
         return predicted.window_alpha(self.window.shape, fabric, self.cutoff, axis)
 
     def notes(self) -> Iterator[Note]:
-        """Why there is no void fabric, or a doubtful one, and which lines meet no grain."""
+        """Notes on a missing or doubtful fabric, and on lines that meet no grain."""
         texts = doubts_of_lines(self.sums, self.variant, self.left_out) | self._doubts_of_void()
         if "state" in self.plan.groups:
             texts |= doubts_of_state(self.sample, self.window)
@@ -171,8 +174,8 @@ class VariantColumns:
             rattlers = self.sample.number(self.sample.solids(with_rattlers, window))
             if not rattlers:
                 return {"no_solid": f"no grain reaches into the {window}"}
-            there = " that reach into the RV" if self.variant.in_window else ""
-            return {"no_solid": f"no grain is left, all {rattlers}{there} are rattlers"}
+            reaching = " that reach into the RV" if self.variant.in_window else ""
+            return {"no_solid": f"no grain is left, all {rattlers}{reaching} are rattlers"}
         if self.edge == ENDS and window is None and self.measurement.solids.inner is None:
             return {"no_inner_window": NO_INNER_WINDOW}
         if self.measured.segment_count == 0:
@@ -191,13 +194,13 @@ class VariantColumns:
 
 
 def no_columns(more: Collection[str] = ()) -> dict[str, Any]:
-    """The columns of a frame without grains."""
+    """Values by column for a frame without grains."""
     empty = {column.name: None for column in table_columns(more)}
     return {**empty, "grains": 0, "rattlers": 0, "contacts": 0}
 
 
 def edge_of(variant: Variant, plan: Plan, solids: Solids) -> str | None:
-    """The rule that holds at the surface of a variant; None for a whole that repeats."""
+    """The edge rule for a variant; None for a periodic whole, which has no edge."""
     if variant.in_window:
         return plan.edge
     if solids.medium is not None:
@@ -206,7 +209,7 @@ def edge_of(variant: Variant, plan: Plan, solids: Solids) -> str | None:
 
 
 def left_out_of(sums: ScanSums, variant: Variant, edge: str | None, kept: float) -> float | None:
-    """Share of the segments that are dropped as they leave the sample; None if they are cut."""
+    """Fraction of segments dropped because they leave the sample; None if they are cut."""
     if edge != START:
         return None
     left = float(sums.left_out[:, "abcd".index(variant.name)].sum())
@@ -215,16 +218,16 @@ def left_out_of(sums: ScanSums, variant: Variant, edge: str | None, kept: float)
 
 def doubts_of_lines(sums: ScanSums, variant: Variant, left_out: float | None) -> dict[str, str]:
     """Notes, by code, on lines that meet no grain and on segments that leave the sample."""
-    found, which = {}, "abcd".index(variant.name)
-    channels, others = (int(one[:, which].sum()) for one in (sums.channels, sums.lines))
+    texts, index = {}, "abcd".index(variant.name)
+    channels, others = (int(counts[:, index].sum()) for counts in (sums.channels, sums.lines))
     if channels:
-        found["channels"] = (
+        texts["channels"] = (
             f"{channels} of {channels + others} lines stay in a channel and meet no grain"
         )
     if left_out is not None and left_out > MOST_LEFT_OUT:
-        found["left_out"] = (
+        texts["left_out"] = (
             f"{left_out:.1%} of the void segments of the RV leave the sample and are left "
-            f"out: they are the long ones, so the mean length is too small: choose a smaller `rv`, "
-            f"or `edge=ends`, which needs nothing from outside"
+            f"out: these are long segments, so the mean length is too small: choose a smaller "
+            f"`rv`, or `edge=ends`, which needs nothing outside the RV"
         )
-    return found
+    return texts

@@ -1,4 +1,4 @@
-"""What settings mean for discs in a plane, of which nothing is known before a frame is read."""
+"""What settings mean for discs in a plane; only a frame tells whether the grains are discs."""
 
 from __future__ import annotations
 
@@ -12,49 +12,49 @@ from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import AXES, Axis, UsualAxis, as_written
 from scanfab.scan.directions import DirectionRule, rule_of
 
-# the largest component of a unit vector that counts as 0
+# a component of a unit vector up to this counts as 0
 ROUNDING = 1e-9
 
 
 def settings_in(settings: Settings, space: Space) -> Settings:
     """
-    The settings for a series whose grains lie in a space; for spheres they stay as they are.
+    Adapt settings to discs in a plane; settings for spheres do not change.
 
     Parameters
     ----------
     settings : Settings
-        As users made them, or as this function has returned them.
+        Settings as users made them, or as this function returned them.
     space : Space
-        That of the first frame that has grains.
+        Space of the first frame that has grains.
 
     Raises
     ------
     DimensionError
-        If they are of three dimensions and the grains are discs, or the other way round.
+        If the settings are for spheres and the grains are discs, or the other way round.
     """
     settings.check_sizes(space.dimension)
     if not space.is_plane:
         return settings
     if settings.rv_shape not in ("sphere", "box", "ellipsoid"):
         raise DimensionError(
-            f"rv_shape: {settings.rv_shape} is no window of discs in {space}: choose sphere (the "
-            f"circle), box or ellipsoid (the ellipse)"
+            f"rv_shape: {settings.rv_shape} is no window for discs in {space}: choose sphere "
+            f"(a circle), box (a rectangle) or ellipsoid (an ellipse)"
         )
     return replace(settings, axis=_axis(settings.axis, space), directions=_rule(settings, space))
 
 
 def _axis(axis: Axis, space: Space) -> Axis:
-    """The loading axis in a plane; where none was given, the second axis of the plane."""
+    """The loading axis in a plane; the default is the second axis of the plane."""
     assert space.across is not None
     if isinstance(axis, UsualAxis):
         return AXES["xyz"[max(space.along)]]
     if abs(axis[space.across]) > ROUNDING:
         first, second = ("xyz"[k] for k in sorted(space.along))
         named = as_written(axis)
-        asked = named if isinstance(named, str) else spelt_place(axis)
+        spelt = named if isinstance(named, str) else spelt_place(axis)
         raise DimensionError(
-            f"axis: the axis {asked} leads out of {space}, in which all discs "
-            f"lie: choose {first}, {second}, or another axis in the plane"
+            f"axis: the axis {spelt} leads out of {space} of the discs: choose {first}, {second}, "
+            f"or another axis in the plane"
         )
     if axis[space.across] == 0.0:
         return axis
@@ -63,13 +63,13 @@ def _axis(axis: Axis, space: Space) -> Axis:
 
 
 def _rule(settings: Settings, space: Space) -> DirectionRule | None:
-    """So many equal steps as a number asks for; None for ``auto``."""
+    """The direction rule in a plane: equal angles, as many as asked for; None for ``auto``."""
     rule = settings.directions
     if rule is None or rule.space == space:
         return rule
     if rule.asked is None:
         raise DimensionError(
-            f"directions: {rule.name} is a rule of three dimensions, but all discs lie in {space}: "
-            f"choose a number of axes, such as 16"
+            f"directions: {rule.name} is a rule for three dimensions, but all discs lie in "
+            f"{space}: choose a number of axes, such as 16"
         )
     return rule_of(rule.asked, space)

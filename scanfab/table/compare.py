@@ -1,4 +1,4 @@
-"""Comparison of fabric tables: normalised curves, and void against contact fabric by variant."""
+"""Compare fabric tables: normalised curves, and void against contact fabric by variant."""
 
 from __future__ import annotations
 
@@ -31,80 +31,81 @@ from scanfab.table.row import (
 from scanfab.table.selection import check_rows
 from scanfab.table.table import Table
 
-# the strain of a frame at 12 % may be 0.1200012, as the numbers of boxes are rounded
+# Box sizes are rounded in dumps, so the strain of a frame at 12 % may be 0.1200012.
 SAME_STRAIN = 1e-5
-# a line through fewer points says nothing
+# a straight line needs at least as many points to say anything
 FEWEST_FRAMES = 3
 BOTH = ("alpha_vs_axial", "alpha_c_axial")
 TURNED = (
     "the loading axis is not the axis of the contact fabric, as in simple shear: alpha_vs_axial, "
-    "alpha_c_axial, and with them slope and peak, miss most of the fabric; figures draw alpha_vs, "
-    "alpha_c and the angle between their axes instead; or compute with `axis` along the major axis"
+    "alpha_c_axial, slope and peak miss most of the fabric. Figures draw alpha_vs, alpha_c and the "
+    "angle between their axes instead; or compute with `axis` along the major axis"
 )
 
-KINDS = {one.name: one.kind for one in (*OWN_COLUMNS, *MORE_COLUMNS)}
+KINDS = {column.name: column.kind for column in (*OWN_COLUMNS, *MORE_COLUMNS)}
 KEPT = "as in the fabric table"
-RV = f"{KEPT}: only where that has several RVs"
+RV = f"{KEPT}; only if that has several RVs"
 
 
 def _columns(**meanings: str) -> tuple[Column, ...]:
-    """Columns by name and meaning, of the kind that they have in fabric tables, else floats."""
+    """Columns from names and meanings; their kind is that of the fabric table, else float."""
     kinds = {**KINDS, "frames": int, "variants": str}
     return tuple(Column(name, kinds.get(name, float), "", text) for name, text in meanings.items())
 
 
 FRAMES = _columns(
     **dict.fromkeys(("source", "frame", "strain", "variant", *BOTH), KEPT),
-    alpha_vs_axial_norm="alpha_vs_axial over its largest absolute value in the source's variant",
-    alpha_c_axial_norm="alpha_c_axial likewise",
-    alpha_vs_axial_se=f"{KEPT}: the scan's part of the error",
-    alpha_vs_axial_sample_se=f"{KEPT}: the sample's part of the error",
-    alpha_vs_axial_total_se="both together, √(scan² + sample²); empty where either is",
-    alpha_c_axial_sample_se=f"{KEPT}: all of the error, as contacts are counted, not scanned",
+    alpha_vs_axial_norm="alpha_vs_axial over its largest absolute value in this source and variant",
+    alpha_c_axial_norm="alpha_c_axial over its largest absolute value in this source and variant",
+    alpha_vs_axial_se=f"{KEPT}: standard error due to the scan",
+    alpha_vs_axial_sample_se=f"{KEPT}: standard error due to the sample",
+    alpha_vs_axial_total_se="total standard error √(scan² + sample²); empty if either is empty",
+    alpha_c_axial_sample_se=f"{KEPT}: the whole standard error, as contacts need no scan",
     shear_strain=KEPT,
     rv=RV,
 )
-"""One frame and variant, with both anisotropies divided by their own largest absolute value."""
+"""Columns of a frame and variant; each anisotropy is also divided by its largest value."""
 
 SUMMARY = _columns(
     **dict.fromkeys(("source", "variant"), KEPT),
-    frames="number of frames that enter the fits",
-    slope="least-squares slope of alpha_vs_axial on alpha_c_axial, with an intercept",
-    slope_origin="that slope through the origin",
+    frames="number of frames in the fits",
+    slope="least-squares slope of alpha_vs_axial against alpha_c_axial, with an intercept",
+    slope_origin="least-squares slope of the line through the origin",
     r2="R² of the fit with an intercept",
-    slope_se="standard error of the slope from the sample's octants, each left out in all frames; "
-    "empty if a frame has no values without octants",
-    peak="alpha_vs_axial where its absolute value is largest",
-    peak_strain="the strain there; shear_strain where strain is the same in all frames",
-    final="alpha_vs_axial of the last frame that has one",
+    slope_se="standard error of the slope, by a jackknife that leaves out each octant of the "
+    "sample in all frames; empty if a frame lacks the values without octants",
+    peak="the alpha_vs_axial with the largest absolute value",
+    peak_strain="strain at the peak; shear_strain if the axial strain does not change",
+    final="the last alpha_vs_axial that is not empty",
     rv=RV,
 )
-"""One source and variant: void fabric against contact fabric over the frames."""
+"""Columns of a source and variant: void fabric against contact fabric over the frames."""
 
 DIFFERENCES = _columns(
     **dict.fromkeys(("source", "frame", "strain"), KEPT),
     variants="the two variants, for instance a-b",
-    difference="alpha_vs_axial of the first minus that of the second",
-    difference_se="its standard error if the scans were independent: too large if they share lines",
+    difference="alpha_vs_axial of the first variant minus that of the second",
+    difference_se="standard error of the difference for independent scans; too large for variants "
+    "that share lines",
 )
-"""How far two variants of one frame are apart."""
+"""Columns of the difference between two variants of a frame."""
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """
-    The tables that :func:`scanfab.compare_tables` makes.
+    The result of :func:`scanfab.compare_tables`: three tables and the points of the fits.
 
     Attributes
     ----------
     frames : Table
-        A row for each frame and variant, with both anisotropies divided by their largest.
+        A row for each frame and variant; each anisotropy is also divided by its largest value.
     summary : Table
         A row for each source and variant: slope, peak, final value.
     differences : Table
         A row for each frame and pair of variants.
     points : tuple of ndarray
-        For each row of the summary, contact and void anisotropy of the frames in its fits, shape
+        For each row of the summary, the contact and void anisotropy of the fitted frames, shape
         (frames, 2).
 
     Examples
@@ -127,29 +128,29 @@ class Comparison:
 
     @property
     def slope(self) -> FloatArray:
-        """Slope of each row of the summary, dimensionless; NaN where there is none."""
+        """Slope of each row of the summary, dimensionless; NaN if there is none."""
         return self.summary["slope"]
 
     @property
     def slope_se(self) -> FloatArray:
-        """Its standard error from the sample's octants."""
+        """Standard error of each slope, by a jackknife over the octants of the sample."""
         return self.summary["slope_se"]
 
     @property
     def r2(self) -> FloatArray:
-        """R² of each fit."""
+        """R² of each fit with an intercept."""
         return self.summary["r2"]
 
     @property
     def peak(self) -> FloatArray:
-        """The void anisotropy that is largest in size, for each row of the summary."""
+        """For each row of the summary, the void anisotropy with the largest absolute value."""
         return self.summary["peak"]
 
     def __repr__(self) -> str:
         lines = [
-            f"{one.source}, variant {variant_of(one)}: "
-            f"slope {with_error(one.slope, one.slope_se)}, {counted(one.frames, 'frame')}"
-            for one in self.summary
+            f"{row.source}, variant {variant_of(row)}: "
+            f"slope {with_error(row.slope, row.slope_se)}, {counted(row.frames, 'frame')}"
+            for row in self.summary
         ]
         return "\n".join([f"Comparison of {len(self.frames)} rows", *lines])
 
@@ -158,28 +159,27 @@ def compare_tables(
     rows: Iterable[Mapping[str, Any]], *, strain_max: float | None = None
 ) -> Comparison:
     """
-    Set the variants of fabric tables side by side.
+    Compare void with contact fabric over the frames, and the variants with one another.
 
     Parameters
     ----------
     rows : iterable of mapping
-        Rows of fabric tables by column; numbers may be None. Groups are source, variant and, where
-        there are several, RV.
+        Rows of fabric tables by column; numbers may be None. Rows are grouped by source, variant
+        and, if there are several, RV.
     strain_max : float, optional
-        Leave frames beyond this strain, a fraction, out of the fits; beyond this shear strain
-        where the axial strain is the same in all frames.
+        Leave frames beyond this strain, a fraction, out of the fits. If the axial strain is the
+        same in all frames, the limit holds for the shear strain.
 
     Returns
     -------
     Comparison
-        Rows for frames, for sources and variants, and for pairs of variants, and the points of
-        each fit.
+        Tables by frame, by source and variant, and by pair of variants, and the points of each fit.
 
     Raises
     ------
     SettingsError
-        If a column is missing, or holds something else than numbers, or if a frame has several rows
-        of one variant, as with several cut-offs.
+        If a column is missing or holds other values than numbers, or if a frame has several rows of
+        the same variant, as with several cut-offs.
 
     Examples
     --------
@@ -200,7 +200,7 @@ def compare_tables(
         if count > 1:
             raise SettingsError(
                 f"{source}, variant {variant}: several rows for frame {frame}: choose one cut-off "
-                f"with `cutoff`, or tell two runs of one sample apart by `labels=NAME`"
+                f"with `cutoff`, or name two runs of the same sample with `labels=NAME`"
             )
     column = strain_column(rows) or "strain"
     _tell_of_strains(rows, column, strain_max)
@@ -208,7 +208,7 @@ def compare_tables(
         note(TURNED)
     fits = [_fitted_group(group, column, strain_max) for group in groups.values()]
     normalised = [row for group in groups.values() for row in _normalised(group)]
-    # the column of the RV is the last one
+    # the last column, rv, is dropped if there are no several RVs
     end = None if numbers_of(rows, "rv") else -1
     return Comparison(
         frames=Table(normalised, FRAMES[:end]),
@@ -219,21 +219,21 @@ def compare_tables(
 
 
 def _tell_of_strains(rows: Rows, column: str, strain_max: float | None) -> None:
-    """Notes on the strain that is used, and warnings on a ``strain_max`` that does not fit it."""
+    """Note which strain is used, and warn if ``strain_max`` does not fit the strains."""
     if hint := why_not_strain(rows):
         note(hint)
     if strain_max is None:
         return
     if not math.isfinite(strain_max):
         raise SettingsError(f"strain_max: expected a number, found {strain_max}")
-    known = [row for row in rows if number_of(row, column) is not None]
-    strains = {(row["source"], row["frame"]): float(row[column]) for row in known}
+    strained = [row for row in rows if number_of(row, column) is not None]
+    strains = {(row["source"], row["frame"]): float(row[column]) for row in strained}
     if not strains:
-        warn("`strain_max`: no frame has a strain, so none is fitted")
+        warn("`strain_max`: no frame has a strain, so no frame is fitted")
         return
     largest = max(strains.values())
     lie = (
-        f"strains are fractions (5 % is 0.05), positive in compression, and lie between "
+        f"strains are fractions (5 % is 0.05), positive in compression, and here lie between "
         f"{min(strains.values()):.3g} and {largest:.3g}"
     )
     if _within(largest, strain_max):
@@ -244,19 +244,19 @@ def _tell_of_strains(rows: Rows, column: str, strain_max: float | None) -> None:
         beyond = [strain for strain in own if not _within(strain, strain_max)]
         if beyond and (left := len(own) - len(beyond)) < FEWEST_FRAMES:
             warn(
-                f"strain_max: {strain_max:g} leaves {left} of {len(own)} frames of {source}, and "
-                f"a line needs {FEWEST_FRAMES}: the nearest strain above is {min(beyond):.10g}; "
+                f"strain_max: {strain_max:g} leaves {left} of {len(own)} frames of {source}, but "
+                f"a fit needs {FEWEST_FRAMES}: the next larger strain is {min(beyond):.10g}; "
                 f"{lie}"
             )
 
 
 def _within(strain: float | None, strain_max: float | None) -> bool:
-    """Whether a frame belongs to the fit; a frame without a strain does not."""
+    """Whether a frame is fitted: always without a limit, else if it has a strain within it."""
     return strain_max is None or (strain is not None and strain <= strain_max + SAME_STRAIN)
 
 
 def _normalised(group: Rows) -> Iterator[dict[str, Any]]:
-    """The rows of one source and variant with their values divided by the largest of them."""
+    """The rows of one source and variant with normalised anisotropies and total errors."""
     largest = {name: max(map(abs, numbers_of(group, name)), default=0.0) for name in BOTH}
     for row in group:
         values = {**row, "alpha_vs_axial_total_se": total_error(row, "alpha_vs_axial")}
@@ -269,7 +269,7 @@ def _normalised(group: Rows) -> Iterator[dict[str, Any]]:
 def _fitted_group(
     group: Rows, column: str, strain_max: float | None
 ) -> tuple[dict[str, Any], FloatArray]:
-    """The row of the summary, and the points of its fit."""
+    """The summary row of one source and variant, and the points of its fit."""
     curve = [row for row in group if row["alpha_vs_axial"] is not None]
     fitted = [
         row
@@ -294,7 +294,7 @@ def _fitted_group(
 
 
 def _fit(x: FloatArray, y: FloatArray) -> tuple[float | None, float | None, float | None]:
-    """Slope with an intercept, slope through the origin, R² of the former."""
+    """Slope of the fit with an intercept, slope through the origin, R² of the first fit."""
     if len(x) < FEWEST_FRAMES:
         return None, None, None
     origin = float(x @ y / (x @ x)) if np.any(x != 0) else None
@@ -308,14 +308,14 @@ def _fit(x: FloatArray, y: FloatArray) -> tuple[float | None, float | None, floa
 
 def _slope_error(fitted: Rows) -> float | None:
     """
-    Standard error of the slope from the blocks of the sample.
+    Standard error of the slope, by a jackknife over the blocks of the sample.
 
-    Frames of one sample are not independent, so their scatter about the line is no measure of it.
-    The values without each block come from two replicates of the scan, which give two slopes each;
-    from these the noise of the scan is known and taken off. None if nothing is left, or if a frame
-    lacks the values without some block.
+    Frames of one sample are not independent, so their scatter about the line does not measure the
+    error. The table has values without each block from two replicates of the scan. They give two
+    slopes per block, whose difference shows the noise of the scan; this noise is subtracted. The
+    error is None if nothing remains, or if a frame lacks the values without some block.
     """
-    # samples in a plane have no upper half, and so half as many blocks
+    # samples in a plane have four quadrants in place of eight octants
     upper = [f"alpha_c_axial_without_{block}" for block in range(BLOCKS // 2 + 1, BLOCKS + 1)]
     has_upper = any(numbers_of(fitted, name) for name in upper)
     slopes: list[list[float | None]] = []
@@ -323,27 +323,27 @@ def _slope_error(fitted: Rows) -> float | None:
         contact = column_of(fitted, f"alpha_c_axial_without_{block}")
         void = column_of(fitted, f"alpha_vs_axial_without_{block}")
         half = column_of(fitted, f"alpha_vs_axial_half_{block}")
-        if np.isnan(half).any():  # an older table lacks this column: the noise stays in
+        if np.isnan(half).any():  # older tables lack this column: the noise is not subtracted
             half = np.zeros(len(fitted))
         slopes.append([_fit(contact, void + sign * half)[0] for sign in (1.0, -1.0)])
-    # a value that a frame lacks makes the slope, and with it the variance, no number
+    # a missing value makes the slope NaN, and so the variance
     variance = float(variance_without_noise(np.array(slopes, float)))
     return math.sqrt(variance) if variance >= 0 else None
 
 
 def _differences(groups: Mapping[tuple[str, str], Rows]) -> Iterator[dict[str, Any]]:
-    """Pairs of variants of one source, frame by frame."""
+    """A row for each frame and each pair of variants of the same source."""
     for source in dict.fromkeys(source for source, _ in groups):
         variants = sorted(variant for name, variant in groups if name == source)
         for first, second in combinations(variants, 2):
             others = {row["frame"]: row for row in groups[source, second]}
-            for one in groups[source, first]:
-                pair = one, others.get(one["frame"], {})
+            for row in groups[source, first]:
+                pair = row, others.get(row["frame"], {})
                 values = numbers_of(pair, "alpha_vs_axial")
                 errors = numbers_of(pair, "alpha_vs_axial_se")
                 if len(values) == 2:
                     yield {
-                        **{name: one[name] for name in ("source", "frame", "strain")},
+                        **{name: row[name] for name in ("source", "frame", "strain")},
                         "variants": f"{first}-{second}",
                         "difference": values[0] - values[1],
                         "difference_se": math.hypot(*errors) if len(errors) == 2 else None,

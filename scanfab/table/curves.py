@@ -1,4 +1,4 @@
-"""Curves of fabric tables, one for each source and variant, and their abscissa."""
+"""Curves of fabric tables: one for each source and variant, over strain or frame number."""
 
 from __future__ import annotations
 
@@ -12,18 +12,19 @@ import numpy as np
 from scanfab.base.typing import FloatArray
 from scanfab.table.row import Rows, column_of, groups_of, number_of, numbers_of, total_error
 
-# columns of strains: in words, and as the symbol of figures
+# columns of strains, each with its name and its symbol in figures
 STRAINS = {
     "strain": ("axial strain", r"$\varepsilon_a$"),
     "shear_strain": ("shear strain", r"$\varepsilon_q$"),
 }
-# strains that differ by less are the same: rounding is no deformation
+# smaller differences between strains are rounding
 SAME = 1e-9
 LONGEST_NAME = 32
-# matplotlib cannot draw larger values, which would be infinite in units of the axis
+# matplotlib cannot draw larger values: they overflow when it scales them to the axis
 LARGEST = 1e100
-# Contact fabric is certainly anisotropic if its intensity is CERTAIN standard errors (without
-# anisotropy it is about one), and turned if less than ALONG of it shows along the loading axis.
+# The contact fabric counts as anisotropic if its intensity exceeds CERTAIN standard errors (noise
+# alone gives about 1). It counts as turned if its anisotropy along the loading axis is less than
+# ALONG times its intensity.
 CERTAIN, ALONG = 5.0, 0.5
 
 
@@ -33,39 +34,40 @@ class Curve:
 
     source: str
     variant: str
-    """With the size of its RV, where there are several."""
+    """Variant, with the size of its RV if there are several."""
     x: FloatArray
     """Strain in per cent, or the number of the frame, shape (F,)."""
     rows: Rows
     """The rows of the curve."""
 
     def values(self, name: str) -> FloatArray:
-        """A column of the table, shape (F,); NaN where there is no number that can be drawn."""
+        """A column of the table, shape (F,); NaN if a value is missing or cannot be drawn."""
         return _drawable(column_of(self.rows, name))
 
     def errors(self, name: str) -> FloatArray:
-        """Standard errors in a column; NaN where another program wrote a negative number."""
+        """Standard errors in a column; NaN for negative numbers, which other programs may write."""
         return np.where(self.values(name) < 0, np.nan, self.values(name))
 
     def total_errors(self, name: str) -> FloatArray:
         """
-        Errors of scan and sample for ``alpha_vs_axial``, of the sample for ``alpha_c_axial``.
+        Standard error that combines scan and sample for ``alpha_vs_axial``, shape (F,).
 
-        Where the sample's error is not known, contacts are taken as independent.
+        For ``alpha_c_axial`` it is the sample's error; if the table lacks it, the error is that of
+        independent contacts.
         """
         if name == "alpha_c_axial" and self.contact_alone:
             return self.errors("alpha_c_axial_se")
-        found = np.array([total_error(row, name) for row in self.rows], np.float64)
-        return np.where(found < 0, np.nan, _drawable(found))
+        errors = np.array([total_error(row, name) for row in self.rows], np.float64)
+        return np.where(errors < 0, np.nan, _drawable(errors))
 
     @property
     def contact_alone(self) -> bool:
-        """Whether contacts are taken as independent."""
+        """Whether errors of the contact fabric are those of independent contacts."""
         return not np.isfinite(self.errors("alpha_c_axial_sample_se")).any()
 
 
 def curves_of(rows: Iterable[Mapping[str, Any]]) -> list[Curve]:
-    """The curves of a table, in the order in which they first appear."""
+    """The curves of a table, in the order of their first rows."""
     rows = list(rows)
     abscissa = strain_column(rows)
     groups = groups_of(rows)
@@ -87,18 +89,18 @@ def _drawable(array: FloatArray) -> FloatArray:
 
 def strain_column(rows: Rows) -> str | None:
     """
-    The column with the strain of all frames of all sources.
+    Choose the column of strain that suits all frames of all sources.
 
     Parameters
     ----------
     rows : sequence of mapping
-        Of fabric tables; those without a void fabric do not matter.
+        Rows of fabric tables; rows without a void fabric are ignored.
 
     Returns
     -------
     str or None
-        ``strain``; ``shear_strain`` where the axial strain of a source is missing or the same in
-        all its frames; None where that is so of both. Then frames have only their number.
+        ``strain``. If the axial strain of a source is missing or the same in all its frames,
+        ``shear_strain``. If that holds for both strains, None: use the frame number.
 
     Examples
     --------
@@ -108,60 +110,60 @@ def strain_column(rows: Rows) -> str | None:
     >>> strain_column(rows)
     'shear_strain'
     """
-    found = [name for name in STRAINS if not _lacking(rows, name)]
-    return found[0] if found and numbers_of(rows, "alpha_vs_axial") else None
+    usable = [name for name in STRAINS if not _lacking(rows, name)]
+    return usable[0] if usable and numbers_of(rows, "alpha_vs_axial") else None
 
 
 def why_not_strain(rows: Rows) -> str | None:
-    """A hint that some sources lack an axial strain; None if all have one, or none has."""
+    """A hint about sources without a useful axial strain; None if all have one, or no source."""
     lacking = _lacking(rows, "strain")
     if not lacking or not numbers_of(rows, "strain"):
         return None
-    instead, cure = "the frame's number", "says what length it is taken from"
+    instead, cure = "the frame number", "chooses the length that it is measured by"
     if strain_column(rows) is not None:
-        instead, cure = "shear_strain", "takes another length"
+        instead, cure = "shear_strain", "chooses another length"
     return (
-        f"{instead} stands in for the axial strain, as {'; '.join(lacking)}: `strain` of compute "
-        f"{cure}"
+        f"{instead} is used in place of the axial strain, because {'; '.join(lacking)}: `strain` "
+        f"of compute {cure}"
     )
 
 
 def _lacking(rows: Rows, column: str) -> list[str]:
-    """What is wrong with the strain of each source, in words."""
+    """Describe the sources whose strain is missing or the same in all frames."""
     sources: dict[str, dict[int, float | None]] = {}
     for row in rows:
         if number_of(row, "alpha_vs_axial") is not None:
             sources.setdefault(row["source"], {})[row["frame"]] = number_of(row, column)
-    said = []
+    problems = []
     for source, strains in sources.items():
         without = [frame for frame, strain in strains.items() if strain is None]
         known = [strain for strain in strains.values() if strain is not None]
         if without:
-            said.append(f"{source} has none" + (f" in frame {without[0]}" if known else ""))
+            problems.append(f"{source} has none" + (f" in frame {without[0]}" if known else ""))
         elif len(known) > 1 and max(known) - min(known) < SAME:
-            said.append(f"{source} has the same in all frames ({known[0]:g})")
-    return said
+            problems.append(f"{source} has the same in all frames ({known[0]:g})")
+    return problems
 
 
 def frame_strain_column(row: Mapping[str, Any]) -> str | None:
-    """The strain column of a single frame, preferably one that is not 0 there."""
-    known = [name for name in STRAINS if number_of(row, name) is not None]
-    moved = [name for name in known if abs(row[name]) >= SAME]
-    return next(iter([*moved, *known]), None)
+    """The strain column for a single frame, preferably with a strain that is not 0."""
+    present = [name for name in STRAINS if number_of(row, name) is not None]
+    moved = [name for name in present if abs(row[name]) >= SAME]
+    return next(iter([*moved, *present]), None)
 
 
 def spelt_strain(row: Mapping[str, Any], column: str | None, *, symbol: bool = False) -> str:
     """
-    The strain of a frame for its title; empty where there is none.
+    The strain of a frame for a title; empty if there is none.
 
     Parameters
     ----------
     row : mapping
-        Of a fabric table.
+        Row of a fabric table.
     column : str or None
-        See :func:`strain_column`.
+        Column of the strain, from :func:`strain_column`.
     symbol : bool, optional
-        For a figure, where words take too much room.
+        Write the symbol in place of the words, which take more room.
 
     Examples
     --------
@@ -177,37 +179,38 @@ def spelt_strain(row: Mapping[str, Any], column: str | None, *, symbol: bool = F
 
 
 def abscissa_label(rows: Rows) -> str:
-    """The label of the abscissa."""
+    """Label of the abscissa in figures."""
     column = strain_column(rows)
     return "frame" if column is None else f"{' '.join(STRAINS[column])} in %"
 
 
 def abscissa_words(rows: Rows) -> str:
-    """The abscissa as words in a sentence."""
+    """Name of the abscissa within a sentence."""
     column = strain_column(rows)
     return "the number of the frame" if column is None else f"the {STRAINS[column][0]}"
 
 
 def is_turned(rows: Rows) -> bool:
     """
-    Whether the axes of the fabric are not the loading axis, as in simple shear.
+    Whether the fabric is turned away from the loading axis, as in simple shear.
 
-    The axial anisotropies then miss most of the fabric. The frame whose contacts are most certainly
-    anisotropic decides; if none is, curves over the shear strain count as turned.
+    The axial anisotropies of a turned fabric miss most of it. The frame with the largest ratio of
+    contact anisotropy to error decides. If no frame is clearly anisotropic, the fabric counts as
+    turned when the shear strain is the abscissa.
     """
     names = ("alpha_c", "alpha_c_axial", "alpha_c_axial_se", "alpha_vs")
-    known = [row for row in rows if None not in [number_of(row, name) for name in names]]
+    complete = [row for row in rows if None not in [number_of(row, name) for name in names]]
     certainty, along = 0.0, 1.0
-    for row in known:
+    for row in complete:
         intensity, error = row["alpha_c"], row["alpha_c_axial_se"]
         if intensity > 0 and error > 0:
             axial = abs(row["alpha_c_axial"]) / intensity
             certainty, along = max((certainty, along), (intensity / error, axial))
-    return along < ALONG if certainty > CERTAIN else strain_column(known) == "shear_strain"
+    return along < ALONG if certainty > CERTAIN else strain_column(complete) == "shear_strain"
 
 
 def short_names(sources: Iterable[str], longest: int = LONGEST_NAME) -> dict[str, str]:
-    """Short names of sources: the last part of the path, where that tells them apart."""
+    """Short names of sources: the last part of each path if these differ, else the path."""
     sources = list(dict.fromkeys(sources))
     for kept in ([PurePath(source).name or source for source in sources], sources):
         names = [middle_out(name, longest) for name in kept]
@@ -219,7 +222,7 @@ def short_names(sources: Iterable[str], longest: int = LONGEST_NAME) -> dict[str
 
 
 def middle_out(name: str, longest: int) -> str:
-    """A long name without its middle, as either end may be what matters."""
+    """Shorten a long name in the middle, because either end may be what tells it apart."""
     if len(name) <= longest:
         return name
     half = (longest - 3) // 2

@@ -1,4 +1,4 @@
-"""Files of tables: CSV, TSV, JSON, JSON lines, Parquet, and the formats of plugins."""
+"""File formats of tables: CSV, TSV, JSON, JSON lines, Parquet, and formats of plugins."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 Rows = Iterable[Mapping[str, Any]]
 Columns = Sequence[Column]
 
-# cells of these columns stay texts even if they look like numbers: a source may be called 2024
-TEXT_COLUMNS = {one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind is str}
+# cells of these columns stay text even if they look like numbers: a source may be named 2024
+TEXT_COLUMNS = {column.name for column in (*OWN_COLUMNS, *MORE_COLUMNS) if column.kind is str}
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
@@ -33,44 +33,44 @@ class TableFormat(Protocol):
     """
     A file format for tables.
 
-    A package offers one under the entry point ``scanfab.table_formats``; a file here needs a line
-    in ``OWN_FORMATS``. A format whose cells may be lists of numbers says ``holds_lists = True``;
-    other formats leave such columns out.
+    Another package offers a format under the entry point ``scanfab.table_formats``; a format of
+    this package is listed in ``OWN_FORMATS``. A format whose cells can hold lists of numbers sets
+    ``holds_lists = True``; other formats leave out columns of lists.
     """
 
     suffix: str
-    """Of its files, in small letters."""
+    """Suffix of its files, in lower case."""
     description: str
-    """For ``scanfab formats``."""
+    """Description for ``scanfab formats``."""
     is_text: bool
-    """Whether it is written to a stream of text."""
+    """Whether it writes to a text stream; if not, it writes bytes."""
 
     def recognises(self, data: bytes) -> bool:
-        """Whether a file's content is of this format."""
+        """Whether the content of a file is in this format."""
         ...
 
     def read(self, data: bytes, name: str) -> list[dict[str, Any]]:
-        """The rows of a file's content; ReadError if it is broken, with the file's name."""
+        """Read rows from the content of a file; ReadError names the file if it is broken."""
         ...
 
     def write(self, stream: IO[Any], rows: Rows, columns: Columns) -> None:
-        """Write rows, whose values are of these columns and in their order."""
+        """Write rows; each has the values of these columns, in the same order."""
         ...
 
 
 class OwnFormat:
-    """Base of the formats of the package, which are recognised by the first characters."""
+    """Base class of the formats of this package, which recognise files by their first bytes."""
 
     is_text = holds_lists = True
     start = b""
 
     def recognises(self, data: bytes) -> bool:
-        """Whether a file begins as the format does."""
+        """Whether the content begins with the characters of this format."""
         return data.removeprefix(BYTE_ORDER_MARK).lstrip().startswith(self.start)
 
 
 class SeparatedText(OwnFormat):
-    """CSV or TSV; a text of no other format is read as one of the two."""
+    """CSV or TSV; any text that no other format recognises is read as one of these two."""
 
     holds_lists = False
 
@@ -78,7 +78,7 @@ class SeparatedText(OwnFormat):
         self.suffix, self.delimiter, self.description = suffix, delimiter, description
 
     def read(self, data: bytes, name: str) -> list[dict[str, Any]]:
-        """The rows; an empty cell is None."""
+        """Read rows; an empty cell becomes None."""
         text = _text(data, name)
         delimiter = "\t" if "\t" in text.split("\n", 1)[0] else ","
         lines = csv.reader(io.StringIO(text), delimiter=delimiter)
@@ -92,20 +92,21 @@ class SeparatedText(OwnFormat):
         except csv.Error as error:
             raise ReadError(f"{name}, line {lines.line_num}: {error}") from None
         if not names:
-            raise ReadError(f"{name}: expected a table, found nothing")
+            raise ReadError(f"{name}: expected a table, found an empty file")
         return rows
 
     def write(self, stream: IO[str], rows: Rows, columns: Columns) -> None:
         """
-        Write each row as soon as it comes, floats in the shortest form that reads back the same.
+        Write each row as soon as it is computed.
 
-        The header comes with the first row: a computation that fails before that writes nothing.
+        A float is written as the shortest text that reads back to the same number. The header is
+        written together with the first row, so that a run that fails before writes nothing.
         """
         writer = csv.writer(stream, delimiter=self.delimiter, lineterminator="\n")
         name = getattr(stream, "name", "")
         lines = (row.values() for row in rows)
         first = list(islice(lines, 1))
-        for line in chain([[one.name for one in columns]], first, lines):
+        for line in chain([[column.name for column in columns]], first, lines):
             with named_errors("standard output" if name == "<stdout>" else name):
                 writer.writerow(line)
                 stream.flush()
@@ -125,18 +126,18 @@ def _text(data: bytes, name: str) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise ReadError(f"{name}: expected a table as text or Parquet, found other bytes") from None
+        raise ReadError(f"{name}: expected text in UTF-8 or Parquet, found other bytes") from None
 
 
 class Json(OwnFormat):
-    """An object for each row, all in one array or each on a line of its own (JSON lines)."""
+    """A JSON object for each row: all in one array, or one on each line (JSON lines)."""
 
     def __init__(self, suffix: str, start: bytes, description: str) -> None:
         self.suffix, self.start, self.description = suffix, start, description
         self.is_array = start == b"["
 
     def read(self, data: bytes, name: str) -> list[dict[str, Any]]:
-        """The objects."""
+        """Read one row from each object."""
         text = _text(data, name)
         try:
             lines = [text] if self.is_array else filter(str.strip, text.split("\n"))
@@ -149,7 +150,7 @@ class Json(OwnFormat):
         return rows
 
     def write(self, stream: IO[str], rows: Rows, columns: Columns) -> None:
-        """Write an object a line; there is no header."""
+        """Write one object per row."""
         lines = map(json_line, rows)
         if not self.is_array:
             stream.writelines(line + "\n" for line in lines)
@@ -159,15 +160,15 @@ class Json(OwnFormat):
 
 
 def json_line(row: Mapping[str, Any]) -> str:
-    """A row as a JSON object on one line; SettingsError for values that JSON does not know."""
+    """A row as a JSON object on one line; SettingsError for values that JSON cannot hold."""
     try:
         return json.dumps(dict(row), ensure_ascii=False, allow_nan=False)
     except TypeError as error:
-        raise SettingsError(f"a row holds what JSON cannot: {error}") from None
+        raise SettingsError(f"a row holds a value that JSON cannot hold: {error}") from None
 
 
 class Parquet(OwnFormat):
-    """A file whose columns have the kinds that they are declared with."""
+    """Apache Parquet, whose columns keep the kinds that they are declared with."""
 
     suffix = ".parquet"
     description = "Apache Parquet"
@@ -175,7 +176,7 @@ class Parquet(OwnFormat):
     start = b"PAR1"
 
     def read(self, data: bytes, name: str) -> list[dict[str, Any]]:
-        """The rows."""
+        """Read the rows."""
         import polars
 
         try:
@@ -184,38 +185,38 @@ class Parquet(OwnFormat):
             raise ReadError(f"{name}: cannot be read as Parquet: {error}") from None
 
     def write(self, stream: IO[bytes], rows: Rows, columns: Columns) -> None:
-        """Write the file when all rows are known."""
+        """Write the file once all rows are computed."""
         data_frame(list(rows), columns).write_parquet(stream)
 
 
 def data_frame(rows: Sequence[Mapping[str, Any]], columns: Columns) -> polars.DataFrame:
     """
-    Rows, whose values are of Python's own kinds, as a data frame of polars.
+    Turn rows of plain Python values into a polars data frame.
 
-    A column has its declared kind. In tables of other programs, where fractions stand among counts
-    or words among numbers, it has a kind that holds all its values.
+    A column gets its declared kind. If values do not fit, as in tables of other programs that mix
+    whole numbers with fractions or words with numbers, it gets a kind that holds them all.
     """
     import polars
 
     kinds = {int: polars.Int64, float: polars.Float64, str: polars.String}
-    found = []
-    for one in columns:
-        values = [row.get(one.name) for row in rows]
+    series_of_columns = []
+    for column in columns:
+        values = [row.get(column.name) for row in rows]
         try:
-            series = polars.Series(one.name, values, kinds.get(one.kind))
+            series = polars.Series(column.name, values, kinds.get(column.kind))
         except (TypeError, ValueError, OverflowError):
-            series = polars.Series(one.name, values, strict=False)
+            series = polars.Series(column.name, values, strict=False)
         if series.null_count() > values.count(None):
-            raise SettingsError(f"{one.name}: its values are of kinds that no column can hold")
-        found.append(series)
-    return polars.DataFrame(found)
+            raise SettingsError(f"{column.name}: no column can hold values of so different kinds")
+        series_of_columns.append(series)
+    return polars.DataFrame(series_of_columns)
 
 
-# In the order in which they are listed. A file is recognised in the opposite order, as any text
-# may be separated by commas.
+# Formats in the order of the list that users see. Files are recognised in the opposite order,
+# because any text could be a table with commas.
 OWN_FORMATS: tuple[TableFormat, ...] = (
     SeparatedText(".csv", ",", "comma-separated values; a missing value is an empty cell"),
-    SeparatedText(".tsv", "\t", "the same with tabs"),
+    SeparatedText(".tsv", "\t", "tab-separated values; a missing value is an empty cell"),
     Json(".json", b"[", "one array of objects; a missing value is null"),
     Json(".jsonl", b"{", "JSON lines: one object a line"),
     Parquet(),
@@ -224,7 +225,7 @@ OWN_FORMATS: tuple[TableFormat, ...] = (
 
 @cache
 def foreign_formats() -> tuple[TableFormat, ...]:
-    """The formats of other packages."""
+    """Formats that other packages offer."""
     make = having(
         "an object with the members of scanfab.table.formats.TableFormat",
         **dict.fromkeys(("suffix", "description"), str),
@@ -232,57 +233,59 @@ def foreign_formats() -> tuple[TableFormat, ...]:
         **dict.fromkeys(("recognises", "read", "write"), Callable),
     )
     offers = load_plugins("scanfab.table_formats", "table format", make)
-    return tuple(one.plugin for one in offers.values())
+    return tuple(offer.plugin for offer in offers.values())
 
 
 def known_formats() -> dict[str, TableFormat]:
-    """All formats by suffix; other packages cannot replace those of this one."""
-    return {one.suffix: one for one in (*OWN_FORMATS, *foreign_formats()[::-1], *OWN_FORMATS)}
+    """All formats by suffix; other packages cannot replace the formats of this package."""
+    return {form.suffix: form for form in (*OWN_FORMATS, *foreign_formats()[::-1], *OWN_FORMATS)}
 
 
 def format_of(path: Path) -> TableFormat:
     """
-    The format in which results are written to a file of this name.
+    The format of results that are written to a file of this name.
 
     Raises
     ------
     SettingsError
-        If there is none.
+        If no format has the suffix of the file.
     """
     suffix = path.suffix.lower()
-    # looking for the formats of other packages takes a while, so it is done only if needed
-    found = {one.suffix: one for one in OWN_FORMATS}.get(suffix) or known_formats().get(suffix)
-    if found is None:
+    # other packages are asked only if needed, because looking for them is slow
+    table_format = {form.suffix: form for form in OWN_FORMATS}.get(suffix) or known_formats().get(
+        suffix
+    )
+    if table_format is None:
         raise SettingsError(
             f"{path}: results can be written as {', '.join(known_formats())}, "
             f"not as {path.suffix or 'a file without a suffix'}"
         )
-    return found
+    return table_format
 
 
 def read_rows(path: Path | str, *, whole: bool = False) -> list[dict[str, Any]]:
     """
-    The rows of a table by column; a missing value is None.
+    Read the rows of a table as dicts by column; a missing value is None.
 
-    The content tells the format. A format of another package comes first, unless the suffix is
-    that of an own one.
+    The content decides the format. Formats of other packages are tried first, unless the suffix
+    belongs to a format of this package.
 
     Parameters
     ----------
     path : path
         A file, or ``-`` for standard input.
     whole : bool, optional
-        Refuse a text whose last line has no end, as its last number may have lost digits.
+        Refuse a text without a line end at its end, because its last number may be cut off.
 
     Returns
     -------
     list of dict
-        :func:`scanfab.load` makes a table of them.
+        Rows; :func:`scanfab.load` returns a :class:`scanfab.Table` instead.
 
     Raises
     ------
     ReadError
-        If the file cannot be read as a table; names the line of a text file.
+        If the file cannot be read as a table; the message names the line of a text file.
 
     Examples
     --------
@@ -291,7 +294,7 @@ def read_rows(path: Path | str, *, whole: bool = False) -> list[dict[str, Any]]:
     >>> rows[0]["contacts"]
     2076
     """
-    check_file(Path(path), "a table", "as - in place of its name")
+    check_file(Path(path), "a table", "give - in place of its name")
     try:
         data = sys.stdin.buffer.read() if str(path) == "-" else Path(path).read_bytes()
     except OSError as error:
@@ -299,12 +302,12 @@ def read_rows(path: Path | str, *, whole: bool = False) -> list[dict[str, Any]]:
     suffix = Path(path).suffix.lower()
     if not data and suffix == ".jsonl":
         return []
-    others = () if suffix in [one.suffix for one in OWN_FORMATS] else foreign_formats()
-    found = next(one for one in (*others, *reversed(OWN_FORMATS)) if one.recognises(data))
-    rows = found.read(data, str(path))
-    if whole and found.is_text and not data.endswith(b"\n"):
+    others = () if suffix in [form.suffix for form in OWN_FORMATS] else foreign_formats()
+    table_format = next(form for form in (*others, *reversed(OWN_FORMATS)) if form.recognises(data))
+    rows = table_format.read(data, str(path))
+    if whole and table_format.is_text and not data.endswith(b"\n"):
         raise ReadError(
-            f"{path}: its last line has no end, so it may be cut off: copy it again, or remove it "
-            f"and run its command again"
+            f"{path}: the last line has no line end, so the file may be cut off: copy it again, or "
+            f"remove it and run its command again"
         )
     return rows

@@ -1,8 +1,8 @@
 """
-The installed figures, and those that can be drawn of some data: ``table.plot``.
+Installed figures, and the accessor ``table.plot`` for the figures that suit the data.
 
 A figure is a class that a package registers under the entry point ``scanfab.figures``, so this
-room imports no drawing code; :mod:`scanfab.viz.figures.figure` says how to write one.
+package imports no drawing code. :mod:`scanfab.viz.figures.figure` says how to write a figure.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from scanfab.base.plugins import load_plugins
 
 @cache
 def installed_figures() -> dict[str, Any]:
-    """The classes of all figures by name, those of the package first."""
+    """Classes of all figures by name; the figures of this package come first."""
 
     def checked(plugin: Any) -> Any:
         if not hasattr(plugin, "kind") or not hasattr(plugin, "order"):
@@ -27,21 +27,21 @@ def installed_figures() -> dict[str, Any]:
         return plugin
 
     offers = load_plugins("scanfab.figures", "figure", checked)
-    found = {name: one.plugin for name, one in offers.items()}
-    return dict(sorted(found.items(), key=lambda one: one[1].order))
+    figures = {name: offer.plugin for name, offer in offers.items()}
+    return dict(sorted(figures.items(), key=lambda item: item[1].order))
 
 
 def figures_of(kind: str) -> dict[str, Any]:
-    """The figures of a kind of data: ``table``, ``frames``, ``calibration`` or ``map``."""
-    return {name: one for name, one in installed_figures().items() if one.kind == kind}
+    """Figures for a kind of data: ``table``, ``frames``, ``calibration`` or ``map``."""
+    return {name: figure for name, figure in installed_figures().items() if figure.kind == kind}
 
 
 class Plots:
     """
-    The figures of some data: ``table.plot.evolution(ax=ax)``.
+    The figures that suit the data, as methods: ``table.plot.evolution(ax=ax)``.
 
-    Each takes ``ax``, the Axes to draw on (its own in a new figure by default), and gives it back;
-    given a matplotlib Figure or SubFigure instead, it draws all its panels there.
+    Each method draws on the Axes ``ax`` and returns them; by default it makes a new figure. Given a
+    matplotlib Figure or SubFigure in place of Axes, it draws all its panels there.
 
     Examples
     --------
@@ -68,9 +68,9 @@ class Plots:
             refuse_unknown(f"the figure {name}", given, [option.name for option in options])
             return figure(data, **given).on(ax)
 
-        # a notebook shows the help and the options of the figure
+        # notebooks show the docstring and the signature of the figure
         axes = Parameter("ax", Parameter.POSITIONAL_OR_KEYWORD, default=None)
-        named = [one.replace(kind=Parameter.KEYWORD_ONLY) for one in options]
+        named = [option.replace(kind=Parameter.KEYWORD_ONLY) for option in options]
         plot.__name__, plot.__doc__ = name, figure.__doc__
         plot.__signature__ = Signature([axes, *named])  # type: ignore[attr-defined]
         return plot

@@ -1,4 +1,4 @@
-"""Rows of tables, the numbers in their columns, and how a session shows them."""
+"""Rows of tables, their numbers, and how interactive sessions show them."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from scanfab.base.typing import FloatArray
 
 Rows = Sequence[Mapping[str, Any]]
 
-# the repr of a row: width of a name with its value, and how many of them stand on a line
+# repr of a row: width of a "name=value" cell, and number of cells per line
 WIDTH, PAIRS = 26, 3
-# columns of a fabric table that a session shows, with titles; other tables show their first ones
+# columns of fabric tables that a session shows, with titles; other tables show their first columns
 SHOWN = {
     "source": "source",
     "frame": "frame",
@@ -34,15 +34,15 @@ SHOWN = {
     "alpha_c_axial": "α_c axial",
 }
 ANISOTROPIES = ("alpha_vs_axial", "alpha_c_axial")
-# columns that are left out if all rows have the same value
+# these columns are not shown if all rows have the same value
 OFTEN_SAME = ("source", "strain", "shear_strain", "cutoff")
 MOST_COLUMNS = 8
-# rows that are shown at each end of a long table
+# number of rows shown at each end of a long table
 ENDS = 5
 
 
 class Record(Mapping[str, Any]):
-    """A row whose columns are the fields of a dataclass."""
+    """Base class of dataclasses that are rows: their fields are the columns."""
 
     __slots__ = ()
 
@@ -52,7 +52,7 @@ class Record(Mapping[str, Any]):
         return getattr(self, name)
 
     def __iter__(self) -> Iterator[str]:
-        return (one.name for one in fields(self))  # type: ignore[arg-type]
+        return (field.name for field in fields(self))  # type: ignore[arg-type]
 
     def __len__(self) -> int:
         return len(fields(self))  # type: ignore[arg-type]
@@ -62,18 +62,18 @@ class Row(Mapping[str, Any]):
     """
     One frame and variant of a fabric table: ``row.alpha_vs`` or ``row["alpha_vs"]``.
 
-    None is a value that does not exist. Lengths are in the dump's unit. A row that is computed has
-    all columns (``scanfab.COLUMNS``), one that is read back has those of its file.
+    A missing value is None. Lengths are in the dump's unit. A computed row has all columns
+    (``scanfab.COLUMNS``); a row that is read from a file has the columns of the file.
 
     Parameters
     ----------
     **values
-        By the names of the columns.
+        Values by the names of their columns.
 
     Raises
     ------
     ScanfabError
-        If a column is asked for that does not exist; also a KeyError and an AttributeError.
+        If there is no such column; the error is also a KeyError and an AttributeError.
 
     Examples
     --------
@@ -101,7 +101,7 @@ class Row(Mapping[str, Any]):
             raise NoColumnError(name, tuple(self)) from None
 
     def __getattr__(self, name: str) -> Any:
-        # Python itself looks for names like __deepcopy__
+        # Python itself looks up names such as __deepcopy__
         if name.startswith("_"):
             raise AttributeError(name)
         return self[name]
@@ -116,7 +116,7 @@ class Row(Mapping[str, Any]):
         return [*super().__dir__(), *self]
 
     def __repr__(self) -> str:
-        # the values without each octant serve fits and are of no interest here
+        # the values without each octant are meant for fits, not for readers
         names = [name for name in self if "_without_" not in name and "_half_" not in name]
         spelt = {n: f"{v:.4g}" if isinstance(v := self[n], float) else repr(v) for n in names}
         cells = [f"{n}={text}".ljust(WIDTH) for n, text in spelt.items() if self[n] is not None]
@@ -125,31 +125,31 @@ class Row(Mapping[str, Any]):
 
 
 def is_number(value: object) -> bool:
-    """Whether a value is a finite number; a bool is not, nor an integer larger than any float."""
+    """Whether a value is a finite number; bools and integers beyond all floats are not."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return abs(value) <= sys.float_info.max
 
 
 def number_of(row: Mapping[str, Any], name: str) -> float | None:
-    """A row's number in a column; None if the column is missing or holds something else."""
+    """A row's number in a column; None if the column is missing or holds no number."""
     value = row.get(name)
     return float(value) if is_number(value) else None  # type: ignore[arg-type]
 
 
 def numbers_of(rows: Iterable[Mapping[str, Any]], name: str) -> list[float]:
-    """The numbers in a column, without the rows that have none."""
+    """All numbers in a column; rows without a number are skipped."""
     return [value for row in rows if (value := number_of(row, name)) is not None]
 
 
 def column_of(rows: Iterable[Mapping[str, Any]], name: str) -> FloatArray:
-    """A column as an array, with NaN where a row has no number."""
+    """A column as an array, shape (rows,), with NaN for rows without a number."""
     return np.array([number_of(row, name) for row in rows], np.float64)
 
 
 def variant_of(row: Mapping[str, Any]) -> str:
     """
-    The name of a curve of a source: the variant, and the size of its RV if there are several.
+    The variant of a row, with the size of its RV if there are several.
 
     Examples
     --------
@@ -162,7 +162,7 @@ def variant_of(row: Mapping[str, Any]) -> str:
 
 
 def groups_of(rows: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], list[Any]]:
-    """Rows by source and :func:`variant_of`, in the order in which these first appear."""
+    """Group rows by source and :func:`variant_of`, in the order of their first rows."""
     groups: dict[tuple[str, str], list[Any]] = {}
     for row in rows:
         groups.setdefault((row["source"], variant_of(row)), []).append(row)
@@ -171,15 +171,15 @@ def groups_of(rows: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], list[A
 
 def total_error(row: Mapping[str, Any], name: str) -> float | None:
     """
-    The standard error to quote beside an anisotropy, which combines scan and sample.
+    The standard error to quote for an anisotropy; it combines scan and sample.
 
     Parameters
     ----------
     row : mapping
-        Of a fabric table.
+        Row of a fabric table.
     name : str
-        ``alpha_vs_axial``: √(scan² + sample²), None where either part is not known.
-        ``alpha_c_axial``: the sample's, as contacts are counted, not scanned.
+        ``alpha_vs_axial``: √(scan² + sample²), None if either part is missing.
+        ``alpha_c_axial``: the error due to the sample, as contacts are counted, not scanned.
 
     Examples
     --------
@@ -196,7 +196,7 @@ def total_error(row: Mapping[str, Any], name: str) -> float | None:
 
 
 def as_text(rows: Rows, names: Sequence[str]) -> str:
-    """The number of rows, and the rows at both ends."""
+    """A table as text: the number of rows, and the first and last rows."""
     lines = _lines(rows, names) if rows else []
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     padded = ["  ".join(map(str.rjust, line, widths)) for line in lines]
@@ -204,9 +204,9 @@ def as_text(rows: Rows, names: Sequence[str]) -> str:
 
 
 def as_html(rows: Rows, names: Sequence[str]) -> str:
-    """The same for a notebook."""
+    """A table as HTML for notebooks: the number of rows, and the first and last rows."""
     heads, *lines = [[html.escape(cell) for cell in line] for line in _lines(rows, names)]
-    head = "".join(f"<th>{one}</th>" for one in heads)
+    head = "".join(f"<th>{title}</th>" for title in heads)
     body = "".join(f"<tr><td>{'</td><td>'.join(line)}</td></tr>" for line in lines)
     return (
         f"<table><caption>Table of {counted(len(rows), 'row')}</caption>"
@@ -216,7 +216,7 @@ def as_html(rows: Rows, names: Sequence[str]) -> str:
 
 def with_error(value: float | None, error: float | None) -> str:
     """
-    A value to two digits of its standard error; a dash for none.
+    A value and its standard error, to two digits of the error; a dash for a missing value.
 
     Examples
     --------
@@ -233,12 +233,12 @@ def with_error(value: float | None, error: float | None) -> str:
 
 
 def _lines(rows: Rows, names: Sequence[str]) -> list[list[str]]:
-    """Titles, and the cells of each row; dots for the rows in the middle of a long table."""
+    """Titles, then the cells of each row; dots replace the middle of a long table."""
 
     def cell(row: Mapping[str, Any], name: str) -> str:
         value = row.get(name)
         if name in ANISOTROPIES:
-            # the error of the scan alone would say too little
+            # quote the total error, as the error of the scan alone would be too small
             return with_error(number_of(row, name), total_error(row, name))
         return "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
 

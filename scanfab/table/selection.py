@@ -1,4 +1,4 @@
-"""Choosing the rows of fabric tables to compare or report: one cut-off, each frame once."""
+"""Choose rows of fabric tables to compare or report: one cut-off, and each frame once."""
 
 from __future__ import annotations
 
@@ -18,15 +18,17 @@ Rows = list[dict[str, Any]]
 
 NEEDED = ("source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_c_axial")
 NAMES = ("source", "variant")
-NUMBERS = tuple(one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind in (int, float))
-# columns that only other tables have, and how to call these tables
+NUMBERS = tuple(
+    column.name for column in (*OWN_COLUMNS, *MORE_COLUMNS) if column.kind in (int, float)
+)
+# columns that show that a table is no fabric table, with a name for such a table
 OTHER_TABLES = {
     "alpha_vs_axial_norm": "a table of scanfab compare",
     "slope_origin": "the summary of scanfab compare",
     "difference": "the differences of scanfab compare",
     "at_surface": "a table of scanfab map",
 }
-# cut-offs that agree in three digits, as they are printed, are the same
+# cut-offs that agree in the three digits that are printed count as equal
 ROUNDING = 5e-3
 
 
@@ -36,24 +38,24 @@ def choose_rows(
     labels: Sequence[str] | None = None,
 ) -> list[Rows]:
     """
-    The rows of several fabric tables to compare, for each table in order.
+    Choose the rows of several fabric tables that are to be compared, table by table.
 
-    A row that an earlier table holds too is left out, with a warning.
+    A row that an earlier table also holds is dropped with a warning.
 
     Parameters
     ----------
     tables : iterable of (name, rows)
-        The name, for messages, and the rows by column, as :func:`scanfab.read_rows` returns them.
+        The name of each table for messages, and its rows as :func:`scanfab.read_rows` returns them.
     cutoff : float, optional
-        Keep the rows of this cut-off, in the unit of the tables, to three digits.
+        Keep only rows with this cut-off, in the unit of the tables, to three digits.
     labels : sequence of str, optional
-        A name for each table in place of its source, to compare two runs of one sample.
+        A name for each table in place of its source, to compare two runs of the same sample.
 
     Raises
     ------
     SettingsError
-        If a table is not one of compute, a value is of another kind, no row has the cut-off, or
-        there are not as many labels as tables.
+        If a table is no fabric table, a value has the wrong kind, no row has the cut-off, or the
+        number of labels is not that of the tables.
 
     Examples
     --------
@@ -68,13 +70,13 @@ def choose_rows(
     named = [(str(name), [dict(row) for row in rows]) for name, rows in tables]
     if labels and len(labels) != len(named):
         raise SettingsError(
-            f"labels: expected one for each table, in their order: found {len(labels)} for "
+            f"labels: expected one name for each table, in the same order: found {len(labels)} for "
             f"{len(named)}"
         )
     for number, (name, rows) in enumerate(named):
         for row in rows:
             if row.get("source", "") is None:
-                row["source"] = ""  # the source of a packing without a name, which CSV leaves empty
+                row["source"] = ""  # CSV has an empty cell for a packing without a name
         check_rows(rows, name)
         if cutoff is not None:
             named[number] = name, _of_cutoff(name, rows, cutoff)
@@ -89,9 +91,9 @@ def choose_rows(
 
 def check_rows(rows: Sequence[Mapping[str, Any]], table: str = "") -> None:
     """
-    SettingsError if rows are not those of a fabric table; it names table, row and column.
+    Raise SettingsError if rows are not from a fabric table; it names table, row and column.
 
-    Other programs write tables too, so a word or a list may stand where a number should be.
+    Other programs also write tables, so a word or a list may be found in place of a number.
     """
     before = f"{table}: " if table else ""
     for number, row in enumerate(rows, start=1):
@@ -115,13 +117,13 @@ def check_rows(rows: Sequence[Mapping[str, Any]], table: str = "") -> None:
 
 
 def _of_cutoff(name: str, rows: Rows, cutoff: float) -> Rows:
-    """The rows of one cut-off; frames without grains have no cut-off and keep a row a variant."""
-    known = sorted({row["cutoff"] for row in rows if row.get("cutoff") is not None})
-    nearest = min(known, key=lambda one: abs(one - cutoff), default=math.nan)
+    """Rows with one cut-off; a frame without grains has none and keeps one row per variant."""
+    cutoffs = sorted({row["cutoff"] for row in rows if row.get("cutoff") is not None})
+    nearest = min(cutoffs, key=lambda value: abs(value - cutoff), default=math.nan)
     if not abs(nearest - cutoff) <= ROUNDING * abs(nearest):
-        there = ", ".join(f"{one:.3g}" for one in known) or "none in this table"
+        listed = ", ".join(f"{value:.3g}" for value in cutoffs) or "none in this table"
         raise SettingsError(
-            f"{name}: no row has the cut-off {cutoff:g}: expected one of the table's: {there}"
+            f"{name}: no row has the cut-off {cutoff:g}: expected a cut-off of the table: {listed}"
         )
     kept: dict[tuple[Any, ...], dict[str, Any]] = {}
     for place, row in enumerate(rows):
@@ -133,8 +135,8 @@ def _of_cutoff(name: str, rows: Rows, cutoff: float) -> Rows:
 
 
 def _each_once(tables: Sequence[tuple[str, Rows]]) -> list[Rows]:
-    """Leaves out rows that an earlier table holds, however the path of their source is spelt."""
-    known: dict[tuple[Any, ...], tuple[str, dict[str, Any]]] = {}
+    """Drop rows that an earlier table also holds, even if it spells the source's path otherwise."""
+    seen: dict[tuple[Any, ...], tuple[str, dict[str, Any]]] = {}
     chosen: list[Rows] = []
     for name, rows in tables:
         chosen.append([])
@@ -142,9 +144,9 @@ def _each_once(tables: Sequence[tuple[str, Rows]]) -> list[Rows]:
             source = row["source"]
             place = os.path.abspath(source) if source not in ("", "-") else source
             key = (place, row["frame"], variant_of(row), row.get("cutoff"))
-            earlier, twin = known.setdefault(key, (name, row))
+            earlier, twin = seen.setdefault(key, (name, row))
             if twin is row or {**twin, "source": source} != row:
                 chosen[-1].append(row)
             else:
-                warn(f"{name}: rows of {source} that {earlier} holds already count once")
+                warn(f"{name}: rows of {source} that {earlier} also holds are used once")
     return chosen

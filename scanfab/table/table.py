@@ -1,4 +1,4 @@
-"""Tables: computed, read back from a file, or made by a comparison."""
+"""Tables: computed, read from a file, or made by a comparison."""
 
 from __future__ import annotations
 
@@ -29,22 +29,23 @@ if TYPE_CHECKING:
 
 def load(path: Path | str) -> Table:
     """
-    Read a table that was saved, by :meth:`Table.save` or by ``scanfab compute -o``.
+    Read a table that :meth:`Table.save` or ``scanfab compute -o`` has written.
 
     Parameters
     ----------
     path : path
-        CSV, TSV, JSON, JSON lines, Parquet, or a format of another package; told apart by content.
+        File in CSV, TSV, JSON, JSON lines, Parquet or a format of another package; the content
+        decides the format.
 
     Returns
     -------
     Table
-        With the columns that the file has; a missing value is None.
+        The table with the columns of the file; a missing value is None.
 
     Raises
     ------
     ReadError
-        If the file cannot be read as a table; names the line of a text file.
+        If the file cannot be read as a table; the message names the line of a text file.
 
     Examples
     --------
@@ -69,7 +70,8 @@ class Table(Sequence[Row]):
     rows : iterable of mapping
         Values by column; missing values are None.
     columns : sequence of Column, optional
-        Their declarations; by default those of fabric tables, or kinds that follow from the values.
+        Declarations of the columns. By default columns are declared as in fabric tables, and the
+        kind of any other column follows from its values.
 
     Examples
     --------
@@ -84,17 +86,17 @@ class Table(Sequence[Row]):
     """
 
     columns: tuple[Column, ...]
-    """The declarations of the columns."""
+    """Declarations of the columns."""
 
     def __init__(
         self, rows: Iterable[Mapping[str, Any]] = (), columns: Sequence[Column] | None = None
     ) -> None:
         given = list(rows)
-        found = [{name: plain(value) for name, value in row.items()} for row in given]
+        values = [{name: plain(value) for name, value in row.items()} for row in given]
         if columns is None and given and is_dataclass(given[0]):
             columns = columns_of_fields(type(given[0]))
-        self.columns = _columns(found) if columns is None else tuple(columns)
-        self._frame = data_frame(found, self.columns)
+        self.columns = _columns(values) if columns is None else tuple(columns)
+        self._frame = data_frame(values, self.columns)
 
     def __len__(self) -> int:
         return self._frame.height
@@ -129,22 +131,22 @@ class Table(Sequence[Row]):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of the columns."""
+        """Names of the columns."""
         return tuple(column.name for column in self.columns)
 
     @property
     def plot(self) -> Plots:
-        """The installed figures; ``table.plot.evolution(ax=ax)`` draws one on given Axes."""
+        """Figures of the table: ``table.plot.evolution(ax=ax)`` draws one on given Axes."""
         return Plots(self, "map" if "block" in self.names else "table")
 
     def select(self, **wanted: Any) -> Table:
         """
-        The rows whose columns have the given values.
+        Select the rows whose columns have the given values.
 
         Parameters
         ----------
         **wanted
-            For instance ``variant="a"``.
+            Values by column, for instance ``variant="a"``.
 
         Returns
         -------
@@ -153,7 +155,7 @@ class Table(Sequence[Row]):
         Raises
         ------
         ScanfabError
-            If there is no such column; names the nearest.
+            If there is no such column; the message suggests the most similar name.
 
         Examples
         --------
@@ -167,7 +169,7 @@ class Table(Sequence[Row]):
 
     def tensor(self, name: str) -> FloatArray:
         """
-        A fabric tensor of all rows.
+        The fabric tensors of all rows.
 
         Parameters
         ----------
@@ -177,12 +179,12 @@ class Table(Sequence[Row]):
         Returns
         -------
         ndarray, shape (rows, 3, 3)
-            Dimensionless, trace 1; NaN where a row has none.
+            Dimensionless tensors of trace 1; NaN for rows without a tensor.
 
         Raises
         ------
         ScanfabError
-            If the table has no such columns.
+            If the table lacks the columns of the tensor.
 
         Examples
         --------
@@ -191,14 +193,14 @@ class Table(Sequence[Row]):
         >>> Table([row]).tensor("gc")[0, 2, 1]
         np.float64(0.1)
         """
-        found = np.empty((len(self), 3, 3))
+        tensors = np.empty((len(self), 3, 3))
         for component, (i, j) in COMPONENTS.items():
-            found[:, i, j] = found[:, j, i] = self[f"{name}_{component}"]
-        return found
+            tensors[:, i, j] = tensors[:, j, i] = self[f"{name}_{component}"]
+        return tensors
 
     def compare(self, *, strain_max: float | None = None) -> Comparison:
         """
-        Void against contact fabric, and variants side by side: :func:`scanfab.compare_tables`.
+        Compare void with contact fabric, and variants: see :func:`scanfab.compare_tables`.
 
         Parameters
         ----------
@@ -208,12 +210,12 @@ class Table(Sequence[Row]):
         Returns
         -------
         Comparison
-            ``.slope`` and its error for each source and variant, and all rows.
+            Slopes with errors for each source and variant, and tables of all compared rows.
 
         Raises
         ------
         SettingsError
-            If the table lacks a column, or has several rows of one frame and variant.
+            If the table lacks a column, or has several rows for the same frame and variant.
         """
         from scanfab.table.compare import compare_tables
 
@@ -227,23 +229,24 @@ class Table(Sequence[Row]):
         digits: int = DEFAULT_DIGITS,
     ) -> None:
         """
-        Write the table; of a computed one the bytes are those of ``scanfab compute -o``.
+        Write the table to a file; a computed table has the bytes of ``scanfab compute -o``.
 
         Parameters
         ----------
         path : path
-            ``.csv``, ``.tsv``, ``.json``, ``.jsonl``, ``.parquet``, or a format of another
-            package. A file that is there is replaced, all at once. What is not finite is
-            written as a missing value.
+            File with the suffix ``.csv``, ``.tsv``, ``.json``, ``.jsonl``, ``.parquet`` or of a
+            format of another package. An existing file is replaced when the new one is complete.
+            NaN and infinite numbers are written as missing values.
         fields : str or sequence of str, optional
-            Names of columns, one by one or separated by commas, in the order to write them in.
+            Names of the columns to write, in this order: a sequence, or a text with commas.
         digits : int, optional
-            Significant digits of floats; with 17 they read back the same.
+            Significant digits of floats; with 17, the shortest text that reads back to the same
+            number.
 
         Raises
         ------
         SettingsError
-            If the suffix, a column or the folder does not exist.
+            If no format has the suffix, or a column or the folder does not exist.
 
         Examples
         --------
@@ -258,12 +261,12 @@ class Table(Sequence[Row]):
 
     def to_pandas(self) -> pandas.DataFrame:
         """
-        The table as a data frame of pandas.
+        Convert the table to a pandas data frame.
 
         Returns
         -------
         pandas.DataFrame
-            Missing numbers are NaN.
+            The table; missing numbers are NaN.
 
         Raises
         ------
@@ -278,12 +281,12 @@ class Table(Sequence[Row]):
 
     def to_polars(self) -> polars.DataFrame:
         """
-        The table as a data frame of polars.
+        Convert the table to a polars data frame.
 
         Returns
         -------
         polars.DataFrame
-            Missing values are null.
+            The table; missing values are null.
 
         Examples
         --------
@@ -301,7 +304,7 @@ class Table(Sequence[Row]):
 
 
 def _columns(rows: Sequence[Mapping[str, Any]]) -> tuple[Column, ...]:
-    """The columns of rows, as fabric tables declare them, or else by their values."""
+    """The columns of rows: declared as in fabric tables, others by the kinds of their values."""
     if not rows:
         return table_columns()
     columns = {column.name: column for column in (*table_columns(), *MORE_COLUMNS)}

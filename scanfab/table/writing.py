@@ -1,4 +1,4 @@
-"""Writing rows to a stream or a file, with chosen columns and digits."""
+"""Write rows to a stream or a file, with chosen columns and digits."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Excerpt:
     """Which columns of a table are written, and with how many digits."""
 
     fields: tuple[str, ...] = ()
-    """Names of columns in the order in which they are written; if empty, all of the table."""
+    """Names of the columns in the order of the file; empty for all columns of the table."""
     digits: int = DEFAULT_DIGITS
-    """Significant digits of floats; with 17 the shortest text that reads back the same."""
+    """Significant digits of floats; 17: the shortest text that reads back to the same number."""
 
     @classmethod
     def make(
@@ -34,14 +34,14 @@ class Excerpt:
         digits: int = DEFAULT_DIGITS,
     ) -> Excerpt:
         """
-        An excerpt by the options of users.
+        Make an excerpt from the options of users.
 
-        ``fields`` are names out of ``columns``, as a sequence or as a text with commas.
+        ``fields`` are names of ``columns``: a sequence, or a text with commas.
 
         Raises
         ------
         SettingsError
-            If there is no such column, or no such number of digits.
+            If a column does not exist, or the number of digits is not from 1 to 17.
 
         Examples
         --------
@@ -50,7 +50,7 @@ class Excerpt:
         >>> Excerpt.make(table_columns(), "strain,alpha_vs_axial").fields
         ('strain', 'alpha_vs_axial')
         """
-        expected = f"1 to {DEFAULT_DIGITS} of them"
+        expected = f"a number from 1 to {DEFAULT_DIGITS}"
         digits = int(whole(expected, lambda count: 1 <= count <= DEFAULT_DIGITS)("digits", digits))
         if fields is None:
             return cls(digits=digits)
@@ -63,36 +63,36 @@ class Excerpt:
             if name not in known:
                 raise SettingsError(f"fields: {no_column(name, known)}")
             if names.count(name) > 1:
-                raise SettingsError(f"fields: the column {name} is named more than once")
+                raise SettingsError(f"fields: the column {name} is listed more than once")
         return cls(names, digits)
 
     def columns(self, columns: Sequence[Column]) -> list[Column]:
-        """The columns that are written, in their order."""
+        """The columns to write, in the order of the file."""
         by_name = {column.name: column for column in columns}
         return [by_name[name] for name in self.fields or by_name]
 
     def of(self, row: Mapping[str, Any]) -> dict[str, Any]:
-        """The values of a row that are written, by column."""
+        """The values of a row to write, by column."""
         values = {name: plain(row[name]) for name in self.fields or row}
         for name, value in values.items():
             if isinstance(value, float):
                 rounded = float(f"{value:.{self.digits}g}")
-                # the largest of all floats would be rounded to infinity
+                # rounding must not turn the largest floats into infinity
                 values[name] = rounded if math.isfinite(rounded) else value
         return values
 
     def asked(self) -> dict[str, Any]:
-        """The options that differ from their defaults, for the manifest."""
-        asked: dict[str, Any] = {"fields": list(self.fields)} if self.fields else {}
-        return asked if self.digits == DEFAULT_DIGITS else {**asked, "digits": self.digits}
+        """Options that differ from their defaults, for the manifest."""
+        options: dict[str, Any] = {"fields": list(self.fields)} if self.fields else {}
+        return options if self.digits == DEFAULT_DIGITS else {**options, "digits": self.digits}
 
 
 def plain(value: Any) -> Any:
-    """A value as all formats can write it: numpy's as Python's, and None if it is not finite."""
+    """A value that all formats can write: numpy becomes Python, NaN and infinity become None."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     if isinstance(value, list | tuple):
-        return [plain(one) for one in value]
+        return [plain(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -107,23 +107,25 @@ def write_to(
     excerpt: Excerpt = ALL,
 ) -> None:
     """
-    Write rows to a stream, which is of text or of bytes, as the format has it.
+    Write rows to a stream of text or bytes, whichever the format needs.
 
-    A format whose cells hold one value leaves out the columns of lists; SettingsError if all that
-    is asked for are lists.
+    Columns of lists are left out if the cells of the format cannot hold lists. If no column
+    remains, SettingsError is raised.
     """
-    asked = excerpt.columns(columns)
+    chosen = excerpt.columns(columns)
     if not getattr(table_format, "holds_lists", False):
-        kept = [one for one in asked if one.kind is not list]
-        if asked and not kept:
-            lists = ", ".join(one.name for one in asked)
-            raise SettingsError(f"fields: {lists} are lists of numbers: write .json or .jsonl")
-        asked, excerpt = kept, replace(excerpt, fields=tuple(one.name for one in kept))
-    table_format.write(stream, map(excerpt.of, rows), asked)
+        kept = [column for column in chosen if column.kind is not list]
+        if chosen and not kept:
+            lists = ", ".join(column.name for column in chosen)
+            raise SettingsError(
+                f"fields: only .json and .jsonl files can hold lists of numbers: {lists}"
+            )
+        chosen, excerpt = kept, replace(excerpt, fields=tuple(column.name for column in kept))
+    table_format.write(stream, map(excerpt.of, rows), chosen)
 
 
 def check_output(path: Path) -> None:
-    """SettingsError if no table can be written to a file of this name."""
+    """Raise SettingsError if no table can be written to a file of this name."""
     format_of(path)
     check_folder(path)
 
@@ -136,10 +138,11 @@ def write_rows(
     write_manifest: Callable[[], object] | None = None,
 ) -> None:
     """
-    Write a table to a file, which is complete or untouched.
+    Write a table to a file; on an error the file stays as it was.
 
-    A manifest is written when the table is complete, just before the file appears, so that a table
-    with a manifest is always finished. Without a manifest, that of an earlier table is removed.
+    The manifest is written when the table is complete, just before the file appears, so a table
+    with a manifest is always complete. Without ``write_manifest``, the manifest of an earlier table
+    is removed.
     """
     check_output(path)
     table_format = format_of(path)
@@ -155,5 +158,5 @@ def write_rows(
 
 
 def manifest_of(table: Path) -> Path:
-    """Where the manifest of a table is, if it has one."""
+    """Path of the manifest of a table."""
     return table.with_name(f"{table.name}.manifest.json")

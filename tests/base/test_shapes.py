@@ -75,5 +75,5 @@ def test_what_is_no_convex_surface_is_refused_in_words(surface, words):
 def test_a_surface_of_very_many_faces_is_refused():
     points = RANDOM.normal(size=(600, 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
-    with pytest.raises(SettingsError, match="has 1196 faces, more than 1000"):
+    with pytest.raises(SettingsError, match="has 1196 faces, expected at most 1000"):
         hull_of(points)

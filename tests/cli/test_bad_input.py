@@ -161,7 +161,9 @@ def test_one_grain_far_away_is_too_far_for_the_whole_alone(tmp_path, refusal, co
 def test_an_rv_at_the_surface_is_a_warning(tmp_path, compute):
     file = grains(tmp_path, cubic_rows(8))
     told = [compute(file, "--rv", rv).err for rv in ("0.9", "0.7")]
-    assert ["comes within one of the largest radii" in one for one in told] == [True, False]
+    assert [
+        "comes closer to the sample's surface than the largest radius" in one for one in told
+    ] == [True, False]
 
 
 def test_a_boundary_that_is_everything(tmp_path, compute):

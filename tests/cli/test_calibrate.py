@@ -82,8 +82,8 @@ def test_with_a_file_the_words_are_the_output(calibrate, tmp_path, word):
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
-        (cubic_rows()[:1], "leaves a void fabric in variant c"),
-        ([], "no frame has any grains: there is nothing to calibrate"),
+        (cubic_rows()[:1], "variant c has no void fabric at any cut-off"),
+        ([], "no frame has grains, so there is nothing to calibrate"),
     ],
 )
 def test_a_dump_of_one_grain_or_none_is_one_message(calibrate, tmp_path, rows, message):

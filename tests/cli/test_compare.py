@@ -68,7 +68,7 @@ def test_several_tables_stand_side_by_side_under_their_labels(compare, table):
     tables = [table(curve(name), f"{name}.jsonl") for name in ("one", "two")]
     assert [row["source"] for row in compare(*tables, "--summary").rows] == ["one", "two"]
     given = [table(curve(factor=k), f"{k}.jsonl") for k in (1.0, 2.0)]
-    assert "by --label NAME" in compare(*given, code=1).err
+    assert "with --label NAME" in compare(*given, code=1).err
     rows = compare(*given, "--summary", "--label", "coarse", "--label", "fine").rows
     assert [row["source"] for row in rows] == ["coarse", "fine"]
     assert "expected one per table: 2, found 1" in compare(*given, "--label", "coarse", code=2).err
@@ -78,7 +78,8 @@ def test_the_rows_of_one_cutoff_are_chosen(compare, table):
     given = table([{**row, "cutoff": c} for row in curve() for c in (0.0, 0.5, 1.0)])
     assert "choose one cut-off with --cutoff" in compare(given, code=1).err
     assert len(compare(given, "--cutoff", "0.5").rows) == 5
-    assert "expected one of the table's: 0, 0.5, 1" in compare(given, "--cutoff", "0.7", code=1).err
+    told = compare(given, "--cutoff", "0.7", code=1).err
+    assert "expected a cut-off of the table: 0, 0.5, 1" in told
 
 
 def test_a_dash_is_standard_input(compare, table, monkeypatch):
@@ -87,7 +88,7 @@ def test_a_dash_is_standard_input(compare, table, monkeypatch):
     assert len(compare("-").rows) == 5
     # what a command that failed before it leaves
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO()))
-    assert compare("-", code=1).err == "scanfab: error: -: expected a table, found nothing\n"
+    assert compare("-", code=1).err == "scanfab: error: -: expected a table, found an empty file\n"
 
 
 def test_tables_without_a_void_fabric_are_exit_code_1(compare, table):

@@ -110,7 +110,7 @@ def test_a_comparison_shows_total_errors_and_curves_where_there_is_room(lines):
     assert "█" in "".join(wide)
 
 
-@pytest.mark.filterwarnings("ignore:shear_strain stands")
+@pytest.mark.filterwarnings("ignore:shear_strain is used in place")
 def test_a_sheared_cell_has_its_shear(lines):
     assert any(
         "shear strain" in one for one in lines(80, print_comparison, compare_tables(sheared()))

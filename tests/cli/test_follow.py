@@ -163,7 +163,10 @@ def test_a_broken_file_stops_it_or_is_skipped_and_a_last_one_left_out(folder, fi
     shutil.copy(files[0], folder)
     broken.write_bytes(half)
     assert follow(seconds=1.5) == 0
-    assert f"warning: dumps/{broken.name}: left out, because it was incomplete" in capsys.readouterr().err
+    assert (
+        f"warning: dumps/{broken.name}: left out, because it was incomplete"
+        in capsys.readouterr().err
+    )
     broken.unlink()
     assert Path("t.csv").read_bytes() == finished_run()
     for path in files[2:]:

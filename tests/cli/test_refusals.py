@@ -52,7 +52,7 @@ def folder(tmp_path, monkeypatch):
         ("compute cube --rv-shape none.stl", 2, "surface that exists (.stl .vtp .ply .obj)"),
         ("compute cube --rv-follows sand", 2, "--rv-follows: expected none or strain"),
         ("compute cube --rv-shape box --rv-size 1,2", 2, "--rv-size: expected A,B,C, full edges"),
-        ("compute cube --rv-size 1,2,3", 2, "takes none: choose --rv-radius"),
+        ("compute cube --rv-size 1,2,3", 2, "takes no sizes: choose --rv-radius"),
         ("compute cube --rv-shape box --rv-radius 2", 2, "--rv-radius: has no meaning if"),
         ("compute cube --rv-axis x", 2, "leave out --rv-axis, or choose --rv-shape cylinder"),
         ("map cube --slices two", 2, "two"),
@@ -86,7 +86,7 @@ def folder(tmp_path, monkeypatch):
         ("view cube --screenshot x.jpg", 2, "screenshots are PNG files"),
         ("view cube --screenshot nowhere/x.png", 2, "there is no folder"),
         # what does not fit the sample
-        ("compute cube --max-chords 5", 1, "max-chords: 5 chords are fewer than"),
+        ("compute cube --max-chords 5", 1, "max-chords: expected at least"),
         ("compute cube --spacing 50 -o out.csv", 1, "spacing: expected a length from"),
         ("compute cube --spacing 1e-6 --directions 20", 1, "choose a wider spacing"),
         ("compute cube --boundary mask=3", 1, "--boundary: there is no column 'mask'; the columns"),
@@ -97,15 +97,15 @@ def folder(tmp_path, monkeypatch):
         ("map cube --slices 2 --variants c --rv 1e-3", 1, "holds no grain"),
         ("calibrate {TRIAXIAL} --frame 7 --boundary mask=3", 1, "the series has no frame in 7:8"),
         ("calibrate {TRIAXIAL} --rv 3 --boundary mask=3", 1, "beyond the sample"),
-        ("calibrate {TRIAXIAL} --rv 0.5,0.6", 1, "nor several rv"),
+        ("calibrate {TRIAXIAL} --rv 0.5,0.6", 1, "all but one --rv"),
         ("calibrate {TRIAXIAL} --boundary mask=5", 1, "no particle of any frame has mask=5"),
         ("view cube --screenshot x.png --frame 9", 1, "there is no frame 9"),
         ("view cube --screenshot x.png --frame -5", 1, "there is no frame -5"),
         # what is of space, of discs
         ("compute {DISCS} --axis 0,1,1", 2, "--axis: the axis (0, 0.7071, 0.7071) leads out of"),
-        ("compute {DISCS} --directions lebedev:11", 2, "lebedev:11 is a rule of three dimensions"),
+        ("compute {DISCS} --directions lebedev:11", 2, "lebedev:11 is a rule for three dimensions"),
         ("compute {DISCS} --rv-center 7 7 3", 1, "--rv-center: lies outside the plane x-y"),
-        ("map {DISCS} --grid 2,2,1", 1, "spheres in space, but all grains are discs"),
+        ("map {DISCS} --grid 2,2,1", 1, "needs spheres, but all grains are discs"),
     ],
 )
 def test_one_message_and_nothing_else(folder, ask, line, code, message):

@@ -50,7 +50,7 @@ def folder(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
-        ("compute pipe", 1, "pipe: is a pipe, expected a file: what a program writes is read from"),
+        ("compute pipe", 1, "pipe: is a pipe, expected a file: to read what a program writes from"),
         ("inspect pipe", 1, "is a pipe, expected a file"),
         ("calibrate pipe", 1, "is a pipe, expected a file"),
         ("view pipe --screenshot x.png", 1, "is a pipe, expected a file"),
@@ -59,7 +59,7 @@ def folder(tmp_path, monkeypatch):
         ("compute dump.txt --strain pipe", 2, "or a CSV file that exists"),
         ("compute /dev/zero", 1, "error: /dev/zero: is a device, expected a file"),
         ("compute socket", 1, "error: socket: is a socket, expected a file"),
-        ("compare pipe", 1, "pipe: is a pipe, expected a table: what a program writes"),
+        ("compare pipe", 1, "pipe: is a pipe, expected a table: to read what a program writes"),
         ("report pipe -o report.html", 1, "pipe: is a pipe, expected a table"),
         ("compare /dev/zero", 1, "/dev/zero: is a device, expected a table"),
     ],
@@ -91,4 +91,4 @@ def test_what_a_shell_pipes_in_is_compared_but_no_source(folder, ask):
     refused = bash('"$@" compute <(cat dump.txt)')
     assert refused.returncode == 1
     assert "is a pipe, expected a file" in refused.stderr
-    assert "by - in place of its name and --format NAME" in refused.stderr
+    assert "give - in place of its name, and --format NAME" in refused.stderr

@@ -78,8 +78,8 @@ def computed():
 
 
 BROKEN = [
-    (Foreign(name="alpha_vs"), "there is a column 'alpha_vs' already"),
-    (Foreign(name="strain"), "there is a column 'strain' already"),
+    (Foreign(name="alpha_vs"), "there is already a column 'alpha_vs'"),
+    (Foreign(name="strain"), "there is already a column 'strain'"),
     (3, "found 3, whose columns is None"),
     (Foreign, "found the class Foreign itself"),
     (Foreign(kind=list), "columns that hold int, float or str"),
@@ -98,7 +98,7 @@ def test_a_broken_one_is_left_out_with_a_warning(offered, plugin, told):
 def test_of_two_with_one_column_the_second_is_left_out(offered):
     offered("one", Foreign())
     offered("two", Foreign())
-    with pytest.warns(ScanfabWarning, match="'two' of made-up .*a column 'foreign' already"):
+    with pytest.warns(ScanfabWarning, match="'two' of made-up .*already a column 'foreign'"):
         assert [one.name for one in columns.table_columns()].count("foreign") == 1
 
 

@@ -107,9 +107,13 @@ def test_a_doubtful_step_is_not_steady(doubt):
     [
         ({"frame": 1}, SettingsError, "frames: the series has no frame in 1:"),
         ({"frame": -2}, SettingsError, "frames: the series has no frame in -2:"),
-        ({"moment": 2}, SettingsError, "neither cutoffs, moment nor several rv"),
-        ({"cutoffs": "0.1,0.2"}, SettingsError, "neither cutoffs, moment nor several rv"),
-        ({"rv": (0.5, 0.6)}, SettingsError, "neither cutoffs, moment nor several rv"),
+        ({"moment": 2}, SettingsError, "leave out `cutoffs`, `moment` and all but one `rv`"),
+        (
+            {"cutoffs": "0.1,0.2"},
+            SettingsError,
+            "leave out `cutoffs`, `moment` and all but one `rv`",
+        ),
+        ({"rv": (0.5, 0.6)}, SettingsError, "leave out `cutoffs`, `moment` and all but one `rv`"),
         ({"tolerence": 0.02}, TypeError, "calibrate has no option 'tolerence': .*'tolerance'"),
     ],
 )
@@ -127,20 +131,20 @@ def test_the_sentences_say_what_the_rows_show(found):
         steady = [v for v in steps if all(row.steady for row in rows if row.value == v)]
         # the last one has nothing to agree with
         is_known = steady[0] != [*steps][-1]
-        from_there = f"from {steady[0]:g} on nothing changes within the errors"
+        from_there = f"from {steady[0]:g} on, nothing changes within the errors"
         said.append(f"{name}: {from_there if is_known else 'no step agrees with all later ones'}")
     alpha = {row.value: row.alpha_vs_axial for row in ladder(found, "cutoff") if row.alpha_vs_axial}
     best = max(alpha, key=lambda value: abs(alpha[value]))
     said.insert(
         2,
-        f"cut-off: it decides what is measured; in c the anisotropy is largest ("
+        f"cut-off: it decides what is measured; in variant c the anisotropy is largest ("
         f"{alpha[best]:.2g}) at {best:g} r_min; at the paper's 1 r_min it is "
         f"{alpha[1.0] / alpha[best]:.0%} of that",
     )
     papers = [" (the paper: 0.1)", "", "", " (the paper: 0.67 to 0.7)"]
     expected = [one + paper for one, paper in zip(said, papers, strict=True)]
     assert list(found.findings[:-1]) == expected
-    assert found.findings[-1].startswith("recommended: scan's error ")
+    assert found.findings[-1].startswith("recommended: error of the scan ")
 
 
 def test_steps_beyond_the_budget_are_left_out_with_a_word(packing):
@@ -149,7 +153,7 @@ def test_steps_beyond_the_budget_are_left_out_with_a_word(packing):
     with pytest.warns(ScanfabWarning) as told:
         few = calibrate(packing, **options)
     assert [row.value for row in ladder(few, "spacing")] == [4, 2, 1, 0.5, 0.2]
-    assert any("spacing 0.1 left out: it would cut" in str(one.message) for one in told)
+    assert any("spacing 0.1 is skipped: it would cut" in str(one.message) for one in told)
 
 
 def test_one_ladder_is_drawn_on_the_axes_that_it_gets(found):

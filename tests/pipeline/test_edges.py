@@ -60,7 +60,7 @@ def test_second_moment_is_that_of_full_lengths_or_refused(ball):
         for moment in (1, 2)
     )
     assert second.mean_length > first.mean_length
-    told = "moment: `edge=ends` counts only what lies inside the window"
+    told = "moment: `edge=ends` counts only the parts inside the window"
     with pytest.raises(SettingsError, match=told):
         scanfab.Settings(edge="ends", moment=2)
 
@@ -73,6 +73,6 @@ def test_an_rv_from_which_segments_leave_the_sample_is_told(ball):
 
 def test_a_whole_without_an_ellipsoid_has_no_void_fabric():
     packing = Packing([[0.0, 0, 0], [1.1, 0, 0], [0, 1.1, 0]], 0.5)
-    with pytest.warns(ScanfabWarning, match="flat or too small: by the rule `edge=ends`"):
+    with pytest.warns(ScanfabWarning, match="flat or too small for `edge=ends`"):
         table = compute(packing, variants="a", edge="ends", **OPTIONS)
     assert table[0].mean_length is None

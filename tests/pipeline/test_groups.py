@@ -61,7 +61,7 @@ def test_without_forces_their_columns_are_an_error_and_stress_is_empty_with_one_
     ("force", "told", "empty"),
     [
         (lambda one: {"force_n": one.force_n}, "normal part of", ("ft", "stress")),
-        (lambda one: {"force": -one.force}, "the contacts pull in the mean", ("fn", "ft")),
+        (lambda one: {"force": -one.force}, "the mean normal force is tension", ("fn", "ft")),
     ],
 )
 def test_forces_that_do_not_suffice_leave_columns_empty(yade, force, told, empty):
@@ -111,7 +111,7 @@ def test_strain_and_directions_of_a_series():
 
 def test_an_open_whole_has_no_volume_and_says_so():
     series = scanfab.read_series(TRIAXIAL)[:1]
-    with pytest.warns(scanfab.ScanfabWarning, match="they need a volume"):
+    with pytest.warns(scanfab.ScanfabWarning, match="they need the volume of an RV"):
         a, c = scanfab.compute(series, with_="state", variants="ac", boundary="mask=3", **FAST)
     assert a.void_ratio is None
     assert a.stress_zz is None

@@ -151,7 +151,7 @@ def test_a_frame_of_discs_among_spheres_is_refused():
     frames = [Packing(random.uniform(0, 10, (200, k)), 0.3) for k in (3, 2)]
     with pytest.raises(scanfab.PackingError, match="frame 1: all its centres lie in the plane x-y"):
         mapped(frames, slices=2)
-    with pytest.raises(SettingsError, match="all grains are discs in the plane x-y: `compute`"):
+    with pytest.raises(SettingsError, match="all grains are discs in the plane x-y: use `compute`"):
         fabric_map(frames[1], grid=(2, 2, 1))
 
 
@@ -210,9 +210,9 @@ def test_frames_without_grains_have_empty_rows():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({}, "just one of `grid`, `slices` and `shells`, found none"),
+        ({}, "exactly one of `grid`, `slices` and `shells`, found none"),
         ({"shells": 2.5}, "shells: expected 1 or more"),
-        ({"slices": 2, "cutoffs": "0,1"}, "cutoffs: a map is of one cut-off"),
+        ({"slices": 2, "cutoffs": "0,1"}, "cutoffs: a map has one cut-off"),
         ({"slices": 2, "rv": "0.4,0.6"}, "rv: expected one size, .* found 2"),
         ({"slices": 2, "with_": "state"}, "with_: a map has no further columns, found state"),
     ],

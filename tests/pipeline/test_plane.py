@@ -96,9 +96,12 @@ def test_the_period_across_the_plane_is_ignored(discs):
     [
         ({"axis": "z"}, "axis: the axis z leads out of the plane x-y.*choose x, y"),
         ({"axis": (1, 0, 1)}, "axis: .* leads out"),
-        ({"rv_shape": "cylinder"}, "rv_shape: cylinder is no window of discs"),
+        ({"rv_shape": "cylinder"}, "rv_shape: cylinder is no window for discs"),
         ({"rv_shape": "box", "rv_size": "1,2,3"}, "rv_size: expected two, A,B, full edges"),
-        ({"directions": "lebedev:11"}, "directions: lebedev:11 is a rule of three dim.*such as 16"),
+        (
+            {"directions": "lebedev:11"},
+            "directions: lebedev:11 is a rule for three dim.*such as 16",
+        ),
         ({"rv_center": (7, 7, 3)}, "rv_center: lies outside the plane x-y.*z = 0, found 3"),
         ({"rv_center": (70, 7, 0)}, "holds no grain"),
     ],

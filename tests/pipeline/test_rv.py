@@ -129,7 +129,11 @@ def test_a_window_across_periodic_faces_is_that_of_the_repeated_packing(tilted, 
     assert np.array_equal(window.may_meet(packing.position, packing.radius, packing), meets)
 
 
-BEYOND, NOTHING, IMAGE = "beyond the sample", "is nothing beside", "overlaps its own image"
+BEYOND, NOTHING, IMAGE = (
+    "beyond the sample",
+    "is far too small for the smallest",
+    "overlaps its own image",
+)
 
 
 @pytest.mark.parametrize(
@@ -143,7 +147,7 @@ BEYOND, NOTHING, IMAGE = "beyond the sample", "is nothing beside", "overlaps its
         ("flat", "box", {"rv_size": "2,2,1e-11"}, NOTHING),
         (
             "flat", "box", {"rv_size": "0.1,0.1,0.1", "rv_center": "10.8,8.8,5.8"},
-            r"holds no grain: choose another `rv_center` or a larger one \(`rv_radius`, `rv_size`",
+            r"holds no grain: choose another `rv_center`, or a larger RV \(`rv_radius`, `rv_size`",
         ),
         ("tilted", "sphere", {"rv": 1.5}, "wider than the cell's shortest period"),
         ("tilted", "box", {"rv_size": "6.1,1,1"}, rf"{IMAGE}, \(.*\) away"),
@@ -194,7 +198,7 @@ def test_a_window_that_has_nothing_to_follow_is_told_what_to_choose(flat):
     with pytest.raises(SettingsError, match=r'rv_follows: .*choose `strain="grains"`'):
         make_plan(Settings(rv_follows="strain"), flat)
     line = sample_of(Packing([[0, 0, 0], [0, 0, 2.0], [0, 0, 4.0]], 1.0))
-    with pytest.raises(SettingsError, match="the grains it is to follow has no volume"):
+    with pytest.raises(SettingsError, match="the grains to follow has no volume"):
         make_plan(Settings(rv_follows="strain", strain="grains", rv=0.3), line)
 
 

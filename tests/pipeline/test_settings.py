@@ -164,7 +164,7 @@ def test_a_strain_file_must_exist(tmp_path):
     [
         ({"min_force": 0.5}, "min_force: .* `rattlers=.force.`"),
         ({"edge": "ends", "moment": 2}, "moment: .* choose `edge=start`"),
-        ({"rv_size": "1,2,3"}, "rv_size: the shape sphere takes none: choose `rv_radius`"),
+        ({"rv_size": "1,2,3"}, "rv_size: the shape sphere takes no sizes: choose `rv_radius`"),
         ({"rv_shape": "cylinder", "rv_size": "1,2,3"}, "rv_size: expected R,H.* found 1,2,3"),
         ({"rv_shape": "ellipsoid", "rv_radius": 2.0}, "rv_radius: .* `rv_shape` is ellipsoid"),
         ({"rv_shape": "box", "rv_axis": "x"}, "rv_axis: .* choose `rv_shape=.cylinder.`"),

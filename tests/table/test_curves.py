@@ -27,7 +27,7 @@ def changed(source="one", frame=None, **values):
 ROUNDED = [{**row, "strain": 0.25 + 1e-12 * row["frame"]} for row in curve("one")]
 SMALL = [{**row, "strain": 1e-6 * row["frame"]} for row in curve("one")]
 SHEARED_TOO = [{**row, "shear_strain": row["strain"]} for row in curve("one")]
-FRAME, SHEAR = "the frame's number stands in for", "shear_strain stands in for"
+FRAME, SHEAR = "the frame number is used in place of", "shear_strain is used in place of"
 
 
 @pytest.mark.parametrize(
@@ -38,12 +38,12 @@ FRAME, SHEAR = "the frame's number stands in for", "shear_strain stands in for"
         (curve("one")[2:3], "strain", None),
         ([], None, None),
         (changed(strain=None), None, None),
-        ([*curve("one"), *changed("two", strain=None)], None, f"{FRAME} .*as two has none: "),
-        (changed(frame=3, strain=None), None, f"{FRAME} .*as one has none in frame 3: "),
+        ([*curve("one"), *changed("two", strain=None)], None, f"{FRAME} .*because two has none: "),
+        (changed(frame=3, strain=None), None, f"{FRAME} .*because one has none in frame 3: "),
         (changed(frame=3, strain=None, alpha_vs_axial=None), "strain", None),
-        (changed(strain=0.25), None, r"as one has the same in all frames \(0.25\): "),
-        (ROUNDED, None, r"as one has the same in all frames \(0.25\): "),
-        (sheared(), "shear_strain", rf"{SHEAR} .*as shear has the same in all frames \(0\): "),
+        (changed(strain=0.25), None, r"because one has the same in all frames \(0.25\): "),
+        (ROUNDED, None, r"because one has the same in all frames \(0.25\): "),
+        (sheared(), "shear_strain", rf"{SHEAR} .*because shear has the same in all frames \(0\): "),
         ([*sheared(), *curve("one")], None, FRAME),
         ([*sheared(), *SHEARED_TOO], "shear_strain", SHEAR),
         (changed(strain=0.25, shear_strain=0.0), None, FRAME),

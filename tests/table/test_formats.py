@@ -33,7 +33,7 @@ def test_the_content_tells_the_format(tmp_path, text):
     ("content", "message"),
     [
         (None, "cannot be read: No such file"),
-        (b"", "expected a table, found nothing"),
+        (b"", "expected a table, found an empty file"),
         (b"a,b\n1,2\n1\n", "line 3: expected 2 cells, found 1"),
         (b"a,b\n1,2,3\n", "line 2: expected 2 cells, found 3"),
         (b'{"a": 1}\n{"a": \n', "cannot be read as JSON"),
@@ -41,7 +41,7 @@ def test_the_content_tells_the_format(tmp_path, text):
         (b"[1, 2]", "expected JSON objects, one for each row"),
         (b"[" * 100_000, "cannot be read as JSON"),
         (b'[{"a": ' + b"9" * 5000 + b"}]", "cannot be read as JSON"),
-        (b"\xff\xfe\x00\x01", "expected a table as text or Parquet, found other bytes"),
+        (b"\xff\xfe\x00\x01", "expected text in UTF-8 or Parquet, found other bytes"),
         (b"PAR1 and nothing else", "cannot be read as Parquet"),
     ],
 )

@@ -61,7 +61,7 @@ def test_rows_that_are_there_already_count_once_with_one_warning(source):
         first, second = choose_rows([("1.csv", curve("one")), ("2.csv", curve(source))])
     assert (len(first), second) == (5, [])
     (text,) = {str(one.message) for one in caught}
-    assert text == f"2.csv: rows of {source} that 1.csv holds already count once"
+    assert text == f"2.csv: rows of {source} that 1.csv also holds are used once"
 
 
 def test_other_results_of_the_same_source_are_not_dropped():

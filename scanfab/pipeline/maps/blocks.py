@@ -1,4 +1,4 @@
-"""Where the blocks of a map lie, which of them a surface cuts, and how much it leaves."""
+"""Blocks of a map: where they lie, which lie at a surface, and their volumes in the RV."""
 
 from __future__ import annotations
 
@@ -19,42 +19,43 @@ from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.lines import line_triads
 
-# Thickness of a block in mean radii: below the first it holds less than a grain, below the second
-# hardly any grain that does not lie partly in its neighbours.
+# Thickness of a block in mean radii. A block thinner than the first is smaller than a grain and is
+# refused. In a block thinner than the second, nearly all grains reach into neighbouring blocks.
 REFUSED_BELOW, DOUBTED_BELOW = 1.0, 4.0
-# cosine of the angle between the axis and the normal of the faces that slices are parallel to
+# least cosine of the angle between the loading axis and the normal of the faces of slices
 MOST_OBLIQUE = 0.8
-# in mean radii: blocks deeper inside than this lose next to no segments that leave the sample
+# in mean radii: blocks that lie deeper inside lose hardly any segments at the surface
 DEPTH = 2.0
-# every so many unit vectors stand for the outer surface of a shell
+# every SOME-th unit vector is used to represent the outer surface of a shell
 SOME = 8
-# lines through all blocks that a window cuts, and through each the fewest and most along an edge
+# LINES: lines through all blocks that a window cuts together; SIDE: fewest and most per block edge
 LINES, SIDE = 1e6, (16, 64)
-# of rays through shells; even, so that all octants get as many, and none lies between two
+# Numbers of rays through shells. They are even, so that each octant gets as many rays and no ray
+# lies between two octants.
 POLAR, AZIMUTHS = 64, 128
 
 
 class MapBlocks(NamedTuple):
     """
-    What the blocks of a map tile; lengths in the dump's unit.
+    The region that the blocks of a map tile; lengths in the dump's unit.
 
-    Of the whole sample they tile a parallelepiped: along the vectors of a cell that repeat the cell
-    as it is in each frame, and along other axes what the grains took in the first frame. Of the RV
-    they tile its box, wherever the RV is.
+    For the whole sample it is a parallelepiped: along periodic vectors it is the cell of each
+    frame, and along other axes it is the extent of the grains in the first frame. For the RV it is
+    the box around the RV in each frame.
     """
 
     settings: MapSettings
     axes: FloatArray
-    """Unit vectors along which blocks lie where nothing repeats, as rows."""
+    """Unit vectors along which blocks lie if the sample is not periodic, as rows."""
     low: FloatArray
-    """From the origin of the axes, where what is tiled begins along each, shape (3,)."""
+    """Lower end of the region along each axis, from the origin of the axes, shape (3,)."""
     high: FloatArray
-    """Likewise where it ends."""
+    """Upper end of the region along each axis, shape (3,)."""
 
     @classmethod
     def of(cls, settings: MapSettings, sample: Sample) -> MapBlocks:
         """
-        What the blocks of a map tile, by the first frame that has grains.
+        Find the region of a map from the first frame that has grains.
 
         Raises
         ------
@@ -64,8 +65,8 @@ class MapBlocks(NamedTuple):
         packing, gathered = sample.packing, sample.gathered
         if packing.space.is_plane:
             raise SettingsError(
-                f"a map is of spheres in space, but all grains are discs in the plane "
-                f"{packing.space.name}: `compute` has the fabric of RVs, wherever `rv_center` is"
+                f"a map needs spheres, but all grains are discs in the plane "
+                f"{packing.space.name}: use `compute` with an RV at each `rv_center` instead"
             )
         open_axes = np.eye(3)
         if settings.slices is not None:
@@ -74,18 +75,18 @@ class MapBlocks(NamedTuple):
         axes, origin, *_ = _axes(packing.cell, open_axes)
         to_axes = np.linalg.inv(axes)
         places = (packing.position[gathered] - origin) @ to_axes
-        # how far a sphere reaches along each, measured between planes of the two others
+        # reach of a sphere along each axis, measured normal to the plane of the other two axes
         reach = packing.radius[gathered, None] * np.linalg.norm(to_axes, axis=0)
         return cls(settings, open_axes, (places - reach).min(axis=0), (places + reach).max(axis=0))
 
     def of_whole(self, cell: Cell | None) -> Blocks:
-        """Of the whole sample in a frame, in the dump's coordinates."""
+        """Blocks of the whole sample in a frame, in the dump's coordinates."""
         axes, origin, repeats, period = _axes(cell, self.axes)
         low, high = np.where(repeats, 0.0, self.low), np.where(repeats, period, self.high)
         return self._parted(origin + low @ axes, (high - low)[:, None] * axes, repeats)
 
     def of_window(self, window: Window) -> Blocks:
-        """Of the box of an RV, in the dump's coordinates."""
+        """Blocks of the box around an RV, in the dump's coordinates."""
         axes, shape = self.axes, window.shape
         reach = np.array([shape.support(sign * axes) for sign in (-1.0, 1.0)])
         low, high = np.einsum("sij,ij->si", reach, axes)
@@ -95,39 +96,43 @@ class MapBlocks(NamedTuple):
         return self._parted(window.center + low @ axes, edges, np.zeros(3, bool))
 
     def _parted(self, corner: FloatArray, edges: FloatArray, repeats: BoolArray) -> Blocks:
-        """What is tiled, in as many blocks as are asked for."""
-        settings, one = self.settings, Blocks(corner, edges, (1, 1, 1), repeats)
+        """Divide the region into the blocks of the settings."""
+        settings, undivided = self.settings, Blocks(corner, edges, (1, 1, 1), repeats)
         if settings.shells is not None:
-            radius = 0.5 * float(one.heights.min())
-            return replace(one, radius=radius, shells=settings.shells)
+            radius = 0.5 * float(undivided.heights.min())
+            return replace(undivided, radius=radius, shells=settings.shells)
         if settings.grid is not None:
-            return replace(one, parts=settings.grid)
-        # slices lie between the faces that are most nearly normal to the axis
-        cosines = np.abs(one.matrix @ np.asarray(settings.axis)) * one.heights
+            return replace(undivided, parts=settings.grid)
+        # slices are parallel to the faces that are most nearly normal to the loading axis
+        cosines = np.abs(undivided.matrix @ np.asarray(settings.axis)) * undivided.heights
         across = int(np.argmax(cosines))
         if cosines[across] < MOST_OBLIQUE:
             angle = np.degrees(np.arccos(cosines[across]))
             raise SettingsError(
-                f"slices: in a periodic cell they lie between its faces, the nearest of which is "
-                f"{angle:.0f} degrees off the axis: choose another `axis`, or `grid`"
+                f"slices: in a periodic cell they are parallel to its faces, but the nearest "
+                f"normal is {angle:.0f} degrees off the axis: choose another `axis`, or `grid`"
             )
-        return replace(one, parts=tuple(settings.blocks if k == across else 1 for k in range(3)))
+        return replace(
+            undivided, parts=tuple(settings.blocks if k == across else 1 for k in range(3))
+        )
 
     def doubts(self, sample: Sample, window: Window | None, mean: float) -> Iterator[Note]:
         """
-        Whether the blocks are large enough; ``mean`` is the mean radius.
+        Check that the blocks are large enough; ``mean`` is the mean radius of the grains.
 
         Raises
         ------
         SettingsError
-            If they are smaller than a grain.
+            If a block is thinner than a mean radius.
         """
-        every = [self.of_window(window)] if window is not None else []
+        tilings = [self.of_window(window)] if window is not None else []
         if {*"ab"} & {*self.settings.variants}:
-            every.append(self.of_whole(sample.packing.cell))
-        thinnest = float(min(one.heights.min() for one in every))
-        name = next(one for one in BLOCK_OPTIONS if getattr(self.settings, one))
-        found = f"makes blocks {thinnest:.4g} thick, {thinnest / mean:.3g} mean radii of the grains"
+            tilings.append(self.of_whole(sample.packing.cell))
+        thinnest = float(min(tiling.heights.min() for tiling in tilings))
+        name = next(option for option in BLOCK_OPTIONS if getattr(self.settings, option))
+        thickness = (
+            f"makes blocks {thinnest:.4g} thick, {thinnest / mean:.3g} mean radii of the grains"
+        )
         choose = (
             f"choose fewer, so that they are at least {DOUBTED_BELOW:g} mean radii thick "
             f"({DOUBTED_BELOW * mean:.4g})"
@@ -135,17 +140,17 @@ class MapBlocks(NamedTuple):
         times = thinnest / mean / (1.0 - 1e-9)
         if times < REFUSED_BELOW:
             raise SettingsError(
-                f"{name}: {found}: less than a grain says nothing of a fabric: {choose}"
+                f"{name}: {thickness}: a block smaller than a grain has no fabric: {choose}"
             )
         if times < DOUBTED_BELOW:
-            unsure = "grains lie in several blocks, and errors from parts of a block are uncertain"
-            yield Note("thin_blocks", f"`{name}` {found}: {unsure}: {choose}")
+            unsure = "grains reach into several blocks, so the errors of blocks are uncertain"
+            yield Note("thin_blocks", f"`{name}` {thickness}: {unsure}: {choose}")
 
 
 def _axes(
     cell: Cell | None, open_axes: FloatArray
 ) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
-    """Unit vectors along which the whole is tiled, where they begin, which repeat, and how soon."""
+    """Axes of the whole: unit vectors, origin, which axes are periodic, and their periods."""
     if cell is None or not cell.is_periodic:
         return open_axes, np.zeros(3), np.zeros(3, bool), np.zeros(3)
     period = np.linalg.norm(cell.vectors, axis=1)
@@ -158,34 +163,34 @@ def near_surface(
     """
     Which blocks lie so near to the surface of a convex region that they lose segments, shape (B,).
 
-    The planes n·x = f touch the region; ``normals`` n has the shape (K, 3), ``furthest`` f (K,).
-    ``mean`` is the mean radius of the grains.
+    The planes n·x = f touch the region; ``normals`` holds n, shape (K, 3), and ``furthest`` holds
+    f, shape (K,). ``mean`` is the mean radius of the grains.
     """
     outline = blocks.corners
     if blocks.radius:
         units = direction_points()[0][::SOME]
         outline = blocks.middles[:, None] + blocks.bounds[1:, None, None] * units
-    found = np.zeros(len(blocks), bool)
+    near = np.zeros(len(blocks), bool)
     for normal, distance in zip(normals, furthest, strict=True):
-        found |= np.any(outline @ normal - distance > -DEPTH * mean, axis=1)
-    return found
+        near |= np.any(outline @ normal - distance > -DEPTH * mean, axis=1)
+    return near
 
 
 def surface_of(window: Window) -> tuple[FloatArray, FloatArray]:
-    """Planes that touch a window in many directions, as :func:`near_surface` takes them."""
+    """Planes that touch a window from many directions, for :func:`near_surface`."""
     normals = np.concatenate([window.shape.planes[:, :3], direction_points()[0]])
     places = window.shape.support(normals) + window.center
     return normals, np.einsum("ki,ki->k", places, normals)
 
 
 def hull_of(sample: Sample) -> tuple[FloatArray, FloatArray]:
-    """Likewise the facets of the hull of the grains' centres; a flat sample has no inside."""
+    """Facets of the hull of the grain centres, for :func:`near_surface`; all blocks if flat."""
     from scipy.spatial import ConvexHull, QhullError
 
     cell, across = sample.packing.cell, np.eye(3)
     if cell is not None and cell.is_periodic:
         repeating = cell.vectors[np.array(cell.periodic)]
-        # orthonormal vectors of what these do not span: only there is a surface
+        # orthonormal vectors normal to the periodic vectors: only along these is there a surface
         across = np.linalg.svd(repeating)[2][len(repeating) :]
     places = sample.packing.position[sample.gathered] @ across.T
     if len(across) < 2:
@@ -199,9 +204,10 @@ def hull_of(sample: Sample) -> tuple[FloatArray, FloatArray]:
 
 def volumes_inside(blocks: Blocks, window: Window | None) -> FloatArray:
     """
-    How much of each of the eight parts of each block lies in a window, if there is one; (B, 8).
+    Volumes of the eight parts of each block inside a window, shape (B, 8).
 
-    Each line is cut exactly at the window, so that volumes are right to a part in a thousand.
+    Without a window the parts count in full. Lines are cut exactly at the window, so that the
+    volumes are right to about 0.1 %.
     """
     if window is None:
         return np.repeat(blocks.volumes[:, None] / 8, 8, axis=1)
@@ -210,9 +216,9 @@ def volumes_inside(blocks: Blocks, window: Window | None) -> FloatArray:
 
 
 def _grid_inside(blocks: Blocks, window: Convex) -> FloatArray:
-    """The volumes of blocks of a grid in a window about the origin, shape (B,)."""
+    """Volumes of the blocks of a grid inside a window about the origin, shape (B,)."""
     edges, corners = blocks.edges / np.array(blocks.parts)[:, None], blocks.corners
-    # as a window is convex, a block lies in it if all its corners do
+    # a window is convex, so it contains a block if it contains all corners
     whole = window.contains(corners.reshape(-1, 3)).reshape(corners.shape[:2]).all(axis=1)
     reach = 0.5 * np.linalg.norm(corners[:, 0] - corners[:, -1], axis=1)
     cut = np.flatnonzero(~whole & window.may_meet(corners.mean(axis=1), reach))
@@ -222,11 +228,12 @@ def _grid_inside(blocks: Blocks, window: Convex) -> FloatArray:
     for block in cut:
         best = np.inf
         for turn in range(3):
-            one, two, along = np.roll(edges, turn, axis=0)
-            across = (steps[:, None, None] * one + steps[:, None] * two).reshape(-1, 3)
+            first, second, along = np.roll(edges, turn, axis=0)
+            across = (steps[:, None, None] * first + steps[:, None] * second).reshape(-1, 3)
             lines = window.share(corners[block, 0] + across, np.broadcast_to(along, across.shape))
             lines = lines.reshape(side, side)
-            # lines along a cylinder's axis are inside or outside, and tell its volume less well
+            # The direction whose lines vary least is used: lines along the axis of a cylinder, for
+            # example, are either inside or outside and give its volume less accurately.
             rough = sum(float(np.sum(np.diff(lines, axis=axis) ** 2)) for axis in (0, 1))
             if rough < best:
                 best, share[block] = rough, lines.mean()
@@ -234,7 +241,7 @@ def _grid_inside(blocks: Blocks, window: Convex) -> FloatArray:
 
 
 def _shells_inside(blocks: Blocks, window: Convex) -> FloatArray:
-    """The volumes of the octants of shells about a window's centre, by rays from there; (B,)."""
+    """Volumes of the octants of shells inside a window, by rays from its centre, shape (B,)."""
     cosine, weight = np.polynomial.legendre.leggauss(POLAR)
     along = np.repeat(cosine, AZIMUTHS)
     turn = np.tile(2.0 * np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS, POLAR)

@@ -22,28 +22,29 @@ def fabric_map(
     **options: Any,
 ) -> Table:
     """
-    The fabric of a packing or of a series by place.
+    Compute the fabric of a packing or of a series block by block.
 
-    A void segment belongs to the block in which its middle lies, a contact to that of its point, a
-    grain to that of its centre. Blocks tile the box of the grains' surfaces in the first frame (of
-    variants c and d that of the RV; along the vectors of a periodic cell the cell). The tolerance
-    holds for the median block. Whether the blocks scatter more than their errors is told as a
-    warning.
+    A void segment belongs to the block that holds its middle, a contact to the block of its contact
+    point, and a grain to the block of its centre. Blocks tile the box around the grains in the
+    first frame; along periodic vectors they tile the cell, and for variants c and d the box around
+    the RV. The tolerance holds for the median block. A warning reports √F, the scatter of the
+    blocks relative to their errors, and its p-value.
 
     Parameters
     ----------
     source : Packing, Series or iterable of Packing
         As for :func:`scanfab.compute`.
     grid : str or three ints, optional
-        So many blocks along x, y and z.
+        Number of blocks along x, y and z.
     slices : int, optional
-        So many slices of equal thickness along `axis`.
+        Number of slices of equal thickness along `axis`.
     shells : int, optional
-        So many shells about the centre, up to half the smallest extent, or the reach of the RV.
+        Number of shells about the centre, out to half the smallest extent, or to the reach of the
+        RV.
     executor : concurrent.futures.Executor, optional
         As for :func:`scanfab.compute`.
     **options
-        Those of :func:`scanfab.compute` but `cutoffs` and `with_`; `variants` is ``"a"`` by
+        Options of :func:`scanfab.compute` except `cutoffs` and `with_`; `variants` is ``"a"`` by
         default.
 
     Returns
@@ -57,7 +58,7 @@ def fabric_map(
         If a frame cannot be read, the settings do not fit the packing, or blocks are smaller than
         a grain.
     TypeError
-        If there is no such option; names the nearest that there is.
+        If there is no such option; the message suggests the most similar name.
 
     Examples
     --------

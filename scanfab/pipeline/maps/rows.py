@@ -1,4 +1,4 @@
-"""One frame scanned block by block: a row for each variant and block, with both of its errors."""
+"""Map one frame: a row for each variant and block, with errors due to scan and sample."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ from scanfab.scan.solids import Solids
 from scanfab.table.columns import row_of
 from scanfab.table.row import Row
 
-# Of the scan for the sample's scatter in each block: replicates, from which its noise is known, and
-# axes, so many that the choice of them adds little: along 16 the error of a block of a hundred
-# grains would scatter by a quarter of its value.
+# A separate scan measures the error of each block due to the sample. Its replicates show its noise.
+# Its axes are so many that their choice adds little: with 16 axes, the error of a block of a
+# hundred grains would scatter by a quarter.
 PART_REPLICATES, PART_AXES = 4, 96
-# chords that it may cut: lines are set further apart where there would be more
+# most chords of this scan; lines are set further apart to keep to it
 MOST_CHORDS = 1e9
 HOMOGENEITY = "homogeneity"
-"""The code of a note: whether the blocks of a variant scatter more than their errors."""
-# the chance below which a sample is said not to be homogeneous
+"""Code of the note on whether the blocks of a variant scatter more than their errors."""
+# p-value below which a sample is reported as not homogeneous
 UNLIKELY = 0.01
-# parts of a block, less one
+# degrees of freedom of the error of a block: its number of parts minus one
 FREEDOM = 7.0
 
 
@@ -57,19 +57,19 @@ def map_rows(
     Parameters
     ----------
     sample, plan
-        Of the frame, with its windows.
+        Sample and plan of the frame, with its windows.
     known : mapping
-        The columns that are the same in all rows of the frame.
+        Values by column that are the same in all rows of the frame.
     where : str
-        Names the frame where progress is told.
+        Name of the frame in the log.
 
     Returns
     -------
     rows : list of Row
     notes : tuple of Note
-        What is doubtful about them.
+        Doubts about the rows.
     blocks : two Blocks
-        Of the whole sample and of the RV.
+        Blocks of the whole sample and of the RV.
     """
     settings, map_blocks = plan.map_settings, plan.map_blocks
     assert settings is not None
@@ -82,38 +82,38 @@ def map_rows(
     rows = []
     for name in plan.variants:
         variant = VARIANTS[name]
-        one = BlocksOfVariant(
+        mapped = BlocksOfVariant(
             sample, plan, solids, variant, blocks[variant.in_window], sums, parts[name]
         )
-        values = ({**known, "variant": name, **own} for own in one.rows())
+        values = ({**known, "variant": name, **own} for own in mapped.rows())
         rows += [row_of(settings.columns, own) for own in values]
-        notes += one.notes()
+        notes += mapped.notes()
     return rows, joined(notes), blocks
 
 
 @dataclass(frozen=True, eq=False)
 class MapSums(ScanSums):
-    """What the scan of a map adds up: beside the sums of all blocks the fabric of each."""
+    """Sums of the scan of a map, with the fabric of each block."""
 
     fabrics: dict[str, BlockFabrics]
-    """Of each variant."""
+    """Fabrics of the blocks, by variant."""
 
 
 @dataclass(frozen=True, eq=False)
 class MedianBlock(Goal):
-    """The error of the median block of each variant is to meet the tolerance."""
+    """The goal of a map: the median error over the blocks of each variant meets the tolerance."""
 
     blocks: tuple[Blocks, Blocks]
-    """Of the whole and of the window, in the dump's coordinates."""
+    """Blocks of the whole and of the window, in the dump's coordinates."""
 
     def scan(
         self, solids: Solids, plan: Plan, replicates: range, most_steps: float = math.inf
     ) -> MapSums:
-        """As planned; replicate by replicate, as the sums of all their axes would be too many."""
+        """Scan one replicate after the other; sums by axis of all together would be too large."""
         weights, moment, parts = plan.rule.weights, plan.moment, []
         scan = partial(gap_scan(solids, plan, self.blocks, [plan.cutoff]), plan.rule)
-        for one in replicates:
-            sums = scan(spacing=plan.spacing, replicates=[one], most_steps=most_steps)
+        for replicate in replicates:
+            sums = scan(spacing=plan.spacing, replicates=[replicate], most_steps=most_steps)
             most_steps -= float(sums.scan.steps.sum())
             fabrics = {
                 name: block_fabrics(sums.axes, weights, *sums.in_blocks(name, 0, moment))
@@ -124,57 +124,57 @@ class MedianBlock(Goal):
         return whole
 
     def errors(self, sums: MapSums, plan: Plan, variant: str) -> Errors:
-        """The median of the blocks that hold any segment: of many, it is sure enough to plan by."""
-        found = sums.fabrics[variant]
-        is_met = found.is_met
+        """Median error of the blocks with segments; over many blocks it is certain enough."""
+        fabrics = sums.fabrics[variant]
+        is_met = fabrics.is_met
         if not is_met.any():
             return Errors(math.inf, math.inf, 1.0)
-        errors = np.where(found.exists, found.axial_errors(np.asarray(plan.axis)), np.inf)
+        errors = np.where(fabrics.exists, fabrics.axial_errors(np.asarray(plan.axis)), np.inf)
         median = float(np.median(errors[is_met]))
-        return Errors(median, median, float(np.median(found.filled.mean(axis=0)[is_met])))
+        return Errors(median, median, float(np.median(fabrics.filled.mean(axis=0)[is_met])))
 
 
 @dataclass(frozen=True, eq=False)
 class PartSums:
-    """What the scan of the eight parts of the blocks tells of one variant; shapes (R, B, 8)."""
+    """Results for the eight parts of each block of a variant; shapes (R, B, 8)."""
 
     rest: BlockFabrics
-    """The fabrics without each part."""
+    """Fabrics of the blocks without each part."""
     segments: FloatArray
-    """Kept segments in each part."""
+    """Number of kept segments in each part."""
     void: FloatArray
-    """Volume of the void with its middle in each part."""
+    """Volume of void whose segments have their middle in each part."""
 
 
 def _part_sums(
     solids: Solids, plan: Plan, blocks: tuple[Blocks, Blocks], before: ScanSums
 ) -> dict[str, PartSums]:
-    """A scan of fewer lines, each block in eight parts, for the sample's scatter and the void."""
+    """Scan fewer lines, with blocks in eight parts, for errors due to the sample and the void."""
     rule, parts = design_of(PART_AXES), []
     most = min(MOST_CHORDS, plan.max_chords)
     spacing = coarse_spacing(solids, PART_REPLICATES * len(rule), before, plan, most)
     finer = blocks[0].finer(), blocks[1].finer()
     scan, clipped = (
-        gap_scan(one, plan, finer, [0.0, plan.cutoff])
-        for one in (solids, replace(solids, edge=CLIP))
+        gap_scan(version, plan, finer, [0.0, plan.cutoff])
+        for version in (solids, replace(solids, edge=CLIP))
     )
     for replicate in range(PART_REPLICATES):
         sums = voids = scan(rule, spacing=spacing, replicates=[replicate])
         if solids.edge == START:
-            # by this rule segments count with what is outside the window, too
+            # this edge rule also counts the parts of segments outside the window
             voids = clipped(rule, spacing=spacing, replicates=[replicate])
-        found = {}
+        sums_of_variants = {}
         for name in plan.variants:
             by_part = blocks[name in "cd"].by_part
             length, number = map(by_part, sums.in_blocks(name, 1, plan.moment))
             rest = length.sum(axis=-1, keepdims=True) - length
-            # what rounding leaves of nothing is none
+            # rounding must not leave negative numbers
             left = np.maximum(number.sum(axis=-1, keepdims=True) - number, 0.0)
             void = np.einsum("d,rdbp->rbp", rule.weights, by_part(voids.in_blocks(name)[0]))
             void *= spacing**2 / rule.weights.sum()
             without = block_fabrics(sums.axes, rule.weights, rest, left)
-            found[name] = PartSums(without, number.sum(axis=1), void)
-        parts.append(found)
+            sums_of_variants[name] = PartSums(without, number.sum(axis=1), void)
+        parts.append(sums_of_variants)
     whole: dict[str, PartSums] = concatenated(parts)
     return whole
 
@@ -185,11 +185,11 @@ class BlocksOfVariant:
 
     sample: Sample
     plan: Plan
-    """With the rule and the spacing as they were in the end."""
+    """The plan with the final rule and spacing."""
     solids: Solids
     variant: Variant
     blocks: Blocks
-    """In the dump's coordinates."""
+    """Blocks in the dump's coordinates."""
     scan: MapSums
     parts: PartSums
 
@@ -200,7 +200,7 @@ class BlocksOfVariant:
 
     @property
     def fabrics(self) -> BlockFabrics:
-        """The void fabrics."""
+        """Void fabrics of the blocks."""
         return self.scan.fabrics[self.variant.name]
 
     @cached_property
@@ -209,7 +209,7 @@ class BlocksOfVariant:
         mean = float(self.sample.packing.radius[self.sample.gathered].mean())
         window, inner = self.window, self.solids.inner
         if window is not None and self.plan.edge == START:
-            # segments are followed beyond the RV, and each end counts in the block that it is in
+            # segments are followed beyond the RV, and each end counts in the block that holds it
             return np.zeros(len(self.blocks), bool)
         if window is None and self.plan.edge == ENDS and inner is not None:
             window = Window(inner.center + self.solids.origin, inner.shape)
@@ -217,7 +217,7 @@ class BlocksOfVariant:
         return near_surface(self.blocks, *surface, mean)
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """The values of each block by their columns."""
+        """Values of each block, by column."""
         blocks, sample, fabrics = self.blocks, self.sample, self.fabrics
         axis, plan, replicates = np.asarray(self.plan.axis), self.plan, self.scan.replicates
         chosen = sample.fabric_contacts(self.variant, self.window)
@@ -238,15 +238,15 @@ class BlocksOfVariant:
         }
         if blocks.radius:
             arrays |= {"r_inner": blocks.bounds[:-1], "r_outer": blocks.bounds[1:]}
-        # rows have None in the place of NaN
+        # rows hold None in place of NaN
         listed = {
-            name: [None if one != one else one for one in values.tolist()]
+            name: [None if value != value else value for value in values.tolist()]
             for name, values in arrays.items()
         }
         number = blocks.of(points)
         order = np.argsort(number, kind="stable")
         starts = np.searchsorted(number[order], np.arange(len(blocks) + 1))
-        # without the contacts before the first block, which are in none
+        # the first group is dropped: it holds the contacts outside all blocks
         groups = np.split(normals[order], starts)[1:-1]
         tensors = fabrics.tensors.mean(axis=0)
         for block, (own, exists) in enumerate(zip(groups, fabrics.exists, strict=True)):
@@ -264,24 +264,24 @@ class BlocksOfVariant:
             }
 
     def _placed(self, points: FloatArray) -> FloatArray:
-        """The images of places that are next to the window's centre."""
+        """The periodic images of points that are nearest to the window's centre."""
         if self.window is None:
             return points
         return self.window.center + self.window.branches(points, self.sample.packing)
 
     def _by_part(self, points: FloatArray, *values: Any) -> list[FloatArray]:
-        """Sums of values by the block and part that their places lie in, shape (B, 8) each."""
+        """Sums of values over points, by the block and part that hold the points, (B, 8) each."""
         number, count = self.blocks.finer().of(points), 8 * len(self.blocks)
         inside = number >= 0
-        found = (np.bincount(number[inside], one[inside], count) for one in values)
-        return [self.blocks.by_part(one.astype(np.float64)) for one in found]
+        sums = (np.bincount(number[inside], array[inside], count) for array in values)
+        return [self.blocks.by_part(array.astype(np.float64)) for array in sums]
 
     @cached_property
     def grains(self) -> dict[str, Any]:
-        """Columns of grains; coordination is NaN without any."""
+        """Columns of grains; the coordination of a block without grains is NaN."""
         sample, variant, bodies = self.sample, self.variant, self.sample.packing.bodies
         places = sample.packing.position if bodies is None else bodies.place
-        # a clump is one grain, where its middle is
+        # a clump is one grain at its centre
         rows = np.flatnonzero(sample.once(sample.counted(variant, self.window)))
         solid = ~sample.removed(variant)[rows]
         numbers = solid * sample.numbers_of(variant)[rows]
@@ -298,54 +298,55 @@ class BlocksOfVariant:
 
     @cached_property
     def void(self) -> dict[str, FloatArray]:
-        """Columns of the void fabric and its errors; NaN where there is none."""
+        """Columns of the void fabric and its errors; NaN for blocks without a fabric."""
         fabrics, rest, axis = self.fabrics, self.parts.rest, np.asarray(self.plan.axis)
         held = self.parts.segments.sum(axis=0) > 0
-        found = {
+        columns = {
             "mean_length": ratio(fabrics.length.sum(axis=0), fabrics.number.sum(axis=0)),
             "alpha_vs_axial": axial(fabrics.tensors.mean(axis=0), axis),
             "alpha_vs_axial_se": fabrics.axial_errors(axis),
             "alpha_vs_axial_sample_se": part_errors(axial(rest.tensors, axis), held),
             "mean_length_se": part_errors(ratio(rest.length, rest.number), held),
         }
-        return {name: np.where(fabrics.exists, values, np.nan) for name, values in found.items()}
+        return {name: np.where(fabrics.exists, values, np.nan) for name, values in columns.items()}
 
     def _solid_fraction(self) -> dict[str, FloatArray]:
-        """1 - void with its middle in the block / volume of the block in the window."""
+        """1 - volume of the void in the block / volume of the block inside the window."""
         void = self.parts.void
         volumes = volumes_inside(self.blocks, self.window)
-        every = volumes.sum(axis=1)
-        known = every > 0
+        volume = volumes.sum(axis=1)
+        known = volume > 0
         if self.window is None:
-            # beyond an open sample nobody knows what is void
+            # outside an open sample, void is not defined
             known &= ~self.at_surface
         if self.window is not None or self.at_surface.any():
-            # A surface takes segments that reach it, and long ones have their middles far inside.
-            # Their mean length without a cut-off follows roughly from the grains' volumes.
+            # A surface removes the segments that reach it, and the middles of long segments lie
+            # far inside. So the fraction is left out if segments are longer than a block. Their
+            # mean length without a cut-off follows roughly from the volumes of the grains.
             radius = self.sample.packing.radius[self.sample.grains]
             solid = float(np.sum(self.grains["grains"]) * np.mean(SPACE.volume(radius)))
             chord = 4.0 * float(np.sum(radius**3) / (3.0 * np.sum(radius**2)))
             free = chord * max(float(volumes.sum()) - solid, 0.0)
             known &= free <= solid * self.blocks.heights.min()
-        left, total = every[:, None] - volumes, void.sum(axis=2)
+        left, total = volume[:, None] - volumes, void.sum(axis=2)
         without = 1.0 - ratio(total[..., None] - void, left)
-        found = {
-            "solid_fraction": 1.0 - ratio(total.mean(axis=0), every),
+        columns = {
+            "solid_fraction": 1.0 - ratio(total.mean(axis=0), volume),
             "solid_fraction_se": part_errors(without, (volumes > 0) & (left > 0)),
         }
-        return {name: np.where(known, values, np.nan) for name, values in found.items()}
+        return {name: np.where(known, values, np.nan) for name, values in columns.items()}
 
     def notes(self) -> Iterator[Note]:
-        """Lines and blocks that are doubtful, and whether the sample is homogeneous."""
+        """Notes on doubtful lines and blocks, and on the homogeneity of the sample."""
         fabrics, variant = self.fabrics, self.variant
         kept = float(fabrics.segments.sum())
         left_out = left_out_of(self.scan, variant, edge_of(variant, self.plan, self.solids), kept)
         texts = doubts_of_lines(self.scan, variant, left_out)
-        lacking, empty = (int((~one).sum()) for one in (fabrics.exists, fabrics.is_met))
+        lacking, empty = (int((~mask).sum()) for mask in (fabrics.exists, fabrics.is_met))
         if lacking:
             texts["few_segments"] = (
                 f"{lacking} of {counted(len(self.blocks), 'block')} have no void fabric: {empty} "
-                f"hold no void segment at all, {lacking - empty} none in more than 5 % of the "
+                f"have no void segment at all, {lacking - empty} have none in more than 5 % of the "
                 f"directions: choose fewer blocks, closer lines (`spacing`, `tolerance`) or a "
                 f"shorter `cutoff`"
             )
@@ -353,7 +354,7 @@ class BlocksOfVariant:
         return (Note(code, text, (variant.name,)) for code, text in texts.items())
 
     def _homogeneity(self) -> str:
-        """What the analysis of variance says, in words."""
+        """The result of the test for homogeneity, in words."""
         inner = self.fabrics.exists & ~self.at_surface
         values = np.where(inner, self.void["alpha_vs_axial"], np.nan)
         variances = self.void["alpha_vs_axial_sample_se"] ** 2
@@ -361,7 +362,7 @@ class BlocksOfVariant:
         test = homogeneity_of(values, variances, self.fabrics.segments.sum(axis=0), FREEDOM)
         if test is None:
             few = "too few blocks to tell whether the sample is homogeneous"
-            better = "" if self.variant.in_window else "those of the RV by `variants=c` and "
+            better = "" if self.variant.in_window else "blocks of the RV by `variants=c` and "
             if not self.at_surface.any():
                 return few
             return (

@@ -1,4 +1,4 @@
-"""Settings of a map: those of a computation, and the blocks of space it tells apart."""
+"""Settings of a map: the settings of a computation, and the blocks."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ block_count = whole("1 or more", lambda number: number >= 1)
 
 
 def parse_grid(name: str, value: Any) -> tuple[int, int, int]:
-    """Three whole numbers of at least 1, in a text between commas or blanks."""
+    """Parse three whole numbers of at least 1, in a text with commas or blanks or a sequence."""
     parse = numbers(
         "three numbers of blocks, such as 4,4,8",
-        lambda grid: len(grid) == 3 and all(one >= 1 and one.is_integer() for one in grid),
+        lambda grid: len(grid) == 3 and all(count >= 1 and count.is_integer() for count in grid),
     )
     first, second, third = map(int, parse(name, value))
     return first, second, third
@@ -37,12 +37,12 @@ class MapSettings(Settings):
     Parameters
     ----------
     **options
-        Those of :func:`scanfab.fabric_map`.
+        Options of :func:`scanfab.fabric_map`.
 
     Raises
     ------
     SettingsError
-        If a value cannot be used, or not just one of `grid`, `slices` and `shells` is given.
+        If a value cannot be used, or not exactly one of `grid`, `slices` and `shells` is given.
     TypeError
         If there is no such option.
 
@@ -55,58 +55,58 @@ class MapSettings(Settings):
 
     variants: str = sample(parse_variants, default="a", metavar="LETTERS", first=True)
     grid: tuple[int, int, int] | None = sample(optional(parse_grid), metavar="NX,NY,NZ", first=True)
-    """So many blocks along x, y and z (along the edges of a periodic cell)."""
+    """Number of blocks along x, y and z (along the edges of a periodic cell)."""
     slices: int | None = sample(optional(block_count), first=True)
-    """So many slices of equal thickness along `axis`."""
+    """Number of slices of equal thickness along `axis`."""
     shells: int | None = sample(optional(block_count), first=True)
-    """So many shells of equal thickness about the centre."""
+    """Number of shells of equal thickness about the centre."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         named = [name for name in BLOCK_OPTIONS if getattr(self, name) is not None]
         if len(named) != 1:
             raise SettingsError(
-                f"a map has one kind of blocks: expected just one of `grid`, `slices` and "
+                f"a map has one kind of blocks: expected exactly one of `grid`, `slices` and "
                 f"`shells`, found {' and '.join(f'`{name}`' for name in named) or 'none'}"
             )
         if self.cutoffs:
             raise SettingsError(
-                "cutoffs: a map is of one cut-off: name it as `cutoff`, and make a map for each"
+                "cutoffs: a map has one cut-off: give it as `cutoff`, and make a map for each one"
             )
         if len(self.rvs) > 1:
             raise SettingsError(
-                f"rv: expected one size, as a map is of one RV, found {len(self.rvs)}: make a map "
-                f"for each"
+                f"rv: expected one size, because a map has one RV, found {len(self.rvs)}: make a "
+                f"map for each"
             )
         if self.with_:
             raise SettingsError(
-                f"with_: a map has no further columns, found {', '.join(self.with_)}: `compute` "
-                f"has them, of the whole sample and of RVs wherever `rv_center` is"
+                f"with_: a map has no further columns, found {', '.join(self.with_)}: use "
+                f"`compute` for the whole sample or for an RV at `rv_center`"
             )
 
     @property
     def blocks(self) -> int:
-        """How many there are."""
+        """Number of blocks."""
         return math.prod(self.grid) if self.grid is not None else self.slices or self.shells or 1
 
     @property
     def rows_per_frame(self) -> int:
-        """One for each variant and block."""
+        """Number of rows per frame: one for each variant and block."""
         return len(self.variants) * self.blocks
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """Of the table."""
+        """All columns of the table."""
         from scanfab.table.columns import map_columns
 
         return map_columns(self.more_columns, shells=self.shells is not None)
 
     @property
     def more_columns(self) -> tuple[str, ...]:
-        """Of those of compute, what can be told of each block."""
+        """Names of the further columns that exist for blocks."""
         return tuple(name for name in super().more_columns if name == "edge")
 
 
 def is_map(options: Any) -> bool:
-    """Whether some options are those of a map."""
+    """Whether options include an option of maps alone."""
     return any(options.get(name) is not None for name in BLOCK_OPTIONS)

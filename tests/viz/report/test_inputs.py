@@ -141,7 +141,7 @@ def test_wrong_usage(table, words, message, capsys):
 
 def test_what_is_doubtful_about_tables_is_told_and_stands_in_the_page(table):
     paths = [table(curve(), "a.jsonl"), table(curve(), "b.jsonl")]
-    with pytest.warns(match="rows of one that .* holds already count once"):
+    with pytest.warns(match="rows of one that .* also holds are used once"):
         page = page_of(paths)
     warned = page[page.index('id="warnings"') : page.index('id="sample"')]
-    assert "holds already count once" in warned
+    assert "also holds are used once" in warned
