@@ -247,5 +247,6 @@ def test_one_finger_scrolls_and_two_turn_and_pinch(phone):
 
 def test_what_is_not_there_is_said(page):
     text = page.run("return document.body.innerText")
-    assert "The view is left out: the source" in text
+    assert "The view is left out: " in text
+    assert ": there is no such file, folder or glob" in text
     assert page.run("return document.querySelectorAll('canvas').length") == 1

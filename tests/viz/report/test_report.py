@@ -133,7 +133,10 @@ def test_without_a_manifest_it_says_so(table):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"sources": ["gone"]}, "The view is left out: the source gone is not there any more."),
+        (
+            {"sources": ["gone"]},
+            "The view is left out: gone: there is no such file, folder or glob.",
+        ),
         ({"sources": ["-"]}, "The view is left out: the frames came by standard input"),
         (
             {"boundary": [{"text": "mask"}]},
