@@ -120,7 +120,7 @@ def test_every_reader_has_a_page() -> None:
 
 def test_every_direction_rule_is_on_the_method_page() -> None:
     text = (DOCS / "method.md").read_text(encoding="utf-8")
-    for name, (_, argument) in RULES.items():
+    for name, (_, argument, *_) in RULES.items():
         assert f"`{name}:{argument}`" in text
 
 

@@ -24,8 +24,7 @@ from scanfab.packing.columns import RV_COLUMN
 from scanfab.pipeline import values
 from scanfab.pipeline.values import AXES, SHAPES, Axis, Length, Vector, as_written, parse_axis
 from scanfab.pipeline.window_settings import check_together
-from scanfab.scan.columns import EDGE_COLUMNS
-from scanfab.scan.edges import CLIP, EDGES
+from scanfab.scan.edges import CLIP, EDGE_COLUMNS, EDGES
 
 if TYPE_CHECKING:
     from scanfab.base.column import Column

@@ -12,7 +12,7 @@ from scanfab.fabric.spectrum import PREDICTED_ALPHA
 from scanfab.fabric.usual import Contact, Void
 from scanfab.fabric.window import WINDOW_ALPHA
 from scanfab.packing.columns import RV_COLUMN, SAMPLE_COLUMNS
-from scanfab.scan.columns import EDGE_COLUMNS, SCAN_COLUMNS
+from scanfab.scan.edges import EDGE_COLUMNS, SCAN_COLUMNS
 from scanfab.table.row import Row
 
 FRAME_COLUMNS = (

@@ -7,8 +7,7 @@ from numba import njit
 from scanfab import box, cylinder, direction_rule, ellipsoid, scan_lines, sphere
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.gaps import scan_gaps
-from scanfab.scan.kernels.strips import spans
-from scanfab.scan.kernels.windows import section_along
+from scanfab.scan.kernels.strips import section_along, spans
 from scanfab.scan.lines import line_triads
 from scanfab.scan.solids import clip_of
 from tests.helpers import naive
