@@ -14,6 +14,7 @@ from scanfab.scan.edges import CLIP, ENDS
 from scanfab.scan.kernels import sweep
 from scanfab.scan.kernels.axes import Axes, Followed, scan_axes, scan_cell
 from scanfab.scan.kernels.bins import OF_WHOLE, OF_WINDOW, Bins, no_bins
+from scanfab.scan.kernels.grid import Bounds
 from scanfab.scan.kernels.strips import Counts, Edge
 from scanfab.scan.solids import Inner, Solids, clip_of, shortest_gap
 
@@ -184,14 +185,16 @@ class _Lines(NamedTuple):
         followed, before = None, float(self.tallies[:, 0, sweep.STEPS].sum())
         if window is not None and window.start is not None:
             followed = Followed(solids.cells, not self.first, self.following.left)
+        position, radius = np.ascontiguousarray(position[solid]), radius[solid]
         scan_axes(
-            np.ascontiguousarray(position[solid]),
-            radius[solid],
+            position,
+            radius,
             removed[solid],
+            _bounds(position, radius),
             self.axes,
             clip_of(shape),
             Counts(self.cutoff, self.both, whole, window, None),
-            self.by_lists(radius[solid], passes),
+            self.by_lists(radius, passes),
             self.bins,
             followed,
             self.tallies,
@@ -223,3 +226,12 @@ class _Lines(NamedTuple):
                 # but for the cut-off: segments that reach it are known to count
                 margin = min(margin, max(NARROW * margin, 1.01 * self.cutoff))
             self.scan(None, Edge(None, True, margin))
+
+
+def _bounds(position: FloatArray, radius: FloatArray) -> Bounds:
+    """What holds all spheres."""
+    if not len(radius):
+        return Bounds(np.zeros(3), np.zeros(3), 0.0)
+    low, high = (position - radius[:, None]).min(axis=0), (position + radius[:, None]).max(axis=0)
+    reach = float((np.sqrt(np.einsum("ij,ij->i", position, position)) + radius).max())
+    return Bounds(0.5 * (low + high), 0.5 * (high - low), reach)

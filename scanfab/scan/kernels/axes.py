@@ -7,10 +7,18 @@ from typing import NamedTuple
 import numpy as np
 
 from scanfab.base.jit import LANES, ZERO, inner, kernel
-from scanfab.base.typing import BoolArray, FloatArray, IntArray
+from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.scan.kernels.bins import Bins, bins_along
 from scanfab.scan.kernels.cells import Cells
-from scanfab.scan.kernels.grid import Grid, Spheres, open_grid, project, sort_into_strips, strip_of
+from scanfab.scan.kernels.grid import (
+    Bounds,
+    Grid,
+    Spheres,
+    open_grid,
+    project,
+    sort_into_strips,
+    strip_of,
+)
 from scanfab.scan.kernels.lists import (
     LISTED_LINES,
     Lists,
@@ -60,36 +68,6 @@ class Followed(NamedTuple):
 
 
 @inner()
-def meet_all(task: Task, lists: Lists, spheres: Spheres, chosen: IntArray, reach: float) -> None:
-    """Let the lines of a strip meet the chosen spheres, row by row or over lists of chords."""
-    if lists.stop.size == 0:
-        visit_all(task, spheres, chosen, reach)
-    else:
-        done = ZERO
-        while done < chosen.size:
-            done = list_chords(lists, task.strip, spheres, chosen, done)
-            if task.bins.cutoffs.size > 0:
-                bin_lists(task, lists)
-            else:
-                sweep_lists(task, lists)
-
-
-@inner()
-def finish(
-    task: Task, which: int, spheres: Spheres, chosen: IntArray, beyond: Beyond | None
-) -> None:
-    """Count what the lines of a strip end with, in one of the sets of solids."""
-    in_bins = task.bins.cutoffs.size > 0
-    closed = bin_last_gaps(task, which) if in_bins else settle(task, which)
-    if closed > 0.0:
-        solve_closed(task, spheres, chosen, which, int(closed))
-    if beyond is not None and task.counts.measured is not None:
-        follow_measured(task, which, task.counts.measured, beyond)
-    if beyond is not None and task.counts.window is not None:
-        follow_beyond(task, which, task.counts.window, beyond)
-
-
-@inner()
 def scan_strips(
     lines: FloatArray,
     spheres: Spheres,
@@ -104,6 +82,7 @@ def scan_strips(
 ) -> None:
     """Scan a grid strip by strip, so that the lines' state stays in cache."""
     most = LISTED_LINES if lists.stop.size > 0 else MOST_LINES
+    in_bins = bins.cutoffs.size > 0
     # a row of lines has to fit a strip
     columns = min(max(grid.columns, 1), most - LANES)
     rows = most // (columns + LANES)
@@ -114,9 +93,23 @@ def scan_strips(
             task = Task(lines, strip, counts, tally, bins)
             begin(lines, strip, section, counts)
             met = chosen[start[number] : start[number + 1]]
-            meet_all(task, lists, spheres, met, reach)
+            if lists.stop.size == 0:
+                visit_all(task, spheres, met, reach)
+            done = ZERO
+            while lists.stop.size > 0 and done < met.size:
+                done = list_chords(lists, strip, spheres, met, done)
+                if in_bins:
+                    bin_lists(task, lists)
+                else:
+                    sweep_lists(task, lists)
             for which in range(1 if counts.second is None else 2):
-                finish(task, which, spheres, met, beyond)
+                closed = bin_last_gaps(task, which) if in_bins else settle(task, which)
+                if closed > 0.0:
+                    solve_closed(task, spheres, met, which, int(closed))
+                if beyond is not None and counts.measured is not None:
+                    follow_measured(task, which, counts.measured, beyond)
+                if beyond is not None and counts.window is not None:
+                    follow_beyond(task, which, counts.window, beyond)
 
 
 @kernel
@@ -124,6 +117,7 @@ def scan_axes(
     position: FloatArray,
     radius: FloatArray,
     removed: BoolArray,
+    extent: Bounds,
     axes: Axes,
     clip: Clip,
     counts: Counts,
@@ -141,6 +135,8 @@ def scan_axes(
         Spheres; the window's centre is the origin.
     removed : shape (N,)
         Spheres that are not solid in the second set of solids.
+    extent : Bounds
+        Of the spheres.
     axes : Axes
         And the lines along them.
     clip : Clip
@@ -165,7 +161,7 @@ def scan_axes(
             return
         triad, offset, tally = axes.triads[axis], axes.offsets[axis], tallies[axis]
         whole = counts.whole is not None
-        grid = open_grid(position, radius, triad, offset, axes.spacing, clip.reach, whole)
+        grid = open_grid(extent, triad, offset, axes.spacing, clip.reach, whole)
         spheres = project(position, radius, removed, triad, grid)
         section = section_along(clip, triad)
         here = bins_along(bins, triad, axis)

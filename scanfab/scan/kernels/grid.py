@@ -59,22 +59,28 @@ def limit_row(grid: Grid, row: int, low_u: float, high_u: float) -> None:
     grid.high[row] = max(min(high, grid.columns), grid.low[row])
 
 
-@inner(fastmath={"nnan", "nsz", "reassoc"}, error_model="numpy")
-def shadow(
-    position: FloatArray, radius: FloatArray, side: FloatArray, low: float, high: float
-) -> tuple[float, float]:
-    """Where the spheres are along a side of the grid, and at least from low to high."""
-    x, y, z = side[0], side[1], side[2]
-    for k in range(np.uint64(radius.size)):
-        place = x * position[k, 0] + y * position[k, 1] + z * position[k, 2]
-        low, high = min(low, place - radius[k]), max(high, place + radius[k])
-    return low, high
+class Bounds(NamedTuple):
+    """A box and a ball about the origin that hold all spheres."""
+
+    centre: FloatArray
+    half: FloatArray
+    reach: float
+
+
+@inner()
+def shadow(extent: Bounds, side: FloatArray, low: float, high: float) -> tuple[float, float]:
+    """Where the spheres may be along a side of the grid, and at least from low to high."""
+    middle = half = 0.0
+    for i in range(3):
+        middle += extent.centre[i] * side[i]
+        half += extent.half[i] * abs(side[i])
+    low = min(low, max(middle - half, -extent.reach))
+    return low, max(high, min(middle + half, extent.reach))
 
 
 @inner()
 def open_grid(
-    position: FloatArray,
-    radius: FloatArray,
+    extent: Bounds,
     triad: FloatArray,
     offset: FloatArray,
     spacing: float,
@@ -89,9 +95,9 @@ def open_grid(
     """
     low_u = low_v = -reach
     high_u = high_v = reach
-    if whole:
-        low_u, high_u = shadow(position, radius, triad[0], low_u, high_u)
-        low_v, high_v = shadow(position, radius, triad[1], low_v, high_v)
+    if whole and extent.reach > 0.0:
+        low_u, high_u = shadow(extent, triad[0], low_u, high_u)
+        low_v, high_v = shadow(extent, triad[1], low_v, high_v)
     grid = cover(low_u, high_u, low_v, high_v, offset, spacing)
     if not whole:
         for row in range(grid.rows):
@@ -268,6 +274,13 @@ def sort_into_strips(spheres: Spheres, grid: Grid, rows: int) -> tuple[IntArray,
     Returns the start of each strip's list (one entry more than there are strips) and the lists.
     """
     start, chosen = np.zeros(-(-grid.rows // rows) + 2, np.int64), np.empty(0, np.int64)
+    if grid.rows <= rows:
+        # all of them
+        chosen = np.empty(spheres.u.size, np.int64)
+        for k in range(chosen.size):
+            chosen[k] = k
+        start[1] = chosen.size
+        return start[:2], chosen
     # first they are counted; where lists begin while they are filled, they end at last
     for fill in range(2):
         for k in range(spheres.u.size):

@@ -161,7 +161,9 @@ def solve_closed(task: Task, spheres: Spheres, chosen: IntArray, which: int, clo
             u = strip.first_u + column_of[number] * strip.spacing
             place = np.uint64(row * strip.pitch + column_of[number])
             line = u, v, lines[place + ENTRY], lines[place + EXIT]
-            order, end = np.arange(stop[number], stop[number + 1]), 0.0
+            order, end = np.empty(stop[number + 1] - stop[number], np.int64), 0.0
+            for k in range(order.size):
+                order[k] = stop[number] + k
             for sign in (-1.0, 1.0):
                 end = solve_line(task, which, line, chords, order, sign)
                 sort_by(chords[0], order)

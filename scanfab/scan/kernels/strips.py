@@ -89,6 +89,8 @@ class Clip(NamedTuple):
     """Shape (P, 4)."""
     isotropic: float
     deviator: FloatArray
+    size: float
+    """That of the quadric: no element of its matrix is greater."""
     level: float
     reach: float
 
@@ -186,7 +188,7 @@ def section_along(clip: Clip, triad: FloatArray) -> Section:
     u, v, n = triad[0], triad[1], triad[2]
     m, deviator = clip.isotropic, clip.deviator
     along, lean_u, lean_v = m + form(deviator, n, n), form(deviator, u, n), form(deviator, v, n)
-    flat = FLAT * (m + np.abs(deviator).max()) + LEAST
+    flat = FLAT * clip.size + LEAST
     if along < flat:
         along, lean_u, lean_v = flat, 0.0, 0.0
     lean_u, lean_v = lean_u / along, lean_v / along

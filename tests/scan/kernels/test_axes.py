@@ -4,8 +4,6 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numba import njit
 
 from scanfab import Solids, sphere
@@ -162,31 +160,6 @@ def sorted_order(values):
 def test_sweep_equals_the_slow_twin(kind):
     for seed in range(RUNS_OF_A_KIND):
         check_random_packing(kind, np.random.default_rng([seed, KINDS.index(kind)]))
-
-
-@given(
-    grains=st.lists(
-        st.tuples(*3 * [st.integers(-8, 8)], st.integers(1, 12), st.booleans()), max_size=12
-    ),
-    axis=st.tuples(*3 * [st.integers(-3, 3)]).filter(any),
-    seed=st.integers(0, 2**32 - 1),
-    cutoff=st.floats(0.0, 4.0),
-    window=st.floats(0.25, 3.0),
-    spacing=st.floats(0.4, 3.0),
-)
-@settings(max_examples=300, deadline=None, derandomize=True)
-def test_sweep_equals_the_slow_twin_for_any_grains(grains, axis, seed, cutoff, window, spacing):
-    table = np.array(grains, dtype=float).reshape(-1, 5)
-    direction = np.array(axis) / np.linalg.norm(axis)
-    assert_fast_equals_naive(
-        (0.25 * table[:, :3], 0.25 * table[:, 3]),
-        table[:, 4] > 0,
-        line_triads(direction[None])[0],
-        np.random.default_rng(seed).random(2),
-        spacing,
-        [cutoff * 1.0001 + 1e-7],
-        window,
-    )
 
 
 def check_a_chord_that_reaches_back_past_the_last_gap():
