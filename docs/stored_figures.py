@@ -11,7 +11,7 @@ from paper_tables import MAIN, table, usual_variant
 
 from scanfab.viz.figures.style import COLOURS, WIDTH, new_figure
 
-# of tests/campaigns/edges.py
+# of the table in docs/validation.md, "The window's surface"
 RV_SIZE = Path(__file__).parent / "rv_size.csv"
 # colour and marker of each rule, and how far beside the radius its errors stand
 RULES = {

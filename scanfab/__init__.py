@@ -2,181 +2,125 @@
 
 from __future__ import annotations
 
-# as typing has it, which takes longer to load than all that is needed to answer Ctrl-C
-TYPE_CHECKING = False
+# same as typing.TYPE_CHECKING; importing typing here would delay the answer to Ctrl-C. Jedi, which
+# completes names in notebooks and editors, skips the block below if the type is not written out.
+TYPE_CHECKING: bool = False
 
 if TYPE_CHECKING:
+    # for editors and type checkers: "as" says that a name is public
     from typing import Any
 
-    from scanfab.base.column import Column
-    from scanfab.base.convex import Convex
-    from scanfab.base.errors import (
-        NoFrameError,
-        PackingError,
-        ReadError,
-        ScanfabError,
-        ScanfabNote,
-        ScanfabWarning,
-        SettingsError,
-        UnknownFormatError,
-    )
-    from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron, sphere
-    from scanfab.fabric.contact import contact_fabric
-    from scanfab.fabric.tensor import FabricTensor
-    from scanfab.fabric.void import VoidFabric, void_fabric
-    from scanfab.io.convert import convert
-    from scanfab.io.follow import follow_series
-    from scanfab.io.frame import Frame
-    from scanfab.io.series import Series
-    from scanfab.io.sources import read, read_series
-    from scanfab.packing.cell import Cell
-    from scanfab.packing.contacts import ContactList, Contacts
-    from scanfab.packing.packing import Packing
-    from scanfab.packing.sample import Sample
-    from scanfab.packing.search import find_contacts
-    from scanfab.packing.window import Window
-    from scanfab.pipeline.calibration import Calibration, calibrate
-    from scanfab.pipeline.cluster import dask_executor
-    from scanfab.pipeline.compute import compute
-    from scanfab.pipeline.frames import samples
-    from scanfab.pipeline.maps.fabric_map import fabric_map
-    from scanfab.pipeline.measurement import solids_of
-    from scanfab.pipeline.merge import merge_tables
-    from scanfab.pipeline.settings import Settings
-    from scanfab.scan.directions import DirectionRule, direction_rule
-    from scanfab.scan.scan import ScanSums, scan_lines
-    from scanfab.scan.solids import Solids
-    from scanfab.table.columns import COLUMNS
-    from scanfab.table.compare import Comparison, compare_tables
-    from scanfab.table.formats import read_rows
-    from scanfab.table.row import Row
-    from scanfab.table.table import Table, load
-    from scanfab.viz.compute_file import compute_file
-    from scanfab.viz.report.report import Report, make_report
-    from scanfab.viz.scanned_frames import ScannedFrames, scan_frames
+    from scanfab.base.column import Column as Column
+    from scanfab.base.convex import Convex as Convex
+    from scanfab.base.errors import NoFrameError as NoFrameError
+    from scanfab.base.errors import PackingError as PackingError
+    from scanfab.base.errors import ReadError as ReadError
+    from scanfab.base.errors import ScanfabError as ScanfabError
+    from scanfab.base.errors import ScanfabNote as ScanfabNote
+    from scanfab.base.errors import ScanfabWarning as ScanfabWarning
+    from scanfab.base.errors import SettingsError as SettingsError
+    from scanfab.base.errors import UnknownFormatError as UnknownFormatError
+    from scanfab.base.shapes import box as box
+    from scanfab.base.shapes import cylinder as cylinder
+    from scanfab.base.shapes import ellipsoid as ellipsoid
+    from scanfab.base.shapes import polyhedron as polyhedron
+    from scanfab.base.shapes import sphere as sphere
+    from scanfab.fabric.contact import contact_fabric as contact_fabric
+    from scanfab.fabric.tensor import FabricTensor as FabricTensor
+    from scanfab.fabric.void import VoidFabric as VoidFabric
+    from scanfab.fabric.void import void_fabric as void_fabric
+    from scanfab.io.convert import convert as convert
+    from scanfab.io.follow import follow_series as follow_series
+    from scanfab.io.frame import Frame as Frame
+    from scanfab.io.series import Series as Series
+    from scanfab.io.sources import read as read
+    from scanfab.io.sources import read_series as read_series
+    from scanfab.packing.cell import Cell as Cell
+    from scanfab.packing.contacts import ContactList as ContactList
+    from scanfab.packing.contacts import Contacts as Contacts
+    from scanfab.packing.packing import Packing as Packing
+    from scanfab.packing.sample import Sample as Sample
+    from scanfab.packing.search import find_contacts as find_contacts
+    from scanfab.packing.window import Window as Window
+    from scanfab.pipeline.calibration import Calibration as Calibration
+    from scanfab.pipeline.calibration import calibrate as calibrate
+    from scanfab.pipeline.cluster import dask_executor as dask_executor
+    from scanfab.pipeline.compute import compute as compute
+    from scanfab.pipeline.frames import samples as samples
+    from scanfab.pipeline.maps.fabric_map import fabric_map as fabric_map
+    from scanfab.pipeline.measurement import solids_of as solids_of
+    from scanfab.pipeline.merge import merge_tables as merge_tables
+    from scanfab.pipeline.settings import Settings as Settings
+    from scanfab.scan.directions import DirectionRule as DirectionRule
+    from scanfab.scan.directions import direction_rule as direction_rule
+    from scanfab.scan.scan import ScanSums as ScanSums
+    from scanfab.scan.scan import scan_lines as scan_lines
+    from scanfab.scan.solids import Solids as Solids
+    from scanfab.table.columns import COLUMNS as COLUMNS
+    from scanfab.table.compare import Comparison as Comparison
+    from scanfab.table.compare import compare_tables as compare_tables
+    from scanfab.table.formats import read_rows as read_rows
+    from scanfab.table.row import Row as Row
+    from scanfab.table.table import Table as Table
+    from scanfab.table.table import load as load
+    from scanfab.viz.compute_file import compute_file as compute_file
+    from scanfab.viz.report.report import Report as Report
+    from scanfab.viz.report.report import make_report as make_report
+    from scanfab.viz.scanned_frames import ScannedFrames as ScannedFrames
+    from scanfab.viz.scanned_frames import scan_frames as scan_frames
 
-# numpy, numba and the readers are loaded by the first name that needs them
-_HOME = {
-    "COLUMNS": "table.columns",
-    "Calibration": "pipeline.calibration",
-    "Cell": "packing.cell",
-    "Column": "base.column",
-    "Comparison": "table.compare",
-    "ContactList": "packing.contacts",
-    "Contacts": "packing.contacts",
-    "Convex": "base.convex",
-    "DirectionRule": "scan.directions",
-    "FabricTensor": "fabric.tensor",
-    "Frame": "io.frame",
-    "NoFrameError": "base.errors",
-    "Packing": "packing.packing",
-    "PackingError": "base.errors",
-    "ReadError": "base.errors",
-    "Report": "viz.report.report",
-    "Row": "table.row",
-    "Sample": "packing.sample",
-    "ScanSums": "scan.scan",
-    "ScanfabError": "base.errors",
-    "ScanfabNote": "base.errors",
-    "ScanfabWarning": "base.errors",
-    "ScannedFrames": "viz.scanned_frames",
-    "Series": "io.series",
-    "Settings": "pipeline.settings",
-    "SettingsError": "base.errors",
-    "Solids": "scan.solids",
-    "Table": "table.table",
-    "UnknownFormatError": "base.errors",
-    "VoidFabric": "fabric.void",
-    "Window": "packing.window",
-    "box": "base.shapes",
-    "calibrate": "pipeline.calibration",
-    "compare_tables": "table.compare",
-    "compute": "pipeline.compute",
-    "compute_file": "viz.compute_file",
-    "convert": "io.convert",
-    "contact_fabric": "fabric.contact",
-    "cylinder": "base.shapes",
-    "dask_executor": "pipeline.cluster",
-    "direction_rule": "scan.directions",
-    "ellipsoid": "base.shapes",
-    "fabric_map": "pipeline.maps.fabric_map",
-    "find_contacts": "packing.search",
-    "follow_series": "io.follow",
-    "load": "table.table",
-    "make_report": "viz.report.report",
-    "merge_tables": "pipeline.merge",
-    "polyhedron": "base.shapes",
-    "read": "io.sources",
-    "read_rows": "table.formats",
-    "read_series": "io.sources",
-    "samples": "pipeline.frames",
-    "scan_frames": "viz.scanned_frames",
-    "scan_lines": "scan.scan",
-    "solids_of": "pipeline.measurement",
-    "sphere": "base.shapes",
-    "void_fabric": "fabric.void",
+# the modules of the public names; each is loaded, with numpy, numba or readers, by its first name
+_NAMES = {
+    "base.column": ["Column"],
+    "base.convex": ["Convex"],
+    "base.errors": [
+        "NoFrameError",
+        "PackingError",
+        "ReadError",
+        "ScanfabError",
+        "ScanfabNote",
+        "ScanfabWarning",
+        "SettingsError",
+        "UnknownFormatError",
+    ],
+    "base.shapes": ["box", "cylinder", "ellipsoid", "polyhedron", "sphere"],
+    "fabric.contact": ["contact_fabric"],
+    "fabric.tensor": ["FabricTensor"],
+    "fabric.void": ["VoidFabric", "void_fabric"],
+    "io.convert": ["convert"],
+    "io.follow": ["follow_series"],
+    "io.frame": ["Frame"],
+    "io.series": ["Series"],
+    "io.sources": ["read", "read_series"],
+    "packing.cell": ["Cell"],
+    "packing.contacts": ["ContactList", "Contacts"],
+    "packing.packing": ["Packing"],
+    "packing.sample": ["Sample"],
+    "packing.search": ["find_contacts"],
+    "packing.window": ["Window"],
+    "pipeline.calibration": ["Calibration", "calibrate"],
+    "pipeline.cluster": ["dask_executor"],
+    "pipeline.compute": ["compute"],
+    "pipeline.frames": ["samples"],
+    "pipeline.maps.fabric_map": ["fabric_map"],
+    "pipeline.measurement": ["solids_of"],
+    "pipeline.merge": ["merge_tables"],
+    "pipeline.settings": ["Settings"],
+    "scan.directions": ["DirectionRule", "direction_rule"],
+    "scan.scan": ["ScanSums", "scan_lines"],
+    "scan.solids": ["Solids"],
+    "table.columns": ["COLUMNS"],
+    "table.compare": ["Comparison", "compare_tables"],
+    "table.formats": ["read_rows"],
+    "table.row": ["Row"],
+    "table.table": ["Table", "load"],
+    "viz.compute_file": ["compute_file"],
+    "viz.report.report": ["Report", "make_report"],
+    "viz.scanned_frames": ["ScannedFrames", "scan_frames"],
 }
+_HOME = {name: module for module, names in _NAMES.items() for name in names}
 
-__all__ = [
-    "COLUMNS",
-    "Calibration",
-    "Cell",
-    "Column",
-    "Comparison",
-    "ContactList",
-    "Contacts",
-    "Convex",
-    "DirectionRule",
-    "FabricTensor",
-    "Frame",
-    "NoFrameError",
-    "Packing",
-    "PackingError",
-    "ReadError",
-    "Report",
-    "Row",
-    "Sample",
-    "ScanSums",
-    "ScanfabError",
-    "ScanfabNote",
-    "ScanfabWarning",
-    "ScannedFrames",
-    "Series",
-    "Settings",
-    "SettingsError",
-    "Solids",
-    "Table",
-    "UnknownFormatError",
-    "VoidFabric",
-    "Window",
-    "box",
-    "calibrate",
-    "compare_tables",
-    "compute",
-    "compute_file",
-    "contact_fabric",
-    "convert",
-    "cylinder",
-    "dask_executor",
-    "direction_rule",
-    "ellipsoid",
-    "fabric_map",
-    "find_contacts",
-    "follow_series",
-    "load",
-    "make_report",
-    "merge_tables",
-    "polyhedron",
-    "read",
-    "read_rows",
-    "read_series",
-    "samples",
-    "scan_frames",
-    "scan_lines",
-    "solids_of",
-    "sphere",
-    "void_fabric",
-]
+__all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> Any:

@@ -28,47 +28,50 @@ def script(words: str) -> str:
 
 
 @pytest.fixture
-def variables(tmp_path):
-    """Those of a shell that has the program on its path."""
+def start(tmp_path):
+    """Starts a command in a folder, with the program on its path and more variables."""
     program = tmp_path / "bin" / "scanfab"
     program.parent.mkdir()
-    program.write_text(
-        f"#!{sys.executable}\nfrom scanfab.cli.main import main\nmain()\n", encoding="utf-8"
-    )
+    program.write_text(f"#!{sys.executable}\nfrom scanfab.cli.main import main\nmain()\n")
     program.chmod(0o755)
-    root = str(Path(__file__).parents[1])
-    return {**os.environ, "PATH": f"{program.parent}:{os.environ['PATH']}", "PYTHONPATH": root}
+    path = f"{program.parent}:{os.environ['PATH']}"
+    environment = {**os.environ, "PATH": path, "PYTHONPATH": str(Path(__file__).parents[1])}
+
+    def start(*command: str, **more: str) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            command, cwd=tmp_path, env={**environment, **more}, start_new_session=True,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        )  # fmt: skip
+
+    return start
 
 
 @pytest.fixture
-def call(tmp_path, variables):
-    """Runs a command in a folder, to its end."""
+def call(start):
+    """Runs a command to its end."""
 
     def call(*command: str, **more: str) -> str:
-        done = subprocess.run(
-            command, cwd=tmp_path, env={**variables, **more}, capture_output=True, text=True
-        )
-        assert done.returncode == 0, done.stderr
-        return done.stdout + done.stderr
+        with start(*command, **more) as process:
+            said = process.communicate()[0]
+        assert process.returncode == 0, said
+        return said
 
     return call
 
 
 @pytest.fixture
-def interrupt(tmp_path, variables):
+def interrupt(start, tmp_path):
     """Starts a command, and sends it and all its children a signal when a file is there."""
 
     def interrupt(sent: signal.Signals, pattern: str, *command: str, **more: str) -> None:
-        with subprocess.Popen(
-            command, cwd=tmp_path, env={**variables, **more}, start_new_session=True,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        ) as process:  # fmt: skip
+        with start(*command, **more) as process:
             end = time.monotonic() + 60
             while not any(tmp_path.glob(pattern)):
                 assert time.monotonic() < end
                 time.sleep(0.005)
             os.killpg(process.pid, sent)
-            assert process.wait(60) != 0
+            process.communicate(timeout=60)
+        assert process.returncode != 0
 
     return interrupt
 

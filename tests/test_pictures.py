@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from scanfab.viz.figures.evolution import Evolution
+from scanfab.viz.figures.curves import Evolution
 from scanfab.viz.figures.page import drawn_page, make_figures
 from tests.conftest import ROOT
 from tests.helpers.tables import curve
@@ -50,24 +50,20 @@ def content(rows):
         return pictures.of_figure(page)
 
 
-def test_other_numbers_words_and_colours_are_told(monkeypatch):
+def test_other_numbers_words_and_sizes_are_told_and_last_digits_are_not(monkeypatch):
     """A test that could not fail would be worth nothing."""
     rows = curve()
     before = content(rows)
     assert pictures.differences(before, content(rows)) == []
     other = [{**row, "alpha_vs_axial": 1.01 * row["alpha_vs_axial"]} for row in rows]
-    assert pictures.differences(before, content(other))
-    assert pictures.differences(before, content(rows[:-1]))
     errors = [{**row, "alpha_c_axial_sample_se": 1e-3} for row in rows]
-    assert pictures.differences(before, content(errors))
+    for changed in (other, errors, rows[:-1]):
+        assert pictures.differences(before, content(changed))
     monkeypatch.setattr(Evolution, "height", 3.5)
     assert pictures.differences(before, content(rows))
     monkeypatch.undo()
-    monkeypatch.setattr("scanfab.viz.figures.groups.MEANINGS", {"c": "another word"})
+    monkeypatch.setattr("scanfab.viz.figures.curves.MEANINGS", {"c": "another word"})
     assert pictures.differences(before, content(rows))
-
-
-def test_last_digits_are_not_told():
     assert pictures.differences([1.0, "a", 0.0], [1.0 + 1e-5, "a", 1e-9]) == []
     assert pictures.differences([1.0, "a"], [1.01, "a"]) == ["1.0, now 1.01"]
     assert pictures.differences([1.0, "a"], [1.0, "b"]) == ["'a', now 'b'"]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import Cell, ContactList, Packing, Settings, sphere
+from scanfab import Cell, ContactList, Packing, Settings, direction_rule, sphere
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import Window
 from scanfab.pipeline.calibration import Calibration
@@ -22,66 +22,95 @@ from tests.helpers.lattices import shaken_cubic
 THIRD = 1.0 / 3.0
 
 
-@pytest.fixture
-def series(tmp_path):
+def test_of_a_series_and_its_frames(tmp_path):
     for step in (0, 10, 20):
         write(tmp_path / f"dump_{step}.txt", dump_text(step=step))
         write(tmp_path / f"pairs_{step}.txt", pairs_text(step=step))
-    return scanfab.read_series(tmp_path)
-
-
-def test_of_a_series(series):
+    series = scanfab.read_series(tmp_path)
     head = f"Series {series.name}: "
     files = " dump_*.txt (liggghts), contacts of pairs_*.txt"
-    assert repr(series) == f"{head}3 files{files}"
     part, last = series[1:], series[-1]
     assert repr(series) == f"{head}3 files{files}"
     assert repr(part) == f"{head}frames 1: of 3 files{files}"
     assert repr(series[:2:2]) == f"{head}frames 0:2:2 of 3 files{files}"
     assert repr(last) == f"Frame 2 of {series.name}: dump_20.txt, step 20"
-
-
-def test_of_a_damaged_frame(tmp_path):
-    write(tmp_path / "dump_0.txt", dump_text())
-    series = scanfab.read_series(tmp_path)
+    again = scanfab.read_series(tmp_path)
     (tmp_path / "dump_0.txt").unlink()
-    assert repr(series[0]) == f"Frame 0 of {series.name}: dump_0.txt, damaged"
+    assert repr(again[0]) == f"Frame 0 of {series.name}: dump_0.txt, step 0, damaged"
 
 
-def test_of_a_packing():
-    pairs = [[0, 1]]
-    row = [[0, 0, 0], [1, 0, 0], [2.1, 0, 0]]
-    assert repr(Packing(row, 0.5)) == "Packing: 3 particles of radius 0.5, contacts not known"
-    packing = Packing(row, [0.5, 0.5, THIRD], contacts=pairs, step=7, cell=Cell([9, 9, 9]))
-    assert repr(packing) == (
+PAIRS, ROW = [[0, 1]], [[0, 0, 0], [1, 0, 0], [2.1, 0, 0]]
+LARGE = Packing(ROW, [0.5, 0.5, THIRD], contacts=PAIRS, step=7, cell=Cell([9, 9, 9]))
+TENSOR = scanfab.FabricTensor(np.diag([0.3, 0.3, 0.4]))
+TENSORS = "FabricTensor: alpha 0.1, principal values 0.4, 0.3, 0.3, major axis (0, 0, 1)"
+ONES = np.ones((1, 3))
+VOID = scanfab.void_fabric(np.eye(3)[None], np.ones(3) / 3, ONES * [1.5, 1.5, 2], ONES)
+SOLIDS = scanfab.Solids(np.eye(3)[:2], np.ones(2), np.array([False, True]), window=sphere(2.0))
+OBJECTS = [
+    (Packing(ROW, 0.5), "Packing: 3 particles of radius 0.5, contacts not known"),
+    (
+        LARGE,
         "Packing: 3 particles of radius 0.3333 to 0.5, 1 contact from file, step 7\n"
-        "  Cell: 9 x 9 x 9 from (0, 0, 0), periodic"
-    )
-    assert repr(packing.contacts) == "Contacts: 1 contact from file"
-    assert repr(Packing(np.zeros((0, 3)), 1.0)) == "Packing: 0 particles, contacts not known"
-    assert repr(ContactList(pairs, force=[[0, 0, 1.0]])) == (
-        "ContactList: 1 contact from file, with forces"
-    )
+        "  Cell: 9 x 9 x 9 from (0, 0, 0), periodic",
+    ),
+    (LARGE.contacts, "Contacts: 1 contact from file"),
+    (Packing(np.zeros((0, 3)), 1.0), "Packing: 0 particles, contacts not known"),
+    (
+        ContactList(PAIRS, force=[[0, 0, 1.0]]),
+        "ContactList: 1 contact from file, with forces",
+    ),
+    (
+        Cell([1, 2, 4 * THIRD], (True, False, True), origin=(0, -1, 0)),
+        "Cell: 1 x 2 x 1.333 from (0, -1, 0), periodic along x and z",
+    ),
+    (
+        Cell([[1, 0, 0], [0.5, 1, 0], [0, 0, 1]], (False,) * 3),
+        "Cell: (1, 0, 0), (0.5, 1, 0), (0, 0, 1) from (0, 0, 0), not periodic",
+    ),
+    (sphere(2 * THIRD), "Convex: radius 0.666667 about the origin"),
+    (
+        Window(np.array([THIRD, 0, 0]), sphere(2.0)),
+        "Window: radius 2 about (0.3333, 0, 0) (dump's unit)",
+    ),
+    (
+        Sample(Packing(np.eye(3), 0.7, contacts=PAIRS), np.array([False, False, True]), 1),
+        "Sample: 2 grains, 0 rattlers (fewer than 1 contact); 1 boundary particle",
+    ),
+    (Sample(Packing(np.eye(3), 0.1), np.zeros(3, bool)), "Sample: 3 grains"),
+    (direction_rule("lebedev:11"), "DirectionRule lebedev:11: 25 axes, exact to degree 11"),
+    (
+        direction_rule("equal-angle-full:10"),
+        "DirectionRule equal-angle-full:10: 324 axes, of no degree, bias 0.17",
+    ),
+    (SOLIDS, "Solids: 2 spheres, 1 of them void in b and d, window of radius 2"),
+    (TENSOR, TENSORS),
+    (
+        VOID,
+        f"VoidFabric: mean length 1.667 (dump's unit), 1 replicate of 3 axes\n  {TENSORS}",
+    ),
+    (
+        Calibration((), ("A sentence.", "Another."), {"spacing": "0.25rmin"}),
+        "Calibration: 0 steps of variants\n  A sentence.\n  Another.\n"
+        "  recommended: spacing='0.25rmin'",
+    ),
+    (Report("x" * 1_234_567, True), "Report: an HTML page of 1.2 MB, with void fabric"),
+    (Report("x", False), "Report: an HTML page of 1e-06 MB, without any void fabric"),
+]
 
 
-def test_of_a_cell():
-    assert repr(Cell([1, 2, 4 * THIRD], (True, False, True), origin=(0, -1, 0))) == (
-        "Cell: 1 x 2 x 1.333 from (0, -1, 0), periodic along x and z"
-    )
-    tilted = Cell([[1, 0, 0], [0.5, 1, 0], [0, 0, 1]], (False,) * 3)
-    assert repr(tilted) == ("Cell: (1, 0, 0), (0.5, 1, 0), (0, 0, 1) from (0, 0, 0), not periodic")
+@pytest.mark.parametrize(("one", "shown"), OBJECTS, ids=[shown[:40] for _, shown in OBJECTS])
+def test_an_object_says_what_it_is(one, shown):
+    assert repr(one) == shown
 
 
-def test_of_windows_and_samples():
-    assert repr(sphere(2 * THIRD)) == "Convex: radius 0.666667 about the origin"
-    assert repr(Window(np.array([THIRD, 0, 0]), sphere(2.0))) == (
-        "Window: radius 2 about (0.3333, 0, 0) (dump's unit)"
+def test_of_a_scan():
+    lines = {"spacing": 0.5, "cutoff": 0.1, "variants": "cd"}
+    sums = scanfab.scan_lines(SOLIDS, direction_rule("3"), **lines)
+    kept, lines = sums.segments.sum(axis=(0, 2)), sums.lines.sum(axis=(0, 2))
+    assert repr(sums) == (
+        f"ScanSums: 16 replicates of 3 axes; segments kept: c {kept[2]} on {lines[2]} lines, "
+        f"d {kept[3]} on {lines[3]} lines"
     )
-    packing = Packing(np.eye(3), 0.7, contacts=[[0, 1]])
-    assert repr(Sample(packing, np.array([False, False, True]), 1)) == (
-        "Sample: 2 grains, 0 rattlers (fewer than 1 contact); 1 boundary particle"
-    )
-    assert repr(Sample(Packing(np.eye(3), 0.1), np.zeros(3, bool))) == "Sample: 3 grains"
 
 
 @pytest.mark.parametrize(
@@ -109,60 +138,13 @@ def test_of_settings_what_differs_which_makes_the_same_again(options, shown):
             assert getattr(again, one.name) == getattr(settings, one.name)
 
 
-def test_of_rules_of_directions():
-    rule = scanfab.direction_rule
-    assert repr(rule("lebedev:11")) == "DirectionRule lebedev:11: 25 axes, exact to degree 11"
-    assert repr(rule("equal-angle-full:10")) == (
-        "DirectionRule equal-angle-full:10: 324 axes, of no degree, bias 0.17"
-    )
-
-
-def test_of_a_scan():
-    removed = np.array([False, True])
-    solids = scanfab.Solids(np.eye(3)[:2], np.ones(2), removed, window=sphere(2.0))
-    assert repr(solids) == "Solids: 2 spheres, 1 of them void in b and d, window of radius 2"
-    sums = scanfab.scan_lines(
-        solids, scanfab.direction_rule("3"), spacing=0.5, cutoff=0.1, variants="cd"
-    )
-    kept = sums.segments.sum(axis=(0, 2))
-    lines = sums.lines.sum(axis=(0, 2))
-    assert repr(sums) == (
-        f"ScanSums: 16 replicates of 3 axes; segments kept: c {kept[2]} on {lines[2]} lines, "
-        f"d {kept[3]} on {lines[3]} lines"
-    )
-
-
-def test_of_fabric():
-    tensor = scanfab.FabricTensor(np.diag([0.3, 0.3, 0.4]))
-    shown = "FabricTensor: alpha 0.1, principal values 0.4, 0.3, 0.3, major axis (0, 0, 1)"
-    assert repr(tensor) == shown
-    ones = np.ones((1, 3))
-    fabric = scanfab.void_fabric(np.eye(3)[None], np.ones(3) / 3, ones * [1.5, 1.5, 2], ones)
-    assert repr(fabric) == (
-        f"VoidFabric: mean length 1.667 (dump's unit), 1 replicate of 3 axes\n  {shown}"
-    )
-
-
-def test_of_results():
-    found = Calibration((), ("A sentence.", "Another."), {"spacing": "0.25rmin"})
-    assert repr(found) == (
-        "Calibration: 0 steps of variants\n  A sentence.\n  Another.\n"
-        "  recommended: spacing='0.25rmin'"
-    )
-    assert repr(Report("x" * 1_234_567, True)) == "Report: an HTML page of 1.2 MB, with void fabric"
-    assert repr(Report("x", False)).endswith("without any void fabric")
-
-
 def test_of_none_is_as_long_as_its_arrays():
-    """Every public class, made of a real frame, says what it is in at most a few lines."""
+    """Public objects, made of a real frame, say what they are in at most a few lines."""
     spheres = shaken_cubic(np.random.default_rng(0), 6)
     packing = scanfab.find_contacts(Packing(spheres.position, spheres.radius))
     table = scanfab.compute(packing, variants="c", tolerance=0.01)
-    comparison = table.compare()
     series = scanfab.read_series(SAMPLE)
-    shown = [packing, packing.contacts, table, table[0], comparison, series, series[0]]
-    for one in shown:
-        assert type(one).__repr__ is not object.__repr__
+    for one in (packing, packing.contacts, table, table[0], table.compare(), series, series[0]):
         assert len(repr(one).splitlines()) <= 15, repr(one)
         assert not re.search(r"array\(|[1-9]\d*\.\d{6}|0\.0*[1-9]\d{5}", repr(one)), repr(one)
 

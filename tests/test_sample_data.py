@@ -24,24 +24,7 @@ SHELL = csv_rows(TRIAXIAL / "engine.csv")
 PLATES = csv_rows(BOX / "engine.csv")
 
 
-def triaxial(**options):
-    return scanfab.compute(
-        scanfab.read_series(TRIAXIAL, **options),
-        boundary="mask=3",
-        rv_radius=float(SHELL["rv_radius"][0]),
-        rv_center=(0.0, 0.0, 0.0),
-        **SCAN,
-    )
-
-
-def box(strain, **options):
-    return scanfab.compute(scanfab.read_series(BOX, **options), strain=strain, **SCAN)
-
-
-@pytest.fixture(scope="module")
-def triaxial_table():
-    with pytest.warns(scanfab.ScanfabNote, match="skipped .* neither grains nor contacts"):
-        return triaxial()
+GRAINS = ("grains", "contacts", "rattlers", "coordination")
 
 
 @pytest.fixture(scope="module")
@@ -54,9 +37,35 @@ def strain_file(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def box_table(strain_file):
+def series_options(strain_file):
+    """Of each sample: its folder, how it is computed, and the program's own numbers."""
+    rv = {"rv_radius": float(SHELL["rv_radius"][0]), "rv_center": (0.0, 0.0, 0.0)}
+    return {
+        "yade": (TRIAXIAL, {"boundary": "mask=3", **rv}, SHELL),
+        "liggghts": (BOX, {"strain": strain_file}, PLATES),
+    }
+
+
+@pytest.mark.parametrize("name", ["yade", "liggghts"])
+def test_the_numbers_of_the_program_are_met(series_options, name):
+    """Counts are exact, and the contact fabric and strain to the digits of the files."""
+    folder, options, engine = series_options[name]
     with pytest.warns(scanfab.ScanfabNote, match="skipped .* neither grains nor contacts"):
-        return box(strain_file)
+        table = scanfab.compute(scanfab.read_series(folder), **options, **SCAN)
+    frames = [(frame, variant) for frame in range(7) for variant in "abcd"]
+    assert [(row.frame, row.variant) for row in table] == frames
+    assert np.isfinite(table["alpha_vs"]).all()
+    assert np.isfinite(table["alpha_c"]).all()
+    assert set(table["contacts_from"].tolist()) == {"file"}
+    np.testing.assert_allclose(table["strain"], np.repeat(engine["strain"], 4), rtol=0, atol=1e-4)
+    whole, without, rv = (table.select(variant=variant) for variant in "abc")
+    for column in GRAINS:
+        np.testing.assert_allclose(whole[column], engine[column], rtol=1e-14, err_msg=column)
+    np.testing.assert_array_equal(without["grains"], engine["grains"] - engine["rattlers"])
+    assert_fabric(whole, engine, "gc")
+    if name == "yade":
+        np.testing.assert_array_equal(rv["contacts"], engine["contacts_rv"])
+        assert_fabric(rv, engine, "gcrv")
 
 
 def assert_fabric(table, engine, prefix):
@@ -66,84 +75,22 @@ def assert_fabric(table, engine, prefix):
         )
 
 
-@pytest.mark.parametrize("name", ["triaxial_table", "box_table"])
-def test_every_frame_has_all_variants_with_a_void_fabric(name, request):
-    table = request.getfixturevalue(name)
-    assert [(row.frame, row.variant) for row in table] == [
-        (frame, variant) for frame in range(7) for variant in "abcd"
-    ]
-    assert np.isfinite(table["alpha_vs"]).all()
-    assert np.isfinite(table["alpha_c"]).all()
-    assert set(table["contacts_from"].tolist()) == {"file"}
-
-
-def test_yades_counts_are_exact(triaxial_table):
-    whole = triaxial_table.select(variant="a")
-    np.testing.assert_array_equal(whole["grains"], SHELL["grains"])
-    np.testing.assert_array_equal(whole["contacts"], SHELL["contacts"])
-    np.testing.assert_array_equal(whole["rattlers"], SHELL["rattlers"])
-    np.testing.assert_array_equal(whole["coordination"], SHELL["coordination"])
-    rv = triaxial_table.select(variant="c")
-    np.testing.assert_array_equal(rv["contacts"], SHELL["contacts_rv"])
-
-
-def test_yades_contact_fabric_is_met(triaxial_table):
-    assert_fabric(triaxial_table.select(variant="a"), SHELL, "gc")
-    assert_fabric(triaxial_table.select(variant="c"), SHELL, "gcrv")
-
-
-def test_yades_strain_is_that_of_the_boundary(triaxial_table):
-    for variant in "abcd":
-        strain = triaxial_table.select(variant=variant)["strain"]
-        np.testing.assert_allclose(strain, SHELL["strain"], rtol=0, atol=1e-4)
-
-
-def test_removing_rattlers_removes_those_that_yade_counts(triaxial_table):
-    removed = triaxial_table.select(variant="b")
-    np.testing.assert_array_equal(removed["grains"], SHELL["grains"] - SHELL["rattlers"])
-
-
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
-def test_yades_contacts_are_found_by_geometry_but_for_a_few():
-    whole = triaxial(contacts="geometric").select(variant="a")
+@pytest.mark.parametrize("name", ["yade", "liggghts"])
+def test_contacts_are_found_by_geometry_but_for_a_few(series_options, name):
+    folder, options, engine = series_options[name]
+    series = scanfab.read_series(folder, contacts="geometric")
+    whole = scanfab.compute(series, variants="a", **options, **SCAN)
     assert set(whole["contacts_from"].tolist()) == {"geometric"}
-    assert np.abs(whole["contacts"] - SHELL["contacts"]).max() <= 3
-    assert np.abs(whole["rattlers"] - SHELL["rattlers"]).max() <= 3
-
-
-def test_liggghts_counts_are_exact(box_table):
-    whole = box_table.select(variant="a")
-    np.testing.assert_array_equal(whole["step"], PLATES["step"])
-    np.testing.assert_array_equal(whole["grains"], PLATES["grains"])
-    np.testing.assert_array_equal(whole["contacts"], PLATES["contacts"])
-    np.testing.assert_array_equal(whole["rattlers"], PLATES["rattlers"])
-    np.testing.assert_allclose(whole["coordination"], PLATES["coordination"], rtol=1e-14)
-
-
-def test_liggghts_contact_fabric_is_met(box_table):
-    assert_fabric(box_table.select(variant="a"), PLATES, "gc")
-
-
-def test_liggghts_strain_comes_from_a_file(box_table):
-    strain = box_table.select(variant="a")["strain"]
-    np.testing.assert_allclose(strain, PLATES["strain"], rtol=0, atol=1e-4)
+    for column in ("contacts", "rattlers"):
+        assert np.abs(whole[column] - engine[column]).max() <= 3
 
 
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
-def test_the_extent_of_the_grains_follows_the_plates():
-    strain = box("grains").select(variant="a")["strain"]
-    np.testing.assert_allclose(strain, PLATES["strain"], rtol=0, atol=1e-2)
-
-
-@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
-def test_without_walls_in_the_table_there_is_no_strain_by_itself():
-    assert np.isnan(box("auto")["strain"]).all()
-
-
-@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
-def test_liggghts_contacts_are_found_by_geometry_but_for_a_few(strain_file):
-    whole = box(strain_file, contacts="geometric").select(variant="a")
-    assert np.abs(whole["contacts"] - PLATES["contacts"]).max() <= 3
+def test_without_walls_in_the_table_the_extent_of_the_grains_tells_the_strain_if_asked():
+    for strain, expected in (("grains", PLATES["strain"]), ("auto", np.full(7, np.nan))):
+        found = scanfab.compute(scanfab.read_series(BOX), strain=strain, variants="a", **SCAN)
+        np.testing.assert_allclose(found["strain"], expected, rtol=0, atol=1e-2)
 
 
 @pytest.mark.parametrize(
@@ -194,7 +141,6 @@ def test_the_small_yade_states_have_their_true_numbers(prefix, grains, contacts,
 
 
 POURED, SHEARED = SAMPLE_DATA / "liggghts_clumps", SAMPLE_DATA / "yade_clumps"
-COUNTS = ("contacts", "rattlers", "coordination")
 
 
 def assert_counts(packing, engine):
@@ -250,7 +196,7 @@ def test_tables_of_clumps_have_the_counts_of_the_programs():
         table = scanfab.compute(scanfab.read_series(source), variants="ab", **SCAN)
         engine = csv_rows(name / "engine.csv")
         whole, without = table.select(variant="a"), table.select(variant="b")
-        for column in ("grains", *COUNTS):
+        for column in GRAINS:
             np.testing.assert_allclose(whole[column], engine[column], rtol=1e-14)
         np.testing.assert_array_equal(without["grains"], engine["grains"] - engine["rattlers"])
 

@@ -10,10 +10,10 @@ from typing import get_args, get_origin, get_type_hints
 
 from scanfab.base.errors import ScanfabError
 
-# With so many significant digits every number that is written reads back the same. No more can be
-# asked for; manifests list only what differs from it.
+# With 17 significant digits every float reads back as the same number; users cannot ask for more.
+# Manifests list the digits only if they differ from this.
 DEFAULT_DIGITS = 17
-# the unit of all lengths: that of the dump, as nothing is converted
+# all lengths are in the unit of the dump; nothing is converted
 LENGTH = "length"
 
 
@@ -30,11 +30,11 @@ class Column:
     name : str
         As scripts know it.
     kind : type
-        ``int``, ``float`` or ``str``; a value that does not exist is None in any column. ``list``
-        where rows are written as JSON alone.
+        ``int``, ``float`` or ``str``; ``list`` only in tables that are written as JSON. A missing
+        value is None in any column.
     unit : str
-        ``"length"`` is that of the dump, ``"time"`` likewise; empty for names, numbers of things
-        and what is dimensionless.
+        ``"length"`` and ``"time"`` are the units of the dump; empty for names, counts and
+        dimensionless numbers.
     meaning : str
         What the column holds, for the documentation.
 
@@ -58,19 +58,19 @@ def numbers(meanings: Mapping[str, str], unit: str = "") -> tuple[Column, ...]:
 
 class NoColumnError(ScanfabError, KeyError, AttributeError):
     """
-    A column that does not exist, asked for by key or as an attribute; names the nearest.
+    A row or table has no column of this name; the message suggests the most similar one.
 
-    It takes the name that was asked for, and those that there are.
+    Its arguments are the name that was asked for and the names of all columns.
     """
 
     def __str__(self) -> str:
-        # only where it is shown: most are raised in ``row.get(name)``, which asks often
+        # made only when the error is shown: ``row.get(name)`` raises many that nobody sees
         return no_column(*self.args)
 
 
 def no_column(name: object, known: Iterable[str]) -> str:
     """
-    What to tell somebody who names a column that does not exist.
+    The message for a name that no column has.
 
     Examples
     --------
@@ -87,9 +87,9 @@ def no_column(name: object, known: Iterable[str]) -> str:
 @cache
 def columns_of_fields(kind: type) -> tuple[Column, ...]:
     """
-    The columns of a dataclass whose fields are annotated with meaning and, where it has one, unit.
+    The columns of a dataclass, one for each field, with the meaning and unit of its annotation.
 
-    ``radius: Annotated[float, "of the smallest grain", LENGTH]`` is such a field.
+    An example of a field is ``radius: Annotated[float, "of the smallest grain", LENGTH]``.
 
     Examples
     --------

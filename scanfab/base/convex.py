@@ -1,9 +1,9 @@
 """
 Convex regions about the origin: what lies in them, and how much of them.
 
-A region is the image of a body under a linear map. The map makes every ellipsoid of the ball of
-radius 1, every box of a cube, and carries over what is known of the body in closed form: a window
-that deforms with its sample needs no formula of its own. The bodies are in shapes.py.
+A region is the image of a body under a linear map. The map makes every ellipsoid from the ball of
+radius 1 and every box from a cube, and it carries over the closed formulas of the body, so that a
+window that deforms with its sample needs no formula of its own.
 
 A region in a plane is spanned by the map's first two columns; the third is the unit normal. Its
 volume is an area, and its areas are lengths.
@@ -16,66 +16,22 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scanfab.base.bodies import AXES, POINTS, Hull, Product, on_circle, on_sphere
 from scanfab.base.typing import BoolArray, FloatArray
 
-# steps towards the nearest place of a region, and what of a distance is rounding
+# steps towards the nearest place of a region, and the share of a distance that may be rounding
 STEPS, ROUNDING = 200, 1e-12
-# points of curved surfaces, and directions over which a shadow is averaged
-POINTS, POINTS_OF_A_RIM, AXES = 2000, 128, 200
-
-
-def on_sphere() -> FloatArray:
-    """Points of the sphere of radius 1 along a spiral; all have a like share of its surface."""
-    z = 1.0 - (2.0 * np.arange(POINTS) + 1.0) / POINTS
-    turn = np.arange(POINTS) * np.pi * (3.0 - np.sqrt(5.0))
-    across = np.sqrt(1.0 - z**2)
-    return np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
-
-
-def on_circle() -> FloatArray:
-    """Points of the circle of radius 1 about z."""
-    turn = np.arange(POINTS_OF_A_RIM) * 2.0 * np.pi / POINTS_OF_A_RIM
-    return np.column_stack([np.cos(turn), np.sin(turn), np.zeros(POINTS_OF_A_RIM)])
-
-
-class Body:
-    """A convex body with the origin inside, by its constants and three functions of its own."""
-
-    planes: FloatArray
-    """Of its flat faces: rows n, d with the body on the side n·x < d, shape (P, 4)."""
-    form: FloatArray = np.zeros(3)
-    """Of its curved face, x·M x < 1: the diagonal of M, shape (3,); zeros without one."""
-    volume: float
-    """With edges and radii of the body itself."""
-    outline: FloatArray
-    """Points of its surface whose hull it is; of a curved one nearly; shape (K, 3)."""
-    is_symmetric: bool = True
-    """Whether with x also -x lies in it."""
-    is_flat: bool = False
-    """Whether it lies in a plane; what lies above and below it counts as inside."""
-
-    def support(self, along: FloatArray) -> FloatArray:
-        """The place in the body that is furthest along each vector, shape (N, 3)."""
-        raise NotImplementedError
-
-    def reach(self, frame: FloatArray) -> float:
-        """No place of its image, frame @ x, is further away from the origin."""
-        return float(np.linalg.norm(self.outline @ frame.T, axis=1).max())
-
-    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-        """As :meth:`scanfab.Convex.overlap`, moved by ``length * shift``, shifts of any length."""
-        raise NotImplementedError
 
 
 class Quadric(NamedTuple):
     """
-    The places x with x·(m I + D) x below a level; of a sphere D = 0, however its axes are turned.
+    The places x with x·(m I + D) x below a level; D = 0 for a sphere, however its axes are turned.
     """
 
     isotropic: float
     """m, not negative."""
     deviator: FloatArray
-    """D, symmetric, shape (3, 3); no eigenvalue of it is below -m."""
+    """D, symmetric, shape (3, 3), no eigenvalue below -m."""
     level: float
     """Above 0: the origin lies inside."""
 
@@ -85,7 +41,7 @@ class Quadric(NamedTuple):
         return self.isotropic * np.eye(3) + self.deviator
 
 
-# of a region of planes alone
+# the quadric of a region that only planes bound
 EVERYWHERE = Quadric(0.0, np.zeros((3, 3)), 1.0)
 
 
@@ -94,8 +50,8 @@ class Convex:
     """
     A convex region about the origin, bounded; its surface is not part of it.
 
-    Planes and quadric are all that decides what lies in it; the body and the frame of which it is
-    the image tell volume, shadow and surface, and what becomes of it when it is deformed.
+    Planes and quadric alone decide which places lie in it. Volume, shadow and surface follow from
+    the body and the frame whose image it is, and so does the region after a deformation.
 
     Parameters
     ----------
@@ -110,11 +66,11 @@ class Convex:
     reach : float
         Radius of the ball about the origin that holds the region; of a sphere its own.
     size : str
-        How messages tell its size, for instance ``radius 2``.
-    body : Body
-        What it is the image of.
+        Its size in messages, for instance ``radius 2``.
+    body : Product or Hull
+        The body whose image it is.
     frame : ndarray, shape (3, 3)
-        It holds the places frame @ x with x in the body.
+        The region holds the places frame @ x with x in the body.
 
     Examples
     --------
@@ -132,7 +88,7 @@ class Convex:
     high: FloatArray
     reach: float
     size: str
-    body: Body
+    body: Product | Hull
     frame: FloatArray
 
     def __repr__(self) -> str:
@@ -143,22 +99,22 @@ class Convex:
 
     @property
     def is_sphere(self) -> bool:
-        """Whether all its diameters are equal; that of a plane is a circle."""
+        """Whether all its diameters are equal; in a plane it is then a circle."""
         return not len(self.planes) and not self.quadric.deviator.any()
 
     @property
     def is_flat(self) -> bool:
-        """Whether it is one of a plane, across which the third column of the frame stands."""
+        """Whether it lies in a plane; the third column of the frame is then the normal."""
         return self.body.is_flat
 
     @property
     def volume(self) -> float:
-        """Dump's length unit, cubed; of a plane the area."""
+        """Volume, in the dump's length unit cubed; in a plane the area."""
         return float(self.body.volume * abs(np.linalg.det(self.frame)))
 
     @property
     def mean_shadow(self) -> float:
-        """Projected area in the mean of all directions, to some per cent; of a plane a length."""
+        """Mean projected area over all directions, within some per cent; in a plane a length."""
         axes = on_sphere()[:: POINTS // AXES]
         if self.is_flat:
             axes = on_circle()[:, :2] @ np.linalg.qr(self.frame[:, :2])[0].T
@@ -166,7 +122,7 @@ class Convex:
 
     @property
     def outline(self) -> FloatArray:
-        """Points of the surface whose hull it is; of a curved one nearly; shape (K, 3)."""
+        """Points of the surface, shape (K, 3), whose hull is the region, or nearly so if curved."""
         return self.body.outline @ self.frame.T
 
     def contains(self, points: FloatArray) -> BoolArray:
@@ -185,7 +141,7 @@ class Convex:
         isotropic, deviator, level = self.quadric
         form = isotropic * np.einsum("ij,ij->i", points, points)
         form += np.einsum("ij,ij->i", points @ deviator, points)
-        # of the roots, as distances are compared everywhere else
+        # roots are compared, as distances are everywhere else, so that rounding is the same
         inside = np.sqrt(form) < np.sqrt(level)
         for plane in self.planes:
             inside &= points @ plane[:3] < plane[3]
@@ -193,7 +149,7 @@ class Convex:
 
     def share(self, start: FloatArray, branch: FloatArray) -> FloatArray:
         """
-        Which part of each straight piece lies inside.
+        Which share of each straight piece lies inside.
 
         Parameters
         ----------
@@ -232,7 +188,7 @@ class Convex:
 
     def may_meet(self, points: FloatArray, radius: FloatArray) -> BoolArray:
         """
-        Which spheres reach inside; at times one that all but touches.
+        Which spheres reach inside; a sphere that nearly touches may count too.
 
         Parameters
         ----------
@@ -250,7 +206,7 @@ class Convex:
             near &= points @ plane[:3] < plane[3] + radius
         if self.is_sphere:
             return np.asarray(near)
-        # Past an edge, or a quadric that is no sphere, these are too many. For a centre p outside,
+        # Near an edge, or a quadric that is no sphere, these are too many. For a centre p outside,
         # walk from a place x inside as near to p as the way to the place furthest along p - x
         # allows. The distance of p is at most |p - x|, and at least that of the plane through the
         # furthest place; a sphere between the two after all steps may reach inside.
@@ -260,7 +216,7 @@ class Convex:
         for _ in range(STEPS):
             toward = points[left] - at
             distance, furthest = np.linalg.norm(toward, axis=1), self.support(toward)
-            # a place on the surface may be reached, and then is no distance away
+            # the distance is 0 once the walk has reached a centre on the surface
             over = np.where(distance > 0.0, distance, 1.0)
             missed = np.einsum("ij,ij->i", points[left] - furthest, toward) / over >= radius[left]
             near[left[missed]] = False
@@ -276,7 +232,7 @@ class Convex:
 
     def support(self, along: FloatArray) -> FloatArray:
         """
-        The place that is furthest along each vector.
+        The place of the region that is furthest along each vector.
 
         Parameters
         ----------
@@ -291,7 +247,7 @@ class Convex:
 
     def overlap(self, axes: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
         """
-        What it shares with itself moved along axes, and how fast that falls.
+        The volume that the region shares with itself moved along axes, and how fast it falls.
 
         Parameters
         ----------
@@ -314,7 +270,7 @@ class Convex:
 
     def meets_itself(self, shift: FloatArray) -> bool:
         """
-        Whether it overlaps itself moved by a vector.
+        Whether the region overlaps its copy that is moved by a vector.
 
         Parameters
         ----------
@@ -326,7 +282,7 @@ class Convex:
         bool
         """
         if self.body.is_symmetric:
-            # the middle of two places of a symmetric region, x and -x + shift, is half the shift
+            # if any place lies in both, so does the middle of the two centres, half the shift
             return bool(self.contains(0.5 * shift[None])[0])
         from scipy.optimize import linprog
 
@@ -357,7 +313,7 @@ class Convex:
         return image_of(self.body, gradient @ self.frame, f"deformed, first {self.size}")
 
 
-def image_of(body: Body, frame: FloatArray, size: str) -> Convex:
+def image_of(body: Product | Hull, frame: FloatArray, size: str) -> Convex:
     """The places frame @ x with x in the body."""
     inverse = np.linalg.inv(frame)
     planes = np.column_stack([body.planes[:, :3] @ inverse, body.planes[:, 3]])
@@ -365,10 +321,10 @@ def image_of(body: Body, frame: FloatArray, size: str) -> Convex:
     quadric = EVERYWHERE
     if body.form.any():
         form = inverse.T @ np.diag(body.form) @ inverse
-        # an isotropic part of 1, of whatever unit lengths are
+        # scaled to an isotropic part of 1, whatever the unit of length
         level = 3.0 / np.trace(form)
         quadric = Quadric(1.0, level * form - np.eye(3), float(level))
-    # the support along x, y, z; those of -x, -y, -z are not its opposites in every body
+    # the supports along -x, -y, -z are not those along x, y, z with the other sign in every body
     along = np.concatenate([np.eye(3), -np.eye(3)])
     ends = np.einsum("ij,ij->i", body.support(along @ frame) @ frame.T, along)
     reach = body.reach(frame)

@@ -1,4 +1,4 @@
-"""What has to be done before the process ends, also where a signal ends it at once."""
+"""Steps that must be taken before the process ends, also when a signal ends it at once."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ def undone_at_end(step: Step) -> Iterator[None]:
 
 
 if hasattr(os, "register_at_fork"):
-    # what a forked process inherits is left to its parent
+    # a forked process leaves the steps that it inherits to its parent
     os.register_at_fork(after_in_child=_steps.clear)
 
 
 @atexit.register
 def finish() -> None:
-    """Do what is left to be done; the last that was asked for comes first."""
+    """Take all steps that are left; the one that was asked for last comes first."""
     while _steps:
         with suppress(OSError):
             _steps.pop()()

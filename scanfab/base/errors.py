@@ -1,7 +1,7 @@
 """
-What users are told: errors and warnings, one kind for each thing that they can mend, and notes.
+Errors and warnings, a class for each kind of problem that a user can mend, and notes.
 
-A note is data about a frame; whoever faces the user makes sentences of it.
+A note is data about a frame; the command line and the report make sentences of it.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class SettingsError(ScanfabError):
 
 
 class DimensionError(SettingsError):
-    """An option of three dimensions meets discs, or the other way round: wrong usage."""
+    """An option for spheres was given for discs, or the other way round: wrong usage."""
 
 
 class ScanfabWarning(UserWarning):
@@ -58,15 +58,15 @@ class Note(NamedTuple):
     """One thing that a user should know."""
 
     code: str
-    """What it is about, for programs: the same for all notes of one kind."""
+    """The kind of the note, for programs."""
     text: str
-    """The sentence, which speaks of arguments as the library calls them."""
+    """The sentence; it names arguments as the library does."""
     variants: tuple[str, ...] = ()
-    """The variants that it is about; none if it is about the whole frame."""
+    """The variants that the note is about; empty if it is about the whole frame."""
 
     def told(self, where: str) -> str:
         """
-        The sentence with what it is about.
+        The sentence behind the frame and variants that it is about.
 
         Examples
         --------
@@ -92,7 +92,7 @@ def note(text: str) -> None:
 
 
 def joined(notes: Iterable[Note]) -> tuple[Note, ...]:
-    """The notes with each sentence once, of all variants that it is about."""
+    """Notes with the same sentence become one note about all their variants."""
     variants: dict[tuple[str, str], dict[str, None]] = {}
     for code, text, about in notes:
         variants.setdefault((code, text), {}).update(dict.fromkeys(about))

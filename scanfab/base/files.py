@@ -1,7 +1,7 @@
 """
-Files: what a path is, writing whole or not at all, locks.
+Files: what kind a path is, files that are written completely or not at all, and locks.
 
-The memory that a process can still get is here, too: it says whether a file can be read.
+The memory that the process can still get is here too, as it decides whether a file can be read.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import IO
 from scanfab.base.ending import undone_at_end
 from scanfab.base.errors import ReadError, ScanfabError, SettingsError
 
-# pipes, devices and sockets are no files: whoever opens one may wait for ever
+# reading from a pipe, a device or a socket may wait for ever
 KINDS = {stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
 KINDS |= {stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
 # pipes that a shell or another program has opened for this process
@@ -31,11 +31,11 @@ CONTAINER = Path("/sys/fs/cgroup/memory.max")
 
 
 def kind_of(path: Path) -> str | None:
-    """What a path is that is neither a file nor a folder; None if it is one, or nothing."""
+    """The kind of a pipe, socket or device; None for a file, a folder and a path to nothing."""
     try:
         return KINDS.get(stat.S_IFMT(path.stat().st_mode))
     except OSError:
-        return None  # whoever opens it says why
+        return None  # opening the path fails with a reason
 
 
 def check_file(path: Path, expected: str = "a file", instead: str = "") -> None:
@@ -51,7 +51,7 @@ def check_file(path: Path, expected: str = "a file", instead: str = "") -> None:
 
 
 def check_folder(path: Path) -> None:
-    """SettingsError if there is no folder that a file of this name can be written to."""
+    """SettingsError if the folder of a file does not exist or cannot be written to."""
     if kind_of(path) is not None:
         return
     if not path.parent.is_dir():
@@ -63,16 +63,16 @@ def check_folder(path: Path) -> None:
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """
-    A file beside the wanted one, to be written, that takes its place if all goes well.
+    A temporary file beside the wanted one; it takes its place when the block ends without error.
 
-    A pipe or a device is written to as it is.
+    A pipe or a device is written to directly.
     """
     if kind_of(path) is not None:
         with named_errors(path):
             yield path
         return
-    # some libraries tell the format by the suffix, so it stays at the end; the random part keeps
-    # processes that write the same file apart
+    # Libraries know the format by the suffix, so it stays at the end. The random part keeps apart
+    # processes that write the same file.
     part = path.with_name(f"{path.stem[:60]}.{os.urandom(4).hex()}.part{path.suffix}")
     remove = partial(part.unlink, missing_ok=True)
     with named_errors(path, part), undone_at_end(remove):
@@ -85,7 +85,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def named_errors(name: Path | str, part: Path | None = None) -> Iterator[None]:
-    """Let errors of the system name this file where they name none, or its unfinished part."""
+    """Errors of the system name this file if they name none or only its unfinished part."""
     try:
         yield
     except OSError as error:
@@ -97,10 +97,10 @@ def named_errors(name: Path | str, part: Path | None = None) -> Iterator[None]:
 @contextmanager
 def locked(path: Path) -> Iterator[IO[bytes]]:
     """
-    Open a file, which is made if it is not there, and keep other runs away until it is closed.
+    Open a file, which is created if it does not exist, and lock it until it is closed.
 
-    The system drops the lock with the process, however it ends. A file system that has no locks
-    keeps nobody away. If another run writes to the file, a ScanfabError says so.
+    The system releases the lock when the process ends, however it ends. On a file system without
+    locks nothing is locked. If another run holds the lock, a ScanfabError says so.
     """
     with named_errors(path):
         stream = open(path, "ab")  # noqa: SIM115
@@ -115,7 +115,7 @@ def locked(path: Path) -> Iterator[IO[bytes]]:
                 import fcntl
 
                 fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # the run that had the lock may have ended just now, and renamed the file
+            # the run that held the lock may just have ended and renamed the file
             is_free = path.exists() and os.path.samestat(os.fstat(stream.fileno()), path.stat())
         except OSError as error:
             is_free = not isinstance(error, BlockingIOError | PermissionError)
@@ -128,19 +128,19 @@ def locked(path: Path) -> Iterator[IO[bytes]]:
 
 
 def free_memory() -> int:
-    """Bytes that this process can get at most: of the machine, its container, its own limit."""
+    """Bytes that this process can still get: the least of machine, container and own limit."""
     found = [sys.maxsize if (own := address_space()) is None else own]
     with suppress(OSError):
         text = Path("/proc/meminfo").read_text("ascii")
         found += [int(kB) << 10 for kB in re.findall(r"MemAvailable:\s*(\d+) kB", text)]
-    # not every process is in a container, and one without a limit has the word "max"
+    # without a container there is no such file, and without a limit it says "max"
     with suppress(OSError, ValueError):
         found.append(int(CONTAINER.read_text("ascii")))
     return max(min(found), 0)
 
 
 def address_space() -> int | None:
-    """What ``ulimit -v`` leaves to this process; None without such a limit."""
+    """Bytes that ``ulimit -v`` leaves to this process; None without this limit."""
     try:
         import resource
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import ast
 import inspect
 import math
+import sys
 import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
-from functools import partial, wraps
+from functools import cache, partial, wraps
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -17,6 +18,7 @@ from typing import Any, ParamSpec, TypeVar
 from scanfab.base.errors import SettingsError
 
 Parse = Callable[[str, Any], Any]
+Floats = tuple[float, ...]
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -24,8 +26,6 @@ R = TypeVar("R")
 GROUPS = ("reading", "sample", "window", "scan", "fabric", "output")
 # what the command line makes of a text, by the type of the field; of all other types a text
 KINDS: dict[str, type] = {"int": int, "float": float, "bool": bool, "Path": Path}
-# the options of dataclasses that have been asked for them
-_known: dict[type, tuple[Option, ...]] = {}
 
 
 def unusable(name: str, expected: str, found: object) -> SettingsError:
@@ -57,14 +57,14 @@ class Option:
     """Makes what is kept of an option's name and value; it takes what is kept as well."""
     choices: Sequence[str] | Callable[[], Iterable[str]] = ()
     """What a shell offers. Without a parser, no other words will do."""
-    metavar: str | None = None
-    """The form of its value; by default the choices."""
+    also: str = ""
+    """What it takes beside its choices, such as FILE: then a shell offers files too."""
+    metavar: str = ""
+    """The form of its value, where :attr:`form` would say too little."""
     spelling: str = ""
     """On the command line, where it does not follow from the name."""
     several: bool = False
     """Whether the command line takes it more than once."""
-    files: bool = False
-    """Whether a shell offers files too."""
     first: bool = False
     """Whether it stands among the few that most need."""
     decides: bool = True
@@ -74,6 +74,12 @@ class Option:
     def flag(self) -> str:
         """As the command line spells it."""
         return self.spelling or flag_of(self.name)
+
+    @property
+    def form(self) -> str:
+        """The form of its value, such as ``auto|cell|FILE``; empty if any will do."""
+        words = () if callable(self.choices) else (*self.choices, self.also)
+        return self.metavar or "|".join(filter(None, words))
 
 
 def flag_of(name: str) -> str:
@@ -92,10 +98,10 @@ def flag_of(name: str) -> str:
 def option(parse: Parse | None = None, **declaration: Any) -> Any:
     """A field of a dataclass that declares an option, by the attributes of :class:`Option`."""
     choices = declaration.get("choices")
+    if parse is None and isinstance(choices, tuple):
+        parse = one_of(*choices)
     if parse is not None:
         declaration["parse"] = parse
-    elif isinstance(choices, tuple):
-        declaration |= {"parse": one_of(*choices), "metavar": "|".join(choices)}
     return field(default=declaration.get("default"), metadata=declaration)
 
 
@@ -105,38 +111,30 @@ reading, sample, window, scan, fabric = (partial(option, group=group) for group 
 running = partial(option, decides=False)
 
 
-def changed(holder: type, name: str, **changes: Any) -> Any:
-    """A field that declares an option of another dataclass once more, with some changes."""
-    (declared,) = (one.metadata for one in fields(holder) if one.name == name)
-    return option(**{**declared, **changes})
-
-
 def options_of(holder: type) -> tuple[Option, ...]:
     """The options that the fields of a dataclass declare."""
-    if holder not in _known:
-        texts = dict(pair for one in reversed(holder.__mro__) for pair in _docstrings(one))
-        kinds = {one.name: str(one.type).removesuffix(" | None") for one in fields(holder)}
-        _known[holder] = tuple(
-            Option(one.name, KINDS.get(kinds[one.name], str), texts[one.name], **one.metadata)
-            for one in fields(holder)
-        )
-    return _known[holder]
+    helps: dict[str, str] = {}
+    for one in reversed(holder.__mro__[:-1]):
+        helps |= _docstrings(one.__module__).get(one.__name__, {})
+    kinds = [KINDS.get(str(one.type).removesuffix(" | None"), str) for one in fields(holder)]
+    return tuple(
+        Option(one.name, kind, helps[one.name], **one.metadata)
+        for one, kind in zip(fields(holder), kinds, strict=True)
+    )
 
 
-def _docstrings(holder: type) -> Iterable[tuple[str, str]]:
-    """The fields of a class, with the docstrings below them, which only its source has."""
-    module = inspect.getmodule(holder)
-    # to find the lines of one class would take longer than all of the module
-    tree = ast.parse("" if module is None or holder is object else inspect.getsource(module))
-    classes = (one for one in tree.body if isinstance(one, ast.ClassDef))
-    bodies = [one.body for one in classes if one.name == holder.__name__]
-    for place, below in (pair for body in bodies for pair in pairwise(body)):
-        match place, below:
-            case (
-                ast.AnnAssign(target=ast.Name(id=name)),
-                ast.Expr(value=ast.Constant(value=str(text))),
-            ):
-                yield name, " ".join(text.split())
+@cache
+def _docstrings(module: str) -> dict[str, dict[str, str]]:
+    """The docstrings below the fields of each class of a module, which only the source has."""
+    return {
+        holder.name: {
+            ast.unparse(field.target): " ".join(ast.literal_eval(below.value).split())
+            for field, below in pairwise(holder.body)
+            if isinstance(field, ast.AnnAssign) and isinstance(below, ast.Expr)
+        }
+        for holder in ast.parse(inspect.getsource(sys.modules[module])).body
+        if isinstance(holder, ast.ClassDef)
+    }
 
 
 def refuse_unknown(what: str, given: Iterable[str], known: Sequence[str]) -> None:
@@ -155,35 +153,35 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
     The function refuses names that are no options, and in its docstring the help of the options, in
     the order of the signature and with its types, stands in place of ``{options}``.
     """
+    declared = {one.name: one for one in options}
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         parameters = inspect.signature(function).parameters
-        declared = {one.name: one for one in options}
 
         @wraps(function)
         def call(*args: P.args, **kwargs: P.kwargs) -> R:
             refuse_unknown(function.__name__, kwargs, list(parameters))
             return function(*args, **kwargs)
 
-        documented = [
-            _documented(declared[one.name], one.annotation)
-            for one in parameters.values()
-            if one.name in declared
+        helps = [
+            _documented(declared[name], one.annotation)
+            for name, one in parameters.items()
+            if name in declared
         ]
         text = inspect.cleandoc(function.__doc__ or "")
-        call.__doc__ = text.replace("{options}", "\n".join(documented))
+        call.__doc__ = text.replace("{options}", "\n".join(helps))
         return call
 
     return decorate
 
 
-def _documented(option: Option, takes: str) -> str:
-    """An option as numpydoc has a parameter."""
-    form = option.metavar or ""
+def _documented(option: Option, annotation: str) -> str:
+    """An option as numpydoc writes a parameter."""
+    form = option.form
     # a single word such as FILE says no more than the type does
     written = f" Written as ``{form}``." if set("|:,") & set(form) else ""
     text = textwrap.fill(option.help + written, 92, break_on_hyphens=False)
-    return f"{option.name} : {takes}, optional\n{textwrap.indent(text, '    ')}"
+    return f"{option.name} : {annotation}, optional\n{textwrap.indent(text, '    ')}"
 
 
 def number(expected: str, holds: Callable[[float], bool]) -> Parse:
@@ -203,19 +201,17 @@ def number(expected: str, holds: Callable[[float], bool]) -> Parse:
 
 def whole(expected: str, holds: Callable[[int], bool]) -> Parse:
     """A parser of one whole number."""
+    parse_float = number(expected, lambda found: found.is_integer() and holds(int(found)))
 
     def parse(name: str, value: Any) -> int:
-        found = number(expected, float.is_integer)(name, value)
+        found = parse_float(name, value)
         # a float would round a large integer
-        exact = value if isinstance(value, int) else int(found)
-        if not holds(exact):
-            raise unusable(name, expected, value)
-        return exact
+        return value if isinstance(value, int) else int(found)
 
     return parse
 
 
-def numbers(expected: str, holds: Callable[[tuple[float, ...]], bool]) -> Parse:
+def numbers(expected: str, holds: Callable[[Floats], bool]) -> Callable[[str, Any], Floats]:
     """A parser of several finite numbers, in a text between commas or blanks or in a sequence."""
 
     def parse(name: str, value: Any) -> tuple[float, ...]:

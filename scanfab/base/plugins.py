@@ -1,4 +1,4 @@
-"""What packages offer under an entry point."""
+"""Plugins that installed packages offer under an entry point."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Offer(NamedTuple):
 
 def having(expected: str, **members: Any) -> Callable[[Any], Any]:
     """
-    Of plugins that are objects: raises TypeError for one without these members, or a class.
+    A check of plugins: it raises TypeError for a class, or for an object without these members.
 
     Examples
     --------
@@ -44,16 +44,16 @@ def load_plugins(group: str, what: str, make: Callable[[Any], Any]) -> dict[str,
     """
     The objects that packages offer, by name and in alphabetical order.
 
-    One that cannot be loaded is a warning with its name, so that it spoils nothing else.
+    A plugin that cannot be loaded is left out with a warning, so that the others still work.
 
     Parameters
     ----------
     group : str
         The entry point, for instance ``scanfab.fabrics``.
     what : str
-        What one of them is called in a message.
+        How messages call such a plugin.
     make : callable
-        Turns into a plugin what is loaded, or raises where it is none.
+        Makes a plugin of a loaded object, or raises if the object is none.
 
     Raises
     ------

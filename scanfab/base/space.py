@@ -1,4 +1,4 @@
-"""The space that grains lie in, all of it or a coordinate plane, and the constants of each."""
+"""The space that grains lie in, three-dimensional or a coordinate plane, with its constants."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from scanfab.base.typing import FloatArray
 
 class Space:
     """
-    All space, or the coordinate plane in which all grains are discs.
+    Three-dimensional space, or the coordinate plane in which all grains are discs.
 
-    The difference between the two stands here and nowhere else. In a plane a ball is a disc, a
+    All differences between the two stand here. In a plane a ball is a disc, a
     volume an area, and lines of one direction lie side by side, not in a grid.
 
     Parameters
     ----------
     across : int, optional
-        The coordinate that is the same all over the plane: 0, 1 or 2 for x, y or z.
+        The coordinate that is constant in the plane: 0, 1 or 2 for x, y or z.
 
     Examples
     --------
@@ -36,25 +36,25 @@ class Space:
         self.is_plane = flat
         self.dimension = 2 if flat else 3
         self.along: tuple[int, ...] = (0, 1, 2)
-        """Its coordinates; of a plane in the order that makes x-y, y-z and z-x alike."""
+        """Its coordinates; in a plane in the order that makes x-y, y-z and z-x alike."""
         if across is not None:
             self.along = (across + 1) % 3, (across + 2) % 3
         self.name = "-".join("xyz"[k] for k in sorted(self.along))
-        """The coordinates along it, as users name them: ``x-y``."""
+        """Its coordinates as users name them: ``x-y``."""
         self.basis: FloatArray = np.eye(3)[[*self.along, *([] if across is None else [across])]]
-        """Unit vectors along these coordinates, of a plane with its normal last, shape (3, 3)."""
+        """Unit vectors along its coordinates, the normal of a plane last, shape (3, 3)."""
         self.normal: FloatArray = self.basis[2]
-        """Of a plane, a unit vector, shape (3,)."""
+        """The unit vector across a plane, shape (3,)."""
         self.identity = np.diag([1.0 if k in self.along else 0.0 for k in range(3)])
-        """The unit tensor; 0 across a plane, shape (3, 3)."""
+        """The unit tensor, shape (3, 3); its component across a plane is 0."""
         self.second_order = 4.0 if flat else 7.5
         """F = 15/2 (G - I/3) is the second order of a density of directions; 4 (G - I/2)."""
         self.intensity = 0.5 if flat else 1.5
         """a = √(3/2 F:F), in a plane √(1/2 F:F)."""
         self.ball = np.pi if flat else 4.0 / 3.0 * np.pi
-        """The volume of a ball of radius 1, of a disc the area."""
+        """The volume of a ball of radius 1; in a plane the area of a disc."""
         self.unit_shadow = 2.0 if flat else np.pi
-        """What lines of one direction meet of a ball of radius 1: an area, of a disc a length."""
+        """The projected area of a ball of radius 1; in a plane the width of a disc."""
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Space) and self.across == other.across
@@ -77,21 +77,21 @@ class Space:
         return self.dimension / (self.dimension - 1.0) * cosine2 - 1.0 / (self.dimension - 1.0)
 
     def volume(self, radius: FloatArray, share: FloatArray | float = 1.0) -> FloatArray:
-        """Of balls, or a share of each; of discs the area."""
+        """The volumes of balls, or of a share of each; in a plane the areas of discs."""
         if self.across is None:
             return np.asarray(share * 4.0 / 3.0 * np.pi * radius**3)
         return np.asarray(share * np.pi * radius**2)
 
     def shadow(self, radius: FloatArray) -> float:
-        """The sum of the shadows of balls, as lines of one direction see them."""
+        """The sum of the projected areas of balls; in a plane of the widths of discs."""
         return self.unit_shadow * float(np.sum(radius ** (self.dimension - 1)))
 
     def lines(self, shadow: float, spacing: float) -> float:
-        """How many lines of one direction meet what has a shadow."""
+        """How many lines of one direction meet a body of this projected area."""
         return shadow / spacing ** (self.dimension - 1)
 
     def apart(self, factor: float) -> float:
-        """How much further apart lines are that are fewer by a factor."""
+        """By how much the spacing of lines grows when their number falls by a factor."""
         return math.sqrt(factor) if self.across is None else factor
 
 

@@ -1,4 +1,4 @@
-"""Numbers in messages, as short as they still say what is meant."""
+"""Numbers in messages, as short as is still clear."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 def counted(number: int, one: str, several: str = "") -> str:
     """
-    A number of things.
+    A number with the word for what is counted.
 
     Examples
     --------
@@ -20,7 +20,7 @@ def counted(number: int, one: str, several: str = "") -> str:
 
 def shortest(value: float) -> str:
     """
-    A number as short as reads back the same.
+    The shortest text that reads back as the same number.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def spelt_place(values: Iterable[float]) -> str:
 
 def spelt_time(seconds: float) -> str:
     """
-    A time to wait, to about a tenth.
+    A time to wait, rounded to about a tenth.
 
     Examples
     --------
@@ -61,7 +61,7 @@ def spelt_time(seconds: float) -> str:
 
 def spelt_apart(value: float, limit: float) -> tuple[str, str]:
     """
-    Two numbers with two digits, or as many as tell them apart.
+    Two numbers with two digits, or with as many as are needed to tell them apart.
 
     Examples
     --------

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import asdict, replace
 from itertools import groupby
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.console import is_readable, print_csv, print_rows, target
-from scanfab.cli.options import EXCERPT, READING, SAMPLE, WINDOW, check_plot, options
-from scanfab.cli.sources import SourceCommand, checked, open_one, source_argument
-from scanfab.cli.talk import announce_compiling, talk_options, tell_inputs, working
+import scanfab
+from scanfab.cli.console import announce, draw, is_readable, print_csv, print_rows, working
+from scanfab.cli.options import SourceCommand, checked, excerpt_of, open_one, options, take_output
 from scanfab.pipeline.options import as_options
 
 if TYPE_CHECKING:
@@ -36,11 +34,10 @@ STAY = 6
 
 
 @click.command(cls=SourceCommand)
-@source_argument
-@options(*READING, *SAMPLE)
+@options("READING", "SAMPLE")
 @options("frame", default=-1, help="Which frame, as in the fabric table (default: last).")
 @options("variants", default="cd")
-@options(*WINDOW, "edge", "cutoff")
+@options("WINDOW", "edge", "cutoff")
 @options("spacing", help="Of the ladder of directions (default: 0.25rmin).")
 @options("directions", help="Of the ladder of spacings (default: icosahedral:9).")
 @options(
@@ -49,17 +46,8 @@ STAY = 6
     "the recommended settings.",
 )
 @options("max_chords", help="Steps that would cut more chords from grains than this are left out.")
-@options("axis", "strain", "seed", "workers", "output", *EXCERPT, "plot")
-@talk_options
-def calibrate(
-    source: str,
-    output: Path | None,
-    plot: Path | None,
-    frame: int,
-    fields: str | None,
-    digits: int,
-    **chosen: Any,
-) -> int:
+@options("axis", "strain", "seed", "workers", "output", "EXCERPT", "plot")
+def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
     """
     Show how the void fabric of one frame changes with spacing, directions, cut-off and RV.
 
@@ -72,34 +60,29 @@ def calibrate(
     """
     from scanfab.base.column import columns_of_fields
     from scanfab.pipeline.calibration import StepRow
-    from scanfab.pipeline.calibration import calibrate as calibrate_series
     from scanfab.pipeline.record import asked_for
     from scanfab.pipeline.repeat import repeat_command
-    from scanfab.pipeline.settings import Settings
     from scanfab.table.writing import write_rows
-    from scanfab.viz.figures.page import make_figures, save_figures
 
-    check_plot(plot, None)
+    asked = take_output(chosen)
     columns = columns_of_fields(StepRow)
-    reading, settings = checked(chosen, Settings)
-    excerpt = target(output, columns, fields, digits)
-    announce_compiling()
-    series = open_one((source,), reading, "calibrated")
-    tell_inputs([series], settings.workers)
+    reading, settings = checked(chosen, scanfab.Settings)
+    excerpt = excerpt_of(asked, columns)
+    series = open_one(sources, reading, "calibrated")
+    announce([series], settings.workers)
     with working():
-        found = calibrate_series(series, frame=frame, **vars(settings))
+        found = scanfab.calibrate(series, frame=frame, **vars(settings))
     rows = [replace(row, note=as_options(row.note)) for row in found.rows]
-    usual = Settings()
+    usual = scanfab.Settings()
     best: Any = {"max_chords": usual.max_chords, "tolerance": usual.tolerance, **found.options}
-    command = repeat_command(asked_for([source], reading, replace(settings, **best)))
-    if output is not None:
-        write_rows(output, rows, columns, excerpt)
-    if plot is not None:
-        save_figures(plot, make_figures(rows, "calibration"))
-    tells_all = output is not None or is_readable()
+    command = repeat_command(asked_for(sources, reading, replace(settings, **best)))
+    if asked.output is not None:
+        write_rows(asked.output, rows, columns, excerpt)
+    draw(asked, rows, "calibration")
+    tells_all = asked.output is not None or is_readable()
     if not tells_all:
         print_csv(rows, excerpt, columns)
-    elif output is None:
+    elif asked.output is None:
         _print(rows)
     # behind rows on standard output, what they show goes beside them
     for sentence in (*found.findings, command):

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.console import Command, is_readable, print_csv, print_rows, target
-from scanfab.cli.options import EXCERPT, OF_SEVERAL, check_labels, check_plot, options
-from scanfab.cli.talk import talk_options
+import scanfab
+from scanfab.cli.console import Command, draw, is_readable, print_csv, print_rows
+from scanfab.cli.options import (
+    OF_SEVERAL,
+    check_labels,
+    excerpt_of,
+    options,
+    tables_argument,
+    take_output,
+)
 
 if TYPE_CHECKING:
     from scanfab.table.compare import Comparison
@@ -31,39 +37,20 @@ MOST_BARS = 15
 
 
 @click.command(cls=Command)
-@click.argument(
-    "tables",
-    metavar="TABLE...",
-    nargs=-1,
-    required=True,
-    type=click.Path(exists=True, dir_okay=False, allow_dash=True),
-)
+@tables_argument(allow_dash=True)
 @click.option("--summary", is_flag=True, help="One row per source and variant: slopes and peaks.")
 @click.option(
     "--differences", is_flag=True, help="One row per frame and pair of variants: how far apart."
 )
 @options("strain_max")
 @options("cutoff", **OF_SEVERAL)
-@options("labels", "output", *EXCERPT, "plot")
+@options("labels", "output", "EXCERPT", "plot")
 @options(
     "figure",
     help="Which figure: evolution, normalised, correlation or columns:NAME,NAME (default: all on "
     "one page).",
 )
-@talk_options
-def compare(
-    tables: tuple[str, ...],
-    summary: bool,
-    differences: bool,
-    strain_max: float | None,
-    cutoff: float | None,
-    labels: tuple[str, ...],
-    output: Path | None,
-    fields: str | None,
-    digits: int,
-    plot: Path | None,
-    figure: str | None,
-) -> int:
+def compare(tables: tuple[str, ...], summary: bool, differences: bool, **chosen: Any) -> int:
     """
     Set the variants of fabric tables side by side.
 
@@ -71,35 +58,30 @@ def compare(
     input. Per frame: both anisotropies, also divided by their own largest absolute value; with
     --summary, per source and variant: the slope of void on contact fabric. On a terminal both.
     """
-    from scanfab.base.errors import SettingsError
-    from scanfab.table.compare import compare_tables
-    from scanfab.table.formats import read_rows
     from scanfab.table.selection import choose_rows
     from scanfab.table.writing import ALL, write_rows
-    from scanfab.viz.figures.page import make_figures, save_figures
 
-    check_plot(plot, figure, "table")
+    asked = take_output(chosen, "table")
     if summary and differences:
         raise click.UsageError("--summary and --differences are two tables: ask for one of them")
-    check_labels(labels, tables)
-    read = [(table, read_rows(table)) for table in tables]
-    rows = [row for one in choose_rows(read, cutoff, labels) for row in one]
-    comparison = compare_tables(rows, strain_max=strain_max)
-    chosen = comparison.frames
+    check_labels(chosen["labels"], tables)
+    read = [(table, scanfab.read_rows(table)) for table in tables]
+    rows = [row for one in choose_rows(read, chosen["cutoff"], chosen["labels"]) for row in one]
+    comparison = scanfab.compare_tables(rows, strain_max=chosen["strain_max"])
+    found = comparison.frames
     if summary or differences:
-        chosen = comparison.summary if summary else comparison.differences
-    if not chosen:
+        found = comparison.summary if summary else comparison.differences
+    if not found:
         lacking = "two variants of one frame" if comparison.frames else "frames"
-        raise SettingsError(f"there is nothing to compare: the tables hold no {lacking}")
-    excerpt = target(output, chosen.columns, fields, digits)
-    if output is not None:
-        write_rows(output, chosen, chosen.columns, excerpt)
+        raise scanfab.SettingsError(f"there is nothing to compare: the tables hold no {lacking}")
+    excerpt = excerpt_of(asked, found.columns)
+    if asked.output is not None:
+        write_rows(asked.output, found, found.columns, excerpt)
     elif is_readable() and not differences and excerpt == ALL:
         print_comparison(comparison)
     else:
-        print_csv(chosen, excerpt, chosen.columns)
-    if plot is not None:
-        save_figures(plot, make_figures(rows, "table", figure, comparison=comparison))
+        print_csv(found, excerpt, found.columns)
+    draw(asked, rows, "table", comparison=comparison)
     return 0 if any(row.alpha_vs_axial is not None for row in comparison.frames) else 1
 
 

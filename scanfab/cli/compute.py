@@ -6,18 +6,13 @@ from typing import Any
 
 import click
 
-from scanfab.cli.options import in_order, options
-from scanfab.cli.sources import SourceCommand, sources_argument
-from scanfab.cli.talk import talk_options
+from scanfab.cli.options import SourceCommand, in_order, options
 from scanfab.pipeline.options import OPTIONS
 
 
 @click.command(cls=SourceCommand)
-@sources_argument
 @options(*in_order(OPTIONS))
-@talk_options
-@click.pass_context
-def compute(ctx: click.Context, /, sources: tuple[str, ...], **chosen: Any) -> int:
+def compute(sources: tuple[str, ...], **chosen: Any) -> int:
     """
     Compute the fabric table: one row per frame and variant.
 
@@ -35,4 +30,4 @@ def compute(ctx: click.Context, /, sources: tuple[str, ...], **chosen: Any) -> i
     from scanfab.cli.rows import write_table
     from scanfab.pipeline.settings import Settings
 
-    return write_table(ctx, sources, chosen, Settings, "table", "frames")
+    return write_table(sources, chosen, Settings)

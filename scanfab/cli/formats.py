@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import click
 
 from scanfab.cli.console import Command, print_rows
@@ -12,16 +10,17 @@ from scanfab.cli.console import Command, print_rows
 @click.command(cls=Command)
 def formats() -> None:
     """List every reader and writer, its extensions, and the package it comes from."""
-    from scanfab.io.reader import installed_readers
+    from scanfab.io.reader import installed_readers, lacking
     from scanfab.io.writer import installed_writers
     from scanfab.table.formats import known_formats
     from scanfab.viz.figures.style import PLOT_FORMATS
 
-    lines = [
-        (kind, name, " ".join(one.plugin.extensions), one.package, _described(one.plugin))
-        for kind, offers in (("reader", installed_readers()), ("writer", installed_writers()))
-        for name, one in offers.items()
-    ]
+    lines = []
+    for kind, offers in (("reader", installed_readers()), ("writer", installed_writers())):
+        for name, offer in offers.items():
+            plugin, advice = offer.plugin, lacking(offer.plugin)
+            about = plugin.description + (f" (not installed: {advice})" if advice else "")
+            lines.append((kind, name, " ".join(plugin.extensions), offer.package, about))
     for suffix, one in known_formats().items():
         package = type(one).__module__.split(".")[0]
         lines.append(("table", suffix.lstrip("."), suffix, package, one.description))
@@ -34,11 +33,3 @@ def formats() -> None:
     titles = ("kind", "name", "extensions", "package", "description")
     rows = [dict(zip(titles, line, strict=True)) for line in lines]
     print_rows(rows, titles, len(titles))
-
-
-def _described(plugin: Any) -> str:
-    """What it is, and how to get the package that it needs."""
-    from scanfab.io.reader import lacking
-
-    advice = lacking(plugin)
-    return f"{plugin.description}{'' if advice is None else f' (not installed: {advice})'}"

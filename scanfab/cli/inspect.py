@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.console import spelt
-from scanfab.cli.options import READING, SAMPLE, WINDOW, options
-from scanfab.cli.sources import SourceCommand, checked, open_series, sources_argument
-from scanfab.cli.talk import announce_compiling, talk_options, tell_inputs, working
+import scanfab
+from scanfab.cli.console import announce, spelt, working
+from scanfab.cli.options import SourceCommand, checked, open_series, options
 from scanfab.pipeline.options import as_options
 
 if TYPE_CHECKING:
@@ -19,10 +18,8 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=SourceCommand)
-@sources_argument
-@options(*READING, "frames", *SAMPLE, *WINDOW)
+@options("READING", "frames", "SAMPLE", "WINDOW")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line and frame.")
-@talk_options
 def inspect(sources: tuple[str, ...], as_json: bool, **chosen: Any) -> int:
     """
     Show what the reader sees in each frame: grains, radii, contacts, rattlers, cell, columns,
@@ -31,12 +28,10 @@ def inspect(sources: tuple[str, ...], as_json: bool, **chosen: Any) -> int:
     Nothing is computed; contacts are found by geometry where no file lists them.
     """
     from scanfab.pipeline.inspection import inspect_series
-    from scanfab.pipeline.settings import Settings
 
-    reading, settings = checked(chosen, Settings)
-    announce_compiling()
+    reading, settings = checked(chosen, scanfab.Settings)
     every = open_series(sources, reading)
-    tell_inputs(every, settings.workers)
+    announce(every, settings.workers)
 
     def frames() -> int:
         return sum(len(range(one.frames_expected())[settings.frames]) for one in every)
@@ -59,10 +54,4 @@ def _print(report: FrameReport) -> None:
     told = fields.pop("warnings")
     click.echo(click.style(title, bold=True))
     for name, value in [*fields.items(), *(("warning", text) for text in told)]:
-        click.echo(f"  {name:<13} {_spell(value)}")
-
-
-def _spell(value: Any) -> str:
-    if isinstance(value, list):
-        return ", ".join(_spell(item) for item in value)
-    return spelt(value, 6)
+        click.echo(f"  {name:<13} {spelt(value, 6)}")

@@ -18,16 +18,11 @@ def main(args: list[str] | None = None) -> None:
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         # without a word until we can say one
         signal.signal(signal.SIGINT, signal.SIG_DFL)
-    from scanfab.cli.signals import catch_signals, flush_streams, ignore_signals, leave_at_once
+    from scanfab.cli.signals import catch_signals, leave
 
     catch_signals()
     _prepare_streams()
-    code = run(sys.argv[1:] if args is None else args)
-    ignore_signals()
-    if code:
-        flush_streams()
-        leave_at_once(code)
-    sys.exit(code)
+    leave(run(sys.argv[1:] if args is None else args))
 
 
 def _prepare_streams() -> None:
@@ -48,7 +43,7 @@ def run(args: list[str]) -> int:
     """The command line's exit code; errors become one message on standard error."""
     import click
 
-    from scanfab.base.errors import DimensionError, ScanfabError
+    from scanfab.base.errors import DimensionError
     from scanfab.cli.group import cli
     from scanfab.cli.signals import interrupted_words
 
@@ -65,37 +60,32 @@ def run(args: list[str]) -> int:
         click.echo(interrupted_words(signal.SIGINT), err=True)
         return 128 + signal.SIGINT
     except Exception as error:
-        if debug or not (isinstance(error, ScanfabError | OSError) or _lacks_memory(error)):
+        if debug or (message := _message(error)) is None:
             raise
-        click.echo(f"scanfab: error: {_describe(error)}", err=True)
+        click.echo(f"scanfab: error: {message}", err=True)
         return 2 if isinstance(error, DimensionError) else 1
 
 
-def _lacks_memory(error: Exception) -> bool:
-    """Whether there is no memory: libraries that cannot load their parts raise all kinds."""
-    from scanfab.base.files import address_space
-
-    space = address_space()
-    told = any(words in str(error) for words in ("failed to map", "can't start new thread"))
-    return isinstance(error, MemoryError) or told or (space is not None and space < LITTLE)
-
-
-def _describe(error: Exception) -> str:
-    """The message of an error, in the words of the command line."""
+def _message(error: Exception) -> str | None:
+    """What is said of an error; None for one that only a mistake in the program can raise."""
     import os
     from io import UnsupportedOperation
 
     from scanfab.base.errors import ScanfabError
+    from scanfab.base.files import address_space
     from scanfab.pipeline.options import as_options
 
     if isinstance(error, UnsupportedOperation):
         return "standard output is closed: name a file with -o"
-    if not isinstance(error, ScanfabError | OSError) and _lacks_memory(error):
-        return (
-            f"not enough memory ({str(error) or type(error).__name__}): fewer --workers need less, "
-            f"and ulimit -v shows the limit"
-        )
     if isinstance(error, OSError) and error.errno and error.strerror == os.strerror(error.errno):
         # whatever writes to files names them
         return f"{error.filename or 'standard output'}: {error.strerror}"
-    return as_options(error) or type(error).__name__
+    words = as_options(error) or type(error).__name__
+    if isinstance(error, ScanfabError | OSError):
+        return words
+    # without memory, libraries that cannot load their parts raise all kinds of errors
+    space, signs = address_space(), ("failed to map", "can't start new thread")
+    is_full = any(one in words for one in signs) or (space is not None and space < LITTLE)
+    advice = "fewer --workers need less, and ulimit -v shows the limit"
+    is_full |= isinstance(error, MemoryError)
+    return f"not enough memory ({words}): {advice}" if is_full else None

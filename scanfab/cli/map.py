@@ -6,18 +6,13 @@ from typing import Any
 
 import click
 
-from scanfab.cli.options import in_order, options
-from scanfab.cli.sources import SourceCommand, sources_argument
-from scanfab.cli.talk import talk_options
+from scanfab.cli.options import SourceCommand, in_order, options
 from scanfab.pipeline.options import MAP_OPTIONS
 
 
 @click.command(cls=SourceCommand)
-@sources_argument
-@options(*in_order(MAP_OPTIONS))
-@talk_options
-@click.pass_context
-def map(ctx: click.Context, /, sources: tuple[str, ...], **chosen: Any) -> int:
+@options(*in_order(MAP_OPTIONS), declared=MAP_OPTIONS)
+def map(sources: tuple[str, ...], **chosen: Any) -> int:
     """
     Fabric by place: a row for each frame, variant and block of the sample.
 
@@ -34,4 +29,4 @@ def map(ctx: click.Context, /, sources: tuple[str, ...], **chosen: Any) -> int:
     from scanfab.cli.rows import write_table
     from scanfab.pipeline.maps.settings import MapSettings
 
-    return write_table(ctx, sources, chosen, MapSettings, "map")
+    return write_table(sources, chosen, MapSettings)

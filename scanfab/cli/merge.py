@@ -8,7 +8,7 @@ import click
 
 from scanfab.cli.console import Command, is_readable, print_csv, print_table
 from scanfab.cli.options import options, usage_errors
-from scanfab.cli.talk import talk_options
+from scanfab.io.options import parse_frames
 
 
 @click.command(cls=Command)
@@ -17,7 +17,6 @@ from scanfab.cli.talk import talk_options
 )
 @options("output")
 @options("frames", help="Which frames the table is to have, as a Python slice (default: all).")
-@talk_options
 def merge(parts: tuple[Path, ...], output: Path | None, frames: str | None) -> int:
     """
     Merge the parts of job arrays into one table: the bytes of one run.
@@ -29,7 +28,6 @@ def merge(parts: tuple[Path, ...], output: Path | None, frames: str | None) -> i
     Job I of 8:  scanfab compute dumps/ --frames I::8 -o part_I.csv
     Then:        scanfab merge part_*.csv -o fabric.csv
     """
-    from scanfab.io.options import parse_frames
     from scanfab.pipeline.merge import check_no_part, merged
 
     with usage_errors():

@@ -8,19 +8,13 @@ from typing import Any
 
 import click
 
-from scanfab.cli.console import Command
-from scanfab.cli.options import OF_SEVERAL, check_labels, options, usage_errors
-from scanfab.cli.talk import announce_compiling, talk_options, working
+import scanfab
+from scanfab.cli.console import Command, announce, working
+from scanfab.cli.options import OF_SEVERAL, check_labels, options, tables_argument, usage_errors
 
 
 @click.command(cls=Command)
-@click.argument(
-    "tables",
-    metavar="TABLE...",
-    nargs=-1,
-    required=True,
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-)
+@tables_argument(path_type=Path)
 @options("output", callback=None, required=True, metavar="FILE.html", help="The report.")
 @click.option("--title", metavar="TEXT", help="Title (default: the sources' names).")
 @click.option(
@@ -28,7 +22,6 @@ from scanfab.cli.talk import announce_compiling, talk_options, working
 )
 @options("cutoff", **OF_SEVERAL)
 @options("labels")
-@talk_options
 def report(tables: tuple[Path, ...], output: Path, author: str | None, **chosen: Any) -> int:
     """
     Write a report on fabric tables: one HTML file that opens without a network.
@@ -37,14 +30,14 @@ def report(tables: tuple[Path, ...], output: Path, author: str | None, **chosen:
     come from TABLE.manifest.json beside it; without it, the report says that they are not known.
     """
     from scanfab.viz.report.page import check_page_file
-    from scanfab.viz.report.report import make_report
 
     check_labels(chosen["labels"], tables)
     with usage_errors():
         check_page_file(output)
-    announce_compiling()
+    announce()
+    author = _full_name() if author is None else author
     with working():
-        made = make_report(tables, author=_full_name() if author is None else author, **chosen)
+        made = scanfab.make_report(tables, author=author, **chosen)
     made.save(output)
     if not made.has_void_fabric:
         click.echo("scanfab: warning: no row of the tables has a void fabric", err=True)

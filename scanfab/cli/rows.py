@@ -3,44 +3,40 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.console import is_readable, print_csv, print_table, target
-from scanfab.cli.options import check_plot, usage_errors
+import scanfab
+from scanfab.cli.console import announce, draw, is_readable, print_csv, print_table, working
+from scanfab.cli.options import checked, excerpt_of, open_series, take_output, usage_errors
 from scanfab.cli.settings_file import as_listed
 from scanfab.cli.signals import ending_in_order, telling
-from scanfab.cli.sources import checked, open_series
-from scanfab.cli.talk import announce_compiling, tell_inputs, working
+from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.pipeline.options import Output
 from scanfab.pipeline.settings import Settings
 
 if TYPE_CHECKING:
-    from scanfab.io.series import Series
+    from scanfab import Series
     from scanfab.pipeline.job import Job
     from scanfab.table.writing import Excerpt
 
 
-def write_table(
-    ctx: click.Context,
-    sources: tuple[str, ...],
-    chosen: dict[str, Any],
-    kind: type[Settings],
-    *figures: str,
-) -> int:
+def write_table(sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Settings]) -> int:
     """
     Compute a table as the options of a command ask, write it, and draw it; returns the exit code.
 
-    ``kind`` are the settings of the table, and ``figures`` the kinds of data that may be drawn.
+    ``kind`` are the settings of the table.
     """
-    from scanfab.pipeline.cluster import dask_executor
     from scanfab.pipeline.job import Job
+    from scanfab.pipeline.record import asked_for
     from scanfab.viz.paraview import vtk_folders
 
-    asked = Output(**{name: chosen.pop(name) for name in vars(Output()) if name in chosen})
+    ctx = click.get_current_context()
+    figures = ("map",) if kind is MapSettings else ("table", "frames")
+    asked = take_output(chosen, *figures)
     cluster = asked.scheduler or asked.scheduler_file
-    check_plot(asked.plot, asked.figure, *figures)
     for is_wrong, words in (
         (asked.plot and chosen.get("cutoffs"), "--plot is of one cut-off: leave out --cutoffs"),
         (asked.resume and not asked.output, "--resume goes with -o FILE"),
@@ -50,28 +46,32 @@ def write_table(
         if is_wrong:
             raise click.UsageError(words)
     reading, settings = checked(chosen, kind)
-    excerpt = target(asked.output, settings.columns, asked.fields, asked.digits)
+    excerpt = excerpt_of(asked, settings.columns)
     follows = asked.follow or asked.follow_for is not None
-    series = [_followed(asked, sources, reading)] if follows else open_series(sources, reading)
+    if follows and (len(sources) > 1 or "-" in sources):
+        raise click.UsageError("--follow takes one folder, or one file that grows")
+    if follows:
+        followed = scanfab.follow_series(sources[0], seconds=asked.follow_for, **reading)
+        series: list[Series] = [followed]
+    else:
+        series = open_series(sources, reading)
     drawing = _Drawing(asked, figures)
     if drawing.kind == "frames" and len(series) > 1:
         raise click.UsageError(f"--figure {asked.figure} draws one series: name one source")
-    tell_inputs(series, settings.workers)
+    announce(series, settings.workers)
     with ExitStack() as stack:
         with usage_errors():
             executor = None
             if cluster:
-                dask = dask_executor(asked.scheduler, scheduler_file=asked.scheduler_file)
+                dask = scanfab.dask_executor(asked.scheduler, scheduler_file=asked.scheduler_file)
                 executor = stack.enter_context(dask)
-            announce_compiling()
             vtk, resume = asked.vtk, asked.resume
             job = Job(
                 series,
                 settings,
+                asked_for(sources, reading, settings, excerpt),
                 asked.output,
                 excerpt,
-                sources=sources,
-                reading=reading,
                 resume=resume,
                 manifest_path=asked.manifest,
                 more={"settings_file": listed} if (listed := as_listed(ctx)) else {},
@@ -81,57 +81,39 @@ def write_table(
             )
             stack.enter_context(job.begun(drawing.needed))
         if follows:
-            followed: Any = series[0]
             stack.enter_context(ending_in_order(followed.end))
             followed.idle = lambda: drawing.redraw(job)
-        _write_or_say(job, excerpt)
+        _write(job, excerpt)
     drawing.draw(job)
     return 0 if job.is_good else 1
 
 
-def _followed(asked: Output, sources: tuple[str, ...], reading: dict[str, Any]) -> Series:
-    """The series that is still being written; it may hold no frames yet."""
-    from scanfab.io.follow import follow_series
-
-    if len(sources) > 1 or "-" in sources:
-        raise click.UsageError("--follow takes one folder, or one file that grows")
-    return follow_series(sources[0], seconds=asked.follow_for, **reading)
-
-
 class _Drawing:
-    """The figures of a table, if they are asked for, and the columns that they need."""
+    """The figures of a table, if they are asked for."""
 
     def __init__(self, asked: Output, kinds: tuple[str, ...]) -> None:
         from scanfab.table.plots import figures_of
         from scanfab.viz.figures.page import find_figure
 
-        self.plot, self.figure, self.kind = asked.plot, asked.figure, kinds[0]
-        figures = [] if self.plot is None else list(figures_of(self.kind).values())
-        if self.figure is not None:
-            figures = [find_figure(self.figure, *kinds)[0]]
+        self.asked, self.kind, self._drawn = asked, kinds[0], 0
+        figures = list(figures_of(self.kind).values()) if asked.plot is not None else []
+        if asked.figure is not None:
+            figures = [find_figure(asked.figure, *kinds)[0]]
             self.kind = figures[0].kind
         self.needed = tuple(dict.fromkeys(name for one in figures for name in one.columns))
-        self._drawn = 0
+        """The columns that they need."""
 
     def draw(self, job: Job) -> None:
         """Draw the rows that there are."""
-        from scanfab.table.compare import compare_tables
-        from scanfab.table.table import Table
-        from scanfab.viz.figures.page import make_figures, save_figures
-        from scanfab.viz.scanned_frames import ScannedFrames
-
-        if self.plot is None:
-            return
-        if not job.found_void_fabric:
-            click.echo(f"scanfab: {self.plot} is not drawn: no row has a void fabric", err=True)
-            return
-        rows = job.every_row
-        data: Any = Table(rows, job.settings.columns)
-        if self.kind == "frames":
-            data = ScannedFrames(job.series[0], job.settings, rows)
-        comparison = compare_tables(rows) if self.kind == "table" else None
-        figures = make_figures(data, self.kind, self.figure, comparison=comparison)
-        save_figures(self.plot, figures)
+        plot, rows = self.asked.plot, job.every_row
+        if plot is not None and not job.found_void_fabric:
+            click.echo(f"scanfab: {plot} is not drawn: no row has a void fabric", err=True)
+        elif self.kind == "frames":
+            draw(self.asked, scanfab.ScannedFrames(job.series[0], job.settings, rows), self.kind)
+        elif plot is not None:
+            comparison = scanfab.compare_tables(rows) if self.kind == "table" else None
+            table = scanfab.Table(rows, job.settings.columns)
+            draw(self.asked, table, self.kind, comparison=comparison)
 
     def redraw(self, job: Job) -> None:
         """Draw a series that is followed if there are new frames; a new scan waits for the end."""
@@ -140,20 +122,25 @@ class _Drawing:
             self.draw(job)
 
 
-def _write_or_say(job: Job, excerpt: Excerpt) -> None:
-    """Write the rows; where that is interrupted or fails, say how far it is and how to go on."""
-    from scanfab.base.errors import ScanfabError
-
+def _write(job: Job, excerpt: Excerpt) -> None:
+    """Write the rows as they come; if that is interrupted or fails, say how to go on."""
     # asked for now, as a signal comes at any moment
     as_table = job.output is None and is_readable()
-
-    def standing() -> str:
-        return _standing(job, as_table)
-
+    standing = partial(_standing, job, as_table)
     try:
         with telling(standing):
-            _write(job, excerpt, as_table)
-    except (ScanfabError, OSError):
+            with working(job.frames, job.done) as advance:
+                if job.output is not None:
+                    job.write(advance)
+                elif as_table:
+                    rows = list(job.rows(advance))
+                else:
+                    print_csv(job.rows(advance), excerpt, job.settings.columns)
+            if as_table:
+                print_table(rows, excerpt)
+            if job.output is None:
+                job.save_manifests()
+    except (scanfab.ScanfabError, OSError):
         if job.output is not None and (job.is_over or 0 < job.done < job.frames()):
             click.echo(f"scanfab: stopped {standing()}", err=True)
         raise
@@ -174,18 +161,3 @@ def _standing(job: Job, as_table: bool) -> str:
         kept = "nothing is kept" if as_table else "the rows printed so far are all"
         return f"{done}; {kept}: with -o FILE, --resume could go on"
     return f"{done}; the same command{'' if job.resume else ' with --resume'} goes on"
-
-
-def _write(job: Job, excerpt: Excerpt, as_table: bool) -> None:
-    """Write the rows as they come; on a terminal, all of them as a table."""
-    with working(job.frames, job.done) as advance:
-        if job.output is not None:
-            job.write(advance)
-            return
-        if as_table:
-            rows = list(job.rows(advance))
-        else:
-            print_csv(job.rows(advance), excerpt, job.settings.columns)
-    if as_table:
-        print_table(rows, excerpt)
-    job.save_manifests()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
@@ -11,11 +10,18 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from scanfab.base.option import Option
+from scanfab.base.errors import SettingsError, note
+from scanfab.base.option import unusable
 from scanfab.pipeline.options import OPTIONS
 
 SECTION = "compute"
-KEY = "scanfab.settings_file"
+META = "scanfab.settings_file"
+KEYS = {
+    one.flag.removeprefix("--"): one
+    for one in OPTIONS.values()
+    if one.decides or one.name == "workers"
+}
+"""What the file may hold: the options that say how samples are read and computed."""
 
 
 def take_settings_file(ctx: click.Context, sources: Iterable[str]) -> None:
@@ -36,85 +42,59 @@ def take_settings_file(ctx: click.Context, sources: Iterable[str]) -> None:
         )
     for path in found:
         given = _read(path)
-        options = {key: _option(path, key) for key in given}
-        ctx.default_map = {
-            one.name: _value(f"{path}: {key}", one, given[key]) for key, one in options.items()
-        }
-        ctx.meta[KEY] = path, list(given)
+        try:
+            ctx.default_map = {KEYS[key].name: _as_typed(key, one) for key, one in given.items()}
+        except SettingsError as error:
+            raise click.UsageError(f"{path}: {error}") from None
+        ctx.meta[META] = path, list(given)
 
 
 def as_listed(ctx: click.Context) -> dict[str, Any]:
     """The file as a manifest lists it: which of its options the command took; empty without one."""
-    path, keys = ctx.meta.get(KEY, (None, []))
-    taken = {
-        one.opts[0].removeprefix("--")
-        for one in ctx.command.params
-        if ctx.get_parameter_source(str(one.name)) is ParameterSource.DEFAULT_MAP
-    }
-    used = [key for key in keys if key in taken]
-    others = [key for key in keys if key not in taken]
-    return {} if path is None else {"path": str(path), "used": used, "not_used": others}
+    if META not in ctx.meta:
+        return {}
+    path, keys = ctx.meta[META]
+    taken = ParameterSource.DEFAULT_MAP
+    used = [key for key in keys if ctx.get_parameter_source(KEYS[key].name) is taken]
+    return {"path": str(path), "used": used, "not_used": [key for key in keys if key not in used]}
 
 
 def tell_used(ctx: click.Context) -> None:
     """Say by a note which options the file has given."""
-    from scanfab.base.errors import note
-
     if (file := as_listed(ctx)) and file["used"]:
         note(f"options from {file['path']}: {', '.join(file['used'])}")
 
 
-def in_file(message: str) -> str:
-    """A message about an option, with the settings file in front if the option comes from it."""
-    ctx = click.get_current_context(silent=True)
-    file = {} if ctx is None else as_listed(ctx)
-    is_used = message.partition(":")[0].removeprefix("--") in file.get("used", ())
-    return f"{file['path']}: {message.removeprefix('--')}" if is_used else message
-
-
 def _read(path: Path) -> dict[str, Any]:
-    """The options in the one section that there may be."""
+    """The options in the one section that there may be, each of them a known one."""
     import tomllib
 
     try:
         content = tomllib.loads(path.read_text("utf-8"))
-    except UnicodeDecodeError as error:
-        raise click.UsageError(f"{path}: {error}") from None
-    except tomllib.TOMLDecodeError as error:
-        line = re.search(r"at line (\d+)", str(error))
-        where = f"{path}, line {line[1]}" if line else f"{path}"
+    except ValueError as error:
         advice = 'text stands in quotes, as in boundary = "type=2"'
-        raise click.UsageError(f"{where}: {error}: {advice}") from None
+        raise click.UsageError(f"{path}: {error}: {advice}") from None
     for name, value in content.items():
         if name != SECTION or not isinstance(value, dict):
             raise click.UsageError(
                 f"{path}: {name!r} has no meaning: options stand in the section [{SECTION}]"
             )
     options: dict[str, Any] = content.get(SECTION, {})
+    for key in (key for key in options if key not in KEYS):
+        near = get_close_matches(key, KEYS, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else "it may say how samples are computed"
+        raise click.UsageError(f"{path}: {key!r} cannot be set in a settings file: {hint}")
     return options
 
 
-def _option(path: Path, key: str) -> Option:
-    """The option of a key: one that says how samples are read and computed."""
-    known = {
-        one.flag.removeprefix("--"): one
-        for one in OPTIONS.values()
-        if one.decides or one.name == "workers"
-    }
-    if key not in known:
-        near = get_close_matches(key, known, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else "it may say how samples are computed"
-        raise click.UsageError(f"{path}: {key!r} cannot be set in a settings file: {hint}")
-    return known[key]
-
-
-def _value(place: str, option: Option, value: Any) -> Any:
-    """A value of the settings file as the command line would give it."""
-    several = value if isinstance(value, list) else [value]
+def _as_typed(key: str, value: Any) -> Any:
+    """A value of the settings file as users would type it, if the option can have it."""
+    option, several = KEYS[key], value if isinstance(value, list) else [value]
     for one in several:
         # a truth value would count as the number 1
         if isinstance(one, bool) or not isinstance(one, str | int | float):
-            expected = "numbers or text in quotes, one or a list of them"
-            raise click.UsageError(f"{place}: expected {expected}, found {one!r}")
+            raise unusable(key, "numbers or text in quotes, one or a list of them", one)
     words = [str(one) for one in several]
-    return words if option.several else ",".join(words)
+    typed = words if option.several else ",".join(words)
+    option.parse(key, typed)
+    return typed

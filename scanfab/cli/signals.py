@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
+from typing import NoReturn
 
 from scanfab.base.ending import finish
 
@@ -68,12 +69,6 @@ def ending_in_order(end: Callable[[], object]) -> Iterator[None]:
         restore()
 
 
-def ignore_signals() -> None:
-    """The result stands: a signal would only spoil the exit code."""
-    for late in ENDED:
-        signal.signal(late, signal.SIG_IGN)
-
-
 def _end(number: int, frame: FrameType | None) -> None:
     """
     Say it, remove what is temporary, and leave.
@@ -94,16 +89,21 @@ def _end(number: int, frame: FrameType | None) -> None:
         leave_at_once(128 + number)
 
 
-def leave_at_once(code: int) -> None:
+def leave(code: int) -> NoReturn:
+    """Exit with what has been printed; a signal from now on would only spoil the exit code."""
+    for late in ENDED:
+        signal.signal(late, signal.SIG_IGN)
+    if code == 0:
+        sys.exit(code)
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError):  # a full disk, a closed pipe: told already
+            stream.flush()
+    leave_at_once(code)
+
+
+def leave_at_once(code: int) -> NoReturn:
     """Exit without waiting for the frames that other threads are computing."""
     try:
         finish()
     finally:
         os._exit(code)
-
-
-def flush_streams() -> None:
-    """Hand on what was printed."""
-    for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError):  # a full disk, a closed pipe: told already
-            stream.flush()

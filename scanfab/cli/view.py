@@ -2,32 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from scanfab.cli.options import READING, SAMPLE, WINDOW, options, usage_errors
-from scanfab.cli.sources import SourceCommand, checked, open_one, sources_argument
-from scanfab.cli.talk import announce_compiling, talk_options
-
-if TYPE_CHECKING:
-    from scanfab.io.series import Series
-    from scanfab.pipeline.settings import Settings
-
+import scanfab
+from scanfab.cli.console import announce
+from scanfab.cli.options import SourceCommand, checked, open_one, options, usage_errors
 
 # letters of the source in a title, which has frame and strain behind it
 LONGEST_SOURCE = 60
 
 
 @click.command(cls=SourceCommand)
-@sources_argument
-@options(*READING, "frame", *SAMPLE, *WINDOW, "cutoff", "axis", "strain")
+@options("READING", "frame", "SAMPLE", "WINDOW", "cutoff", "axis", "strain")
 @click.option(
     "--cut", is_flag=True, help="Leave out the grains in front, and show scan lines in the section."
 )
 @options("screenshot")
-@talk_options
 def view(
     sources: tuple[str, ...], frame: int, cut: bool, screenshot: Path | None, **chosen: Any
 ) -> int:
@@ -38,32 +32,20 @@ def view(
     upright.
     """
     from scanfab.base.files import check_folder
-    from scanfab.pipeline.settings import Settings
+    from scanfab.table.curves import middle_out, spelt_strain
+    from scanfab.viz.scene import look_at, section_lines
+    from scanfab.viz.window3d import check_screen, show_scene
 
-    reading, settings = checked({**chosen, "variants": "c"}, Settings)
-    if screenshot is not None:
-        if screenshot.suffix.lower() != ".png":
-            raise click.UsageError(f"{screenshot}: screenshots are PNG files: name one .png")
+    reading, settings = checked({**chosen, "variants": "c"}, scanfab.Settings)
+    if screenshot is None:
+        check_screen()
+    elif screenshot.suffix.lower() != ".png":
+        raise click.UsageError(f"{screenshot}: screenshots are PNG files: name one .png")
+    else:
         with usage_errors():
             check_folder(screenshot)
     series = open_one(sources, reading, "viewed")
-    announce_compiling()
-    _show(series, settings, frame, cut, screenshot)
-    return 0
-
-
-def _show(
-    series: Series, settings: Settings, frame: int, cut: bool, screenshot: Path | None
-) -> None:
-    from dataclasses import replace
-
-    from scanfab.table.curves import middle_out, spelt_strain
-    from scanfab.viz.frame_view import look_at
-    from scanfab.viz.scene import section_lines
-    from scanfab.viz.window3d import check_screen, show_scene
-
-    if screenshot is None:
-        check_screen()
+    announce([series], settings.workers)
     look = look_at(series, settings, frame)
     scene = look.scene
     if cut:
@@ -73,3 +55,4 @@ def _show(
     source = middle_out(series.name, LONGEST_SOURCE)
     title = ", ".join(filter(None, [source, f"frame {look.number}", strain, none]))
     show_scene(scene, look.axis, title, screenshot)
+    return 0

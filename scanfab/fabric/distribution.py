@@ -1,10 +1,7 @@
 """
 The directional distribution of a scan: an even function on the sphere fitted to the mean lengths.
 
-Of discs it is one on the circle of their plane.
-
-On the unit sphere the homogeneous polynomials of an even degree are exactly the sums of the even
-harmonics up to that degree, so monomials are all that is needed.
+For discs it is an even function on the circle of their plane.
 """
 
 from __future__ import annotations
@@ -39,9 +36,10 @@ class EvenFunction:
 
     def __call__(self, directions: npt.ArrayLike) -> FloatArray:
         """Values at unit vectors, shape (..., 3) to (...)."""
-        basis = _basis(np.asarray(directions), self.degree, self.space)
-        values: FloatArray = basis @ self.coefficients
-        return values
+        flat = np.reshape(np.asarray(directions, dtype=np.float64), (-1, 3))
+        orthonormal = _orthonormal(self.degree, self.space)
+        values = even_polynomials(flat, self.degree, self.space) @ orthonormal @ self.coefficients
+        return np.asarray(values.reshape(np.shape(directions)[:-1]))
 
 
 def fit_even(
@@ -77,7 +75,8 @@ def fit_even(
     """
     root = np.sqrt(weights / weights.sum())
     for degree in range(HIGHEST_DEGREE, -1, -2):
-        matrix = _basis(axes, degree, space) * root[:, None]
+        matrix = even_polynomials(axes, degree, space) @ _orthonormal(degree, space)
+        matrix *= root[:, None]
         # whether the axes are enough, and even enough
         if len(matrix) >= matrix.shape[1] and np.linalg.cond(matrix) < WORST_COVERAGE:
             break
@@ -136,24 +135,30 @@ def harmonics_of(degree: int, space: Space) -> int:
     return 2 if space.is_plane else 2 * degree + 1
 
 
-def _basis(directions: FloatArray, degree: int, space: Space) -> FloatArray:
-    """Orthonormal even functions up to a degree, shape (..., 3) to (..., functions)."""
-    values: FloatArray = _monomials(directions, degree, space) @ _orthonormal(degree, space)
-    return values
+def even_polynomials(axes: FloatArray, degree: int, space: Space) -> FloatArray:
+    """
+    A basis of the even functions up to a degree, at unit vectors, shape (M, 3) to (M, functions).
 
-
-def _monomials(directions: FloatArray, degree: int, space: Space) -> FloatArray:
+    On the sphere the homogeneous polynomials of an even degree are the sums of the even harmonics
+    up to that degree, so monomials are enough; around a circle they are cosines and sines.
+    """
+    if space.is_plane:
+        u, v = space.basis[:2] @ axes.T
+        orders = np.arange(2, degree + 1, 2)
+        angles = np.arctan2(v, u)[:, None] * orders
+        return np.column_stack([np.ones(len(axes)), np.cos(angles), np.sin(angles)])
     powers = [(i, j, degree - i - j) for i in range(degree + 1) for j in range(degree + 1 - i)]
-    powers = [one for one in powers if space.across is None or one[space.across] == 0]
-    values: FloatArray = np.prod(directions[..., None, :] ** np.array(powers), axis=-1)
-    return values
+    i, j, k = np.array(powers).T
+    x, y, z = (np.vander(one, degree + 1, increasing=True) for one in axes.T)
+    design: FloatArray = x[:, i] * y[:, j] * z[:, k]
+    return design
 
 
 @cache
 def _orthonormal(degree: int, space: Space) -> FloatArray:
-    """The matrix that makes the monomials orthonormal on the sphere."""
+    """The matrix that makes the polynomials orthonormal on the sphere."""
     points, weights = direction_points(space)
-    monomials = _monomials(points, degree, space)
-    triangle = np.linalg.qr(monomials * np.sqrt(weights)[:, None], mode="r")
+    design = even_polynomials(points, degree, space) * np.sqrt(weights)[:, None]
+    triangle = np.linalg.qr(design, mode="r")
     inverse: FloatArray = np.linalg.inv(triangle)
     return inverse

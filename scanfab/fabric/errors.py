@@ -1,21 +1,24 @@
 """
 Standard errors: of means, of a sample by a jackknife over its parts, and what they say of blocks.
 
-The delete-one jackknife leaves out one part of the sample in turn, and asks how much a value moves.
-That says how far another sample of the same material would differ; the error of the scan says
-nothing of it. Efron and Stein (1981), doi:10.1214/aos/1176345462.
+The delete-one jackknife leaves out one part of the sample after the other, and asks how much a
+value moves. That says how far another sample of the same material would differ; the error of the
+scan says nothing of it. Efron and Stein (1981), doi:10.1214/aos/1176345462.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from scanfab.base.typing import BoolArray, FloatArray
 
-# blocks without which there is no telling whether they differ
-FEWEST_BLOCKS = 3
+# parts of a sample: octants about its centre; of discs the first four, quadrants of their plane
+BLOCKS = 8
+# parts of a block without which there is no telling how much they differ, and blocks likewise
+FEWEST_PARTS, FEWEST_BLOCKS = 4, 3
 
 
 def error_of_mean(values: FloatArray) -> float | None:
@@ -81,15 +84,105 @@ def variance_without_noise(values: FloatArray, held: BoolArray | bool = True) ->
     return np.asarray((count * of_mean - of_single) / (count - 1))
 
 
+class Jackknife(NamedTuple):
+    """A value of the sample without each of its P parts."""
+
+    shift: FloatArray
+    """By how much leaving out each part moves the value, shape (P,)."""
+    error: float | None
+    """The standard error that follows; None if the scan's noise hides it."""
+    half: FloatArray
+    """
+    How far the first replicate lies above the mean of all, without each part: of two replicates
+    half their difference. Shape (P,).
+
+    From these the noise of the scan is known in whatever is made of several frames, such as a
+    slope. 0 where nothing is scanned, as for contacts.
+    """
+
+
+def jackknife(values: FloatArray) -> Jackknife:
+    """
+    The standard error of the sample, from a value of the whole and without each part.
+
+    The noise that the scan adds to the scatter between parts is known from its replicates, and
+    taken off. If nothing is left there is no error: the lines are too few to see it, which is no
+    proof that there is none.
+
+    Parameters
+    ----------
+    values : ndarray, shape (1 + P, R)
+        Of the whole, then without each part, in each replicate; R is 1 where nothing is scanned.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.fabric.errors import jackknife
+    >>> x = np.array([1.0, 2.0, 4.0])
+    >>> means = np.append(x.mean(), (x.sum() - x) / 2)
+    >>> bool(np.isclose(jackknife(means[:, None]).error, x.std(ddof=1) / np.sqrt(3)))
+    True
+    """
+    means, without = values.mean(axis=1), values[1:]
+    variance = float(variance_without_noise(without))
+    is_hidden = variance <= 0.0 and values.shape[1] > 1
+    error = None if is_hidden else math.sqrt(variance)
+    return Jackknife(means[1:] - means[0], error, without[:, 0] - means[1:])
+
+
+def part_errors(values: FloatArray, held: BoolArray) -> FloatArray:
+    """
+    Standard errors from the values without each part, without what the scan's noise adds.
+
+    Parameters
+    ----------
+    values : ndarray, shape (R, B, P)
+        Of each replicate; all have the same parts.
+    held : ndarray of bool, shape (B, P)
+        The parts that hold anything.
+
+    Returns
+    -------
+    ndarray, shape (B,)
+        NaN where too few parts hold anything, or the noise hides the scatter.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.fabric.errors import part_errors
+    >>> x = np.array([1.0, 2.0, 4.0, 7.0])
+    >>> means = (x.sum() - x) / 3
+    >>> error = part_errors(means[None, None], np.ones((1, 4), bool))
+    >>> bool(np.isclose(error[0], x.std(ddof=1) / 2))
+    True
+    """
+    variance = variance_without_noise(np.moveaxis(values, -1, 0), held.T)
+    known = (held.sum(axis=1) >= FEWEST_PARTS) & (variance > 0)
+    return np.sqrt(np.where(known, variance, np.nan))
+
+
+def ratio_with_errors(over: FloatArray, under: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Σ over / Σ under and its errors, shape (B,), from sums over each part, shape (B, P)."""
+    above, below = over.sum(axis=1, keepdims=True), under.sum(axis=1, keepdims=True)
+    rest = ratio(above - over, below - under)
+    held = (under > 0) & np.isfinite(rest)
+    return ratio(above, below)[:, 0], part_errors(rest[None], held)
+
+
+def ratio(over: FloatArray, under: FloatArray) -> FloatArray:
+    """NaN where there is nothing to divide by."""
+    return np.where(under > 0, over / np.where(under > 0, under, 1.0), np.nan)
+
+
 class Homogeneity(NamedTuple):
-    """What the scatter of blocks says."""
+    """Whether blocks scatter more than their errors explain."""
 
     ratio: float
-    """Of their scatter to what their errors explain: 1 in the mean of homogeneous samples."""
+    """Scatter of the blocks over what their errors explain; about 1 in homogeneous samples."""
     chance: float
-    """That blocks of a homogeneous sample scatter so much or more."""
+    """Probability that the blocks of a homogeneous sample scatter as much or more."""
     blocks: int
-    """How many there are."""
+    """Number of blocks."""
 
 
 def homogeneity_of(
@@ -131,7 +224,7 @@ def homogeneity_of(
     >>> homogeneity_of(shifted, *words).chance < 0.001
     True
     """
-    # loaded here, as few need it
+    # imported here because few scans need it
     from scipy.special import fdtrc
 
     known = np.isfinite(values) & np.isfinite(variances) & (variances > 0) & (weights > 0)

@@ -32,14 +32,14 @@ from scanfab.fabric.invariants import fabric_deviator
 from scanfab.fabric.measured import Measured
 from scanfab.fabric.tensor import COMPONENTS
 
-# of a tangential to the mean normal force: what remains of it where only digits are left
+# tangential over mean normal force: less than this is rounding of the digits in the dump
 NO_FRICTION = 1e-4
-# of the largest force: what differs by less is equal
+# differences below this share of the largest force are rounding
 ROUNDING = 1e-12
 
 
 class DirectionalMean(NamedTuple):
-    """How a mean over the contacts of a direction depends on that: a tensor without trace."""
+    """How the mean over contacts depends on their direction: a tensor without trace."""
 
     matrix: FloatArray
     """Shape (3, 3), dimensionless."""
@@ -111,9 +111,9 @@ def directional_mean(
     values = along - ratio * size
     through = space.second_order * ((weights**2 * values)[:, None] * n).T @ n / count
     error = error_of_mean(weights * values - np.einsum("ci,ij,cj->c", n, through, n))
-    return DirectionalMean(
-        matrix, less * factor * ratio, None if error is None else less * factor / scale * error
-    )
+    if error is not None:
+        error *= less * factor / scale
+    return DirectionalMean(matrix, less * factor * ratio, error)
 
 
 def _weights(normals: FloatArray, space: Space) -> FloatArray | None:
@@ -140,33 +140,30 @@ AXIAL = {
     "gc_strong": "the strong contacts",
     "gc_weak": "the weak contacts",
 }
-ERROR = "its standard error if contacts were independent"
 
 
 class Forces:
     """The columns of branches, forces, and strong and weak contacts."""
 
-    columns = (
-        *numbers(
-            {f"{name}_{k}": f"{k} of {TENSORS[name]}" for name in TENSORS for k in COMPONENTS}
-        ),
-        *(
-            column
-            for name, what in AXIAL.items()
-            for column in numbers(
-                {
-                    f"alpha_{name}_axial": f"anisotropy of {what}, signed, along the loading axis",
-                    f"alpha_{name}_axial_se": ERROR,
-                }
-            )
-        ),
+    columns = numbers(
+        {
+            **{f"{name}_{k}": f"{k} of {TENSORS[name]}" for name in TENSORS for k in COMPONENTS},
+            **{
+                f"alpha_{name}_axial{suffix}": meaning
+                for name, what in AXIAL.items()
+                for suffix, meaning in (
+                    ("", f"anisotropy of {what}, signed, along the loading axis"),
+                    ("_se", "its standard error if contacts were independent"),
+                )
+            },
+        }
     )
 
     def values(self, measured: Measured) -> dict[str, Any]:
         """All None without contacts."""
         found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
-        normals, axis, forces = measured.normals, measured.axis, measured.forces
-        space = measured.space
+        normals, axis, space = measured.normals, measured.axis, measured.space
+        forces = measured.forces
         if forces is None or not len(normals):
             return found
         means = {
@@ -181,10 +178,9 @@ class Forces:
         rounding = ROUNDING * np.abs(forces.force_n).max()
         strong = forces.force_n > forces.force_n.mean() + rounding
         for name, chosen in (("gc_strong", strong), ("gc_weak", ~strong)):
-            some = normals[chosen]
-            tensor = contact_fabric(some, space)
+            tensor = contact_fabric(normals[chosen], space)
             if tensor is not None:
-                error = axial_error(some, axis, space)
+                error = axial_error(normals[chosen], axis, space)
                 means[name] = DirectionalMean(tensor.matrix, tensor.axial(axis), error)
         for name, mean in means.items():
             if mean is not None:
@@ -200,7 +196,6 @@ def doubts_of_forces(measured: Measured) -> dict[str, str]:
     texts: dict[str, str] = {}
     if forces is None or not len(normals):
         return texts
-    size = np.abs(forces.force_n)
     if _weights(normals, measured.space) is None:
         texts["few_contacts"] = (
             "the contacts are so few, or so anisotropic, that 1 + n·C·n is not above 0 in "
@@ -212,13 +207,10 @@ def doubts_of_forces(measured: Measured) -> dict[str, str]:
             "that on the other grain?"
         )
     if forces.force is None:
-        texts["no_tangential"] = (
-            "the dump has the normal part of the contact forces only: ft is empty"
-        )
-    elif (
-        np.abs(forces.force - forces.force_n[:, None] * normals).max() <= NO_FRICTION * size.mean()
-    ):
-        # all forces are along the normals, but for the digits of the dump
+        text = "the dump has the normal part of the contact forces only: ft is empty"
+        return texts | {"no_tangential": text}
+    tangential = np.abs(forces.force - forces.force_n[:, None] * normals)
+    if tangential.max() <= NO_FRICTION * np.abs(forces.force_n).mean():
         texts["no_tangential"] = (
             "no contact has a tangential force, so ft is 0: are the contacts without friction, "
             "or is the force of `contact_columns` its normal part only (LAMMPS: name tx, ty, "

@@ -1,5 +1,5 @@
 """
-Order 2 and 4 of the void lengths and of the contact normals, and fourth-order tensors.
+Harmonics of orders 2 and 4 of void lengths and contact normals, and their fourth-order tensors.
 
 a_l = (2l + 1) <P_l(a·n)> about the loading axis a, with the Legendre polynomials P_l: the
 coefficients of the distribution E(n) = 1/4π (1 + a_2 P_2 + a_4 P_4 + ...). Of discs, at the angle θ
@@ -117,27 +117,25 @@ class Harmonics:
         """All None of a fabric that does not exist."""
         found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
         void, axis, space, normals = measured.void, measured.axis, measured.space, measured.normals
+        # what each order is the mean of
+        each: dict[str, FloatArray] = {}
         if void is not None:
             weights = void.weights * void.mean_lengths
             weights = weights / weights.sum(axis=1, keepdims=True)
             for order in ORDERS:
-                # in a plane fewer steps take other orders for this one
-                if space.is_plane and void.axes.shape[1] < order // 2 + 2:
-                    continue
-                # of each replicate: the error is from their scatter, as that of the tensor
-                means = np.sum(weights * harmonic(order, void.axes @ axis, space), axis=1)
-                found |= _mean("vs", order, harmonics_of(order, space) * means)
+                # in a plane a rule of fewer steps cannot tell this order from others
+                if not space.is_plane or void.axes.shape[1] >= order // 2 + 2:
+                    # the error is that of the replicates, as for the tensor
+                    means = np.sum(weights * harmonic(order, void.axes @ axis, space), axis=1)
+                    each[f"vs_a{order}"] = harmonics_of(order, space) * means
             tensor = tensor4(void.axes.reshape(-1, 3), weights.ravel())
             found["vs_tensor4"] = tensor.ravel().tolist()
         if len(normals):
             for order in ORDERS:
-                # of each contact: the error is that of a mean over independent contacts
-                values = harmonics_of(order, space) * harmonic(order, normals @ axis, space)
-                found |= _mean("c", order, values)
+                # the error is that of a mean over independent contacts
+                values = harmonic(order, normals @ axis, space)
+                each[f"c_a{order}"] = harmonics_of(order, space) * values
             found["c_tensor4"] = tensor4(normals, np.ones(len(normals))).ravel().tolist()
+        for name, values in each.items():
+            found |= {name: float(values.mean()), f"{name}_se": error_of_mean(values)}
         return found
-
-
-def _mean(name: str, order: int, values: FloatArray) -> dict[str, float | None]:
-    """The columns of one order."""
-    return {f"{name}_a{order}": float(values.mean()), f"{name}_a{order}_se": error_of_mean(values)}

@@ -159,25 +159,21 @@ def _values(
     a, the principal values and b with their errors.
 
     G is the mean of each tensor, shape (M, 3, 3), and to first order a and the principal values are
-    linear in G. ``count`` is the number of segments or contacts.
+    linear in G: values of a form A, A:G. ``count`` is the number of segments or contacts.
     """
-    space = tensor.space
-    largest, middle, smallest = (float(one) for one in tensor.principal_values)
+    space, (largest, middle, smallest) = tensor.space, tensor.principal_values.tolist()
+    found: dict[str, float | None] = {
+        f"f_{name}": intensity(tensor.matrix, space),
+        **{f"g{name}_{k}": one for k, one in enumerate((largest, middle, smallest), start=1)},
+    }
     alpha = largest - smallest
-    known = count > 0 and not space.is_plane and alpha >= LEAST_ALPHA / math.sqrt(count)
+    if count > 0 and not space.is_plane and alpha >= LEAST_ALPHA / math.sqrt(count):
+        found[f"b_{name}"] = (middle - smallest) / alpha
     forms = {f"g{name}_{k}": np.outer(one, one) for k, one in enumerate(tensor.principal_axes, 1)}
     deviator = fabric_deviator(tensor.matrix, space)
     size = float(np.linalg.norm(deviator))
     if size > 0.0:
         forms[f"f_{name}"] = math.sqrt(space.intensity) * space.second_order * deviator / size
-    return {
-        f"f_{name}": intensity(tensor.matrix, space),
-        f"g{name}_1": largest,
-        f"g{name}_2": middle,
-        f"g{name}_3": smallest,
-        f"b_{name}": (middle - smallest) / alpha if known else None,
-        **{
-            f"{of}_se": error_of_mean(np.einsum("cij,ij->c", each, form))
-            for of, form in forms.items()
-        },
-    }
+    for of, form in forms.items():
+        found[f"{of}_se"] = error_of_mean(np.einsum("cij,ij->c", each, form))
+    return found

@@ -12,8 +12,8 @@ import numpy as np
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.contact import contact_fabric
-from scanfab.fabric.jackknife import BlockedSums, Jackknife, contact_jackknife, void_jackknife
-from scanfab.fabric.tensor import FabricTensor
+from scanfab.fabric.errors import Jackknife, jackknife
+from scanfab.fabric.tensor import FabricTensor, axial
 from scanfab.fabric.void import VoidFabric, void_fabric
 
 # of √(3/2 s:s), s the stress's deviator, to p, below which the stress has no direction
@@ -21,7 +21,7 @@ LEAST_RATIO = 0.02
 
 
 class ContactForces(NamedTuple):
-    """What the contacts of one variant bear, and what they span."""
+    """Forces and branches of the contacts of one variant."""
 
     branch: FloatArray
     """From the first grain's centre to the second's, along the normal; shape (M,), a length."""
@@ -31,8 +31,25 @@ class ContactForces(NamedTuple):
     """On the second grain, shape (M, 3); None where only its normal part is known."""
 
 
+class BlockedSums(NamedTuple):
+    """
+    A scan whose void segments are told apart by the block of the sample that their middle is in.
+
+    Sums are lengths (dump's unit) and numbers of the kept segments, each of shape (R, D).
+    """
+
+    axes: FloatArray
+    """Unit vectors of each replicate, shape (R, D, 3)."""
+    weights: FloatArray
+    """Of the direction rule, shape (D,)."""
+    full: tuple[FloatArray, FloatArray | IntArray]
+    """Of all blocks."""
+    without: list[tuple[FloatArray, FloatArray | IntArray]]
+    """Of all but one block, for each of them."""
+
+
 class SampleState(NamedTuple):
-    """What is known of the sample beside its fabric."""
+    """Void ratio, coordination and stress of the sample."""
 
     void_ratio: float | None
     """Volume of the voids over that of the grains; None without a volume."""
@@ -65,7 +82,7 @@ class SampleState(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What a fabric is computed from, and what several of them need of that."""
+    """What fabrics are computed from, and results that several of them share."""
 
     axis: FloatArray
     """Loading axis, a unit vector, shape (3,)."""
@@ -100,7 +117,7 @@ class Measured:
     segment_count: int = 0
     """Number of the kept void segments of all replicates."""
     forces: ContactForces | None = None
-    """What these contacts bear; None if that is not known, or not asked for."""
+    """Forces of these contacts; None if they are unknown or not asked for."""
     state: SampleState | None = None
     """Stress and void ratio, where they are asked for."""
 
@@ -118,12 +135,25 @@ class Measured:
 
     @cached_property
     def void_scatter(self) -> Jackknife | None:
-        """The void fabric's anisotropy without each block."""
-        return None if self.void is None else void_jackknife(self.blocked, self.axis, self.space)
+        """The void fabric's anisotropy without each block; None if one lacks a fabric."""
+        if self.void is None:
+            return None
+        axes, weights, full, without = self.blocked
+        values = []
+        for length, segments in (full, *without):
+            fabric = void_fabric(axes, weights, length, segments, self.space)
+            if fabric is None:
+                return None
+            values.append(axial(fabric.replicates, self.axis, self.space))
+        return jackknife(np.array(values))
 
     @cached_property
     def contact_scatter(self) -> Jackknife | None:
-        """The contact fabric's anisotropy without each block."""
-        if self.contact is None:
+        """The contact fabric's anisotropy without each block; None if one has all contacts."""
+        count = 2**self.space.dimension
+        along = self.space.axial((self.normals @ self.axis) ** 2)
+        left = len(along) - np.bincount(self.blocks, minlength=count)
+        if np.any(left == 0):
             return None
-        return contact_jackknife(self.normals, self.blocks, self.axis, self.space)
+        rest = (along.sum() - np.bincount(self.blocks, along, count)) / left
+        return jackknife(np.array([along.mean(), *rest])[:, None])

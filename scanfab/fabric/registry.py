@@ -57,63 +57,52 @@ def load_fabrics(taken: Iterable[str]) -> dict[str, Fabric]:
     """
     The fabrics of other packages by name; none as a rule.
 
-    One with a column whose name is taken is left out with a warning, like a broken one.
+    One that is broken, or has a column whose name is ``taken`` by scanfab or by a fabric before it,
+    is left out with a warning.
 
     Raises
     ------
     ScanfabError
-        If two packages use one name for a fabric, or for a column.
+        If two packages use one name for a fabric.
     """
     names = set(taken)
-    offers = load_plugins(GROUP, "fabric", lambda one: _fabric(one, names))
-    owners: dict[str, str] = {}
-    for name, offer in offers.items():
-        for column in offer.plugin.columns:
-            who = f"{name!r} of {offer.package}"
-            other = owners.setdefault(column.name, who)
-            if other != who:
-                raise ScanfabError(
-                    f"two fabrics have a column called {column.name!r}: {other} and {who}; remove "
-                    f"one of them"
-                )
-    return {name: offer.plugin for name, offer in offers.items()}
 
+    def checked(plugin: Any) -> Any:
+        expected = "an object with columns and values, as scanfab.fabric.registry.Fabric has them"
+        having(expected, columns=tuple | list, values=Callable)(plugin)
+        for column in plugin.columns:
+            if not isinstance(column, Column) or column.kind not in (int, float, str):
+                raise TypeError(f"expected columns that hold int, float or str, found {column!r}")
+            if column.name in names:
+                raise TypeError(f"there is a column {column.name!r} already: rename it")
+        names.update(column.name for column in plugin.columns)
+        return plugin
 
-def _fabric(plugin: Any, taken: set[str]) -> Any:
-    expected = "an object with columns and values, as scanfab.fabric.registry.Fabric has them"
-    having(expected, columns=tuple | list, values=Callable)(plugin)
-    for column in plugin.columns:
-        if not isinstance(column, Column) or column.kind not in (int, float, str):
-            raise TypeError(f"expected columns that hold int, float or str, found {column!r}")
-        if column.name in taken:
-            raise TypeError(f"its column {column.name!r} is one of scanfab's own: rename it")
-    return plugin
+    return {name: offer.plugin for name, offer in load_plugins(GROUP, "fabric", checked).items()}
 
 
 def checked_values(name: str, fabric: Fabric, measured: Measured) -> dict[str, Any]:
     """
-    The values of another package's fabric by its columns; what is not finite does not exist.
+    The values of another package's fabric by its columns; None for a number that is not finite.
 
     Raises
     ------
     ScanfabError
         If it fails, lacks a value, or gives one that its column cannot hold.
     """
-    columns = {column.name: column for column in fabric.columns}
+    columns = {column.name: column.kind for column in fabric.columns}
     try:
         found = dict(fabric.values(measured))
         if found.keys() != columns.keys():
             raise ValueError(f"expected a value for each of {[*columns]}, found {found}")
-        return {key: _value(column, found[key]) for key, column in columns.items()}
+        for key, kind in columns.items():
+            value = found[key]
+            if value is None or (kind is not str and not math.isfinite(value)):
+                found[key] = None
+            elif kind(value) != value:
+                raise ValueError(f"{key}: expected {kind.__name__} or None, found {value!r}")
+            else:
+                found[key] = kind(value)
+        return found
     except Exception as error:  # a foreign package may fail in any way
         raise ScanfabError(f"the fabric {name!r}: {type(error).__name__}: {error}") from error
-
-
-def _value(column: Column, value: Any) -> Any:
-    """A value as its column holds it."""
-    if value is None or (column.kind is not str and not math.isfinite(value)):
-        return None
-    kept = column.kind(value)
-    if kept != value:
-        raise ValueError(f"{column.name}: expected {column.kind.__name__} or None, found {value!r}")
-    return kept

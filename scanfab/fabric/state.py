@@ -111,22 +111,21 @@ class State:
 
 
 def _against_stress(measured: Measured, state: SampleState) -> dict[str, float | None]:
-    """How both fabrics stand to the stress and the direction of its deviator; if it has one."""
+    """How both fabrics stand to the stress and the direction of its deviator, if it has one."""
     space, n, along = state.space, measured.normals, state.direction
+    found: dict[str, float | None] = {}
     if state.stress is None or along is None:
-        return {}
-    # of what each tensor is the mean of, the value of F:n
-    fabrics = []
+        return found
+    stress = FabricTensor(state.stress / np.trace(state.stress), space)
+    fabrics: dict[str, tuple[FabricTensor, FloatArray]] = {}
+    # with each tensor the F:n of what it is the mean of
     if measured.void is not None:
         tensors = fabric_deviator(measured.void.replicates, space)
-        each = np.einsum("rij,ij->r", tensors, along)
-        fabrics.append(("vs", measured.void.tensor, each))
+        fabrics["vs"] = measured.void.tensor, np.einsum("rij,ij->r", tensors, along)
     if measured.contact is not None:
         each = space.second_order * np.einsum("ci,ij,cj->c", n, along, n)
-        fabrics.append(("c", measured.contact, each))
-    found: dict[str, float | None] = {}
-    stress = FabricTensor(state.stress / np.trace(state.stress), space)
-    for name, fabric, each in fabrics:
+        fabrics["c"] = measured.contact, each
+    for name, (fabric, each) in fabrics.items():
         found[f"acst_{name}"] = float(np.sum(fabric_deviator(fabric.matrix, space) * along))
         found[f"angle_{name}_stress"] = fabric.angle_to(stress)
         found[f"acst_{name}_se"] = error_of_mean(each)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from itertools import zip_longest
 from typing import Any
 
 from scanfab.base.column import LENGTH, numbers
-from scanfab.base.typing import FloatArray
 from scanfab.fabric.contact import axial_error
-from scanfab.fabric.jackknife import BLOCKS
+from scanfab.fabric.errors import BLOCKS
 from scanfab.fabric.measured import Measured
 from scanfab.fabric.tensor import FABRICS, of_both, tensor_columns, tensor_values
 
@@ -37,11 +36,10 @@ class Void:
     def values(self, measured: Measured) -> dict[str, Any]:
         """All None if there is no void fabric."""
         fabric, axis = measured.void, measured.axis
-        return {
-            "mean_length": fabric.mean_length if fabric else None,
-            **tensor_values("vs", fabric.tensor if fabric else None, axis),
-            f"{VOID}_se": fabric.axial_error(axis) if fabric else None,
-        }
+        if fabric is None:
+            return dict.fromkeys(column.name for column in self.columns)
+        own = {"mean_length": fabric.mean_length, f"{VOID}_se": fabric.axial_error(axis)}
+        return own | tensor_values("vs", fabric.tensor, axis)
 
 
 class Contact:
@@ -54,10 +52,8 @@ class Contact:
 
     def values(self, measured: Measured) -> dict[str, Any]:
         """All None without contacts."""
-        return {
-            **tensor_values("c", measured.contact, measured.axis),
-            f"{CONTACT}_se": axial_error(measured.normals, measured.axis, measured.space),
-        }
+        error = axial_error(measured.normals, measured.axis, measured.space)
+        return {**tensor_values("c", measured.contact, measured.axis), f"{CONTACT}_se": error}
 
 
 class Scatter:
@@ -79,22 +75,21 @@ class Scatter:
 
     def values(self, measured: Measured) -> dict[str, Any]:
         """All None where there is no fabric, or none without some block."""
+        found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
         void, axis = measured.void.tensor if measured.void else None, measured.axis
-        found: dict[str, Any] = {}
         for name, tensor, scatter in (
             (VOID, void, measured.void_scatter),
             (CONTACT, measured.contact, measured.contact_scatter),
         ):
-            found[f"{name}_sample_se"] = None if scatter is None else scatter.error
-            if tensor is None or scatter is None:
-                found |= _by_block(f"{name}_without", [])
-            else:
-                found |= _by_block(f"{name}_without", tensor.axial(axis) + scatter.shift)
+            if tensor is not None and scatter is not None:
+                found[f"{name}_sample_se"] = scatter.error
+                without = tensor.axial(axis) + scatter.shift
+                found |= {f"{name}_without_{k}": float(x) for k, x in enumerate(without, start=1)}
         return found
 
 
 class Halves:
-    """The columns of what the scan's noise makes of the void fabric without each block."""
+    """The columns of the scan's noise in the void fabric without each block."""
 
     columns = numbers(
         {
@@ -106,13 +101,9 @@ class Halves:
     def values(self, measured: Measured) -> dict[str, Any]:
         """All None where there is no void fabric, or none without some block."""
         scatter = measured.void_scatter
-        return _by_block(f"{VOID}_half", [] if scatter is None else scatter.half)
-
-
-def _by_block(name: str, known: Sequence[float] | FloatArray) -> dict[str, float | None]:
-    """A column for each block; those of blocks that there are not are empty."""
-    values = [*map(float, known), *[None] * (BLOCKS - len(known))]
-    return {f"{name}_{block}": one for block, one in enumerate(values, start=1)}
+        halves = [] if scatter is None else scatter.half.tolist()
+        # in a plane there are no blocks for the last columns
+        return dict(zip_longest((column.name for column in self.columns), halves))
 
 
 class Orientation:
@@ -134,9 +125,11 @@ class Orientation:
         """Of what there is: an angle needs both fabrics."""
         void = measured.void.tensor if measured.void else None
         contact = measured.contact
-        found: dict[str, Any] = {}
+        found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
         for prefix, tensor in (("gvs", void), ("gc", contact)):
-            axis = [None] * 3 if tensor is None else tensor.major_axis.tolist()
-            found |= {f"{prefix}_axis_{one}": x for one, x in zip("xyz", axis, strict=True)}
-        found["coaxiality_deg"] = void.angle_to(contact) if void and contact else None
+            if tensor is not None:
+                along = zip("xyz", tensor.major_axis.tolist(), strict=True)
+                found |= {f"{prefix}_axis_{one}": x for one, x in along}
+        if void is not None and contact is not None:
+            found["coaxiality_deg"] = void.angle_to(contact)
         return found

@@ -15,13 +15,16 @@ import numpy.typing as npt
 
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
-from scanfab.base.typing import FloatArray, IntArray
-from scanfab.fabric.errors import error_of_mean
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
+from scanfab.fabric.distribution import even_polynomials
+from scanfab.fabric.errors import error_of_mean, ratio
 from scanfab.fabric.tensor import FabricTensor, axial, weighted_tensors
 
-MOST_FILLED = 0.5
-# By dimension, the highest degree of a polynomial in the direction that mean lengths are held
-# against. Of discs they follow the direction in finer detail, and a degree costs two terms only.
+# Of the replicates' axes without a segment, above which there is no fabric: with more the filled
+# ones would look isotropic. A block's axes are filled with its own mean, which hides more.
+MOST_FILLED, MOST_FILLED_IN_BLOCK = 0.5, 0.05
+# By dimension, the highest degree of the polynomial that mean lengths are compared with. Those of
+# discs vary faster with the direction, and a degree costs only two terms there.
 MOST_EVEN = {3: 8, 2: 16}
 
 
@@ -92,7 +95,7 @@ class VoidFabric:
 
     def expected_error(self, axis: npt.ArrayLike, degree: int | None = None) -> float | None:
         """
-        The same from the scatter of the mean lengths about an even polynomial.
+        The same error from the scatter of the mean lengths about an even polynomial.
 
         Far less noisy for few replicates, as every axis counts, but it depends on the polynomial:
         good for planning a scan.
@@ -114,32 +117,18 @@ class VoidFabric:
         count = len(self.mean_lengths)
         space = self.tensor.space
         even = min(max((degree or 0) // 2 * 2 - 2, 4), MOST_EVEN[space.dimension])
-        design = _even_polynomials(self.axes.reshape(-1, 3), even, space)
+        design = even_polynomials(self.axes.reshape(-1, 3), even, space)
         lengths, terms = self.mean_lengths.ravel(), design.shape[1]
         if len(lengths) < 3 * terms:
             return None
-        # many more lengths than terms: the normal equations do, and are much faster
+        # with many more lengths than terms the normal equations suffice and are much faster
         fit = np.linalg.lstsq(design.T @ design, design.T @ lengths, rcond=None)[0]
         variance = np.sum((lengths - design @ fit) ** 2) / (len(lengths) - terms)
-        # by how much a mean length moves the axial anisotropy, a ratio of sums over the axes
+        # derivative of the axial anisotropy, a ratio of sums over the axes, by each mean length
         along = space.axial((self.axes @ np.asarray(axis, dtype=float)) ** 2)
         slope = self.weights * (along - self.tensor.axial(axis))
         slope /= (self.mean_lengths @ self.weights)[:, None]
         return float(np.sqrt(variance * np.sum(slope**2)) / count)
-
-
-def _even_polynomials(axes: FloatArray, degree: int, space: Space) -> FloatArray:
-    """A basis of the even polynomials of a degree on the sphere or the circle, a column each."""
-    if space.is_plane:
-        u, v = space.basis[:2] @ axes.T
-        orders = np.arange(2, degree + 1, 2)
-        angles = np.arctan2(v, u)[:, None] * orders
-        return np.column_stack([np.ones(len(axes)), np.cos(angles), np.sin(angles)])
-    powers = [(i, j, degree - i - j) for i in range(degree + 1) for j in range(degree + 1 - i)]
-    i, j, k = np.array(powers).T
-    x, y, z = (np.vander(one, degree + 1, increasing=True) for one in axes.T)
-    design: FloatArray = x[:, i] * y[:, j] * z[:, k]
-    return design
 
 
 def void_fabric(
@@ -208,3 +197,66 @@ def void_fabric(
         mean_lengths=mean,
         filled=float(empty.mean()),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class BlockFabrics:
+    """
+    The void fabrics of many blocks, or of each without its parts, in R replicates.
+
+    Unlike in :class:`VoidFabric`, an axis that keeps no segment takes the mean length of its block
+    in the same replicate. So sums need not be kept axis by axis; those of a thousand blocks would
+    be too many. ``(...)`` stands for the shape of the blocks.
+    """
+
+    tensors: FloatArray
+    """Fabric tensors, shape (R, ..., 3, 3); that of a block without anything is isotropic."""
+    length: FloatArray
+    """Σ w·sum, dump's length unit, shape (R, ...)."""
+    number: FloatArray
+    """Σ w·count, shape (R, ...)."""
+    segments: FloatArray
+    """Kept segments, shape (R, ...)."""
+    filled: FloatArray
+    """Fraction of the axes without any kept segment, shape (R, ...)."""
+
+    @property
+    def is_met(self) -> BoolArray:
+        """Whether a block has any segment, shape (...)."""
+        return np.asarray(self.number.sum(axis=0) > 0)
+
+    @property
+    def exists(self) -> BoolArray:
+        """Whether a block has enough segments for a fabric, shape (...)."""
+        return np.asarray((self.filled.mean(axis=0) <= MOST_FILLED_IN_BLOCK) & self.is_met)
+
+    def axial_errors(self, axis: FloatArray) -> FloatArray:
+        """Standard errors of the axial anisotropies by the scan; NaN for one replicate; (...)."""
+        values = axial(self.tensors, axis)
+        if len(values) < 2:
+            return np.full(values.shape[1:], np.nan)
+        return np.asarray(values.std(axis=0, ddof=1) / np.sqrt(len(values)))
+
+
+def block_fabrics(
+    axes: FloatArray, weights: FloatArray, length: FloatArray, number: FloatArray
+) -> BlockFabrics:
+    """
+    The void fabrics of blocks from the sums of a scan.
+
+    Parameters
+    ----------
+    axes : ndarray, shape (R, D, 3)
+        Unit vectors of each replicate.
+    weights : ndarray, shape (D,)
+        The direction rule's weights.
+    length, number : ndarray, shape (R, D, ...)
+        Of the kept segments, as :func:`scanfab.void_fabric` takes them.
+    """
+    empty = number <= 0
+    over, under = (np.einsum("d,rd...->r...", weights, one) for one in (length, number))
+    usual = np.where(under > 0, ratio(over, under), 1.0)
+    mean = np.where(empty, usual[:, None], ratio(length, number))
+    mean *= weights.reshape(-1, *[1] * (mean.ndim - 2))
+    tensors = weighted_tensors(axes, mean)
+    return BlockFabrics(tensors, over, under, number.sum(axis=1), empty.mean(axis=1))

@@ -10,13 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError, note, warn
+from scanfab.base.typing import Columns
 from scanfab.io.files import bare_name, check_memory, check_times, first_bytes, plain
 from scanfab.packing.cell import Cell
-
-Arrays = dict[str, npt.NDArray[Any]]
 
 IS_PARQUET = b"PAR1"
 IS_NPZ = b"PK"
@@ -47,14 +45,14 @@ def binary_names(path: Path) -> list[str] | None:
     return None
 
 
-def read_binary(path: Path) -> Arrays:
+def read_binary(path: Path) -> Columns:
     """The columns of a binary table, without those that are neither numbers nor text."""
     if is_xyzd(path):
         return _read_xyzd(path)
     if first_bytes(path, 8).startswith(IS_PARQUET):
         with _told(path, "Parquet"):
             return _read_parquet(path)
-    columns: Arrays = {}
+    columns: Columns = {}
     for name, values in read_npz(path).items():
         parts = _parts(name, values.shape)
         columns |= dict(zip(parts, values.T if values.ndim == 2 else [values], strict=False))
@@ -82,8 +80,8 @@ def _open_parquet(path: Path) -> Any:
     return parquet.ParquetFile(plain(path), thrift_string_size_limit=1 << 20)
 
 
-def _read_parquet(path: Path) -> Arrays:
-    found: Arrays = {}
+def _read_parquet(path: Path) -> Columns:
+    found: Columns = {}
     file = _open_parquet(path)
     names = file.schema_arrow.names
     _check_room(path, 8.0 * file.metadata.num_rows * len(names))
@@ -125,7 +123,7 @@ def npz_shapes(path: Path) -> dict[str, tuple[int, ...]]:
     return found
 
 
-def read_npz(path: Path, wanted: Iterable[str] | None = None) -> Arrays:
+def read_npz(path: Path, wanted: Iterable[str] | None = None) -> Columns:
     """The arrays of numbers and text in an NPZ file, those wanted; pickled objects are refused."""
     names = [name for name in npz_shapes(path) if wanted is None or name in wanted]
     with _told(path, "NPZ"), np.load(plain(path), max_header_size=MOST_HEADER) as archive:
@@ -138,7 +136,7 @@ def is_xyzd(path: Path) -> bool:
     return bare_name(path).lower().endswith(".xyzd")
 
 
-def _read_xyzd(path: Path) -> Arrays:
+def _read_xyzd(path: Path) -> Columns:
     """
     The columns x, y, z and diameter of a binary packing of PackingGeneration.
 
@@ -161,10 +159,8 @@ def _read_xyzd(path: Path) -> Arrays:
         )
         factor = (final / theory) ** (1 / 3) if min(final, theory) > 0 else np.nan
         if not 0.5 < factor < 2.0:
-            raise ReadError(
-                f"{path.with_name('packing.nfo')}: expected a theoretical and a final porosity "
-                f"between 0 and 1, by which the diameters of {path.name} are scaled"
-            )
+            expected = "a theoretical and a final porosity between 0 and 1, which scale diameters"
+            raise ReadError(f"{path.with_name('packing.nfo')}: expected {expected}")
     if factor != 1.0:
         told = f"diameters are multiplied by {factor:.6g}, from the porosities in packing.nfo"
         note(f"{path}: {told}")

@@ -12,12 +12,15 @@ import numpy.typing as npt
 
 from scanfab.base.arrays import MOST, doubles
 from scanfab.base.errors import ReadError
-from scanfab.base.typing import FloatArray, IntArray
-from scanfab.io.reader import BODIES, WALLS, GrainTable, ReadOptions
+from scanfab.base.typing import AnyArray, Columns, FloatArray, IntArray
+from scanfab.io.reader import GrainTable, ReadOptions
 from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
 from scanfab.packing.cell import Cell
 
-Columns = Mapping[str, npt.NDArray[Any]]
+BODIES = "scanfab_bodies"
+"""A column of this name is the number of each sphere's body, whatever other columns say."""
+WALLS = "scanfab_wall_contacts"
+"""A column of this name is the number of contacts with walls of each grain."""
 
 # names are compared without regard to case
 RADIUS_NAMES = ("radius", "radii", "rad", "r", "f_radius")
@@ -32,9 +35,9 @@ POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("x
 # axes are its radius and the exponents 2, within the rounding of six digits
 HALF_AXES, EXPONENTS = ("shapex", "shapey", "shapez"), ("blockiness1", "blockiness2")
 OLD_EXPONENTS, SIX_DIGITS = ("roundness1", "roundness2"), 1e-5
-# no grain is so many periodic cells, or times as far as the others where there are some, from the
-# origin: rounding would leave nothing of its place
-FAR, FEW = 1e12, 10
+# a number is damaged if a grain lies this many periodic cells from the cell's origin, or without a
+# cell this many times as far from 0 as the others: rounding would leave nothing of its place
+FAR = 1e12
 # a diameter that differs from twice the radius by more than this share of it is another size:
 # numbers of few digits are rounded
 ROUNDED = 0.05
@@ -102,10 +105,8 @@ def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | Non
     if periodic is None:
         return cell
     if cell is None:
-        raise ReadError(
-            f'{path}: `periodic="{asked}"` was asked for, but the dump names no cell: give it with '
-            f"`cell=(LX, LY, LZ)`"
-        )
+        lacks = f'`periodic="{asked}"` needs a cell, which the dump does not name'
+        raise ReadError(f"{path}: {lacks}: give it with `cell=(LX, LY, LZ)`")
     return Cell(cell.vectors, periodic, cell.origin)
 
 
@@ -140,12 +141,10 @@ def _named_by_user(path: Path, columns: Columns, options: ReadOptions) -> dict[s
     rest, named = dict(columns), {}
     for standard, own in options.columns.items():
         if own not in rest:
-            raise ReadError(
-                f"{path}: there is no column {own!r} to serve as {standard}; "
-                f"the columns are {', '.join(rest)}"
-            )
+            there = f"the columns are {', '.join(rest)}"
+            raise ReadError(f"{path}: there is no column {own!r} to serve as {standard}; {there}")
         named[standard] = rest.pop(own)
-    # a column that the file calls by a standard name is something else
+    # a column of the file that has such a standard name already is something else
     return {name + "_of_dump" * (name in named): one for name, one in rest.items()} | named
 
 
@@ -153,7 +152,7 @@ def _position(
     where: str, rest: dict[str, Any], options: ReadOptions, cell: Cell | None
 ) -> FloatArray:
     """Take the coordinates out of the columns."""
-    # a column of a dump may have that name, too
+    # a dump may have a column of single numbers called position, too
     if "position" in rest and np.ndim(rest["position"]) == 2:
         return _lengths(where, rest.pop("position"), "a coordinate")
     for names, scaled in POSITION_NAMES:
@@ -167,34 +166,32 @@ def _position(
             return position
         if cell is None:
             raise ReadError(f"{where}: {names} are fractions of a box, but there is no box")
-        # what is not finite is the packing's to refuse
+        # Packing refuses numbers that are not finite
         with np.errstate(over="ignore", invalid="ignore"):
             return np.asarray(cell.origin + position @ cell.vectors)
-    raise ReadError(
-        f"{where}: no coordinates: expected the columns x y z (or xu yu zu, xs ys zs), found "
-        f'{", ".join(rest) or "none"}; name them with `columns={{"x": ..., "y": ..., "z": ...}}`'
-    )
+    there, advice = ", ".join(rest) or "none", '`columns={"x": ..., "y": ..., "z": ...}` names them'
+    raise ReadError(f"{where}: no coordinates (x y z, xu yu zu, xs ys zs) in {there}; {advice}")
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def _refuse_far(where: str, position: FloatArray, radius: FloatArray, cell: Cell | None) -> None:
     """ReadError if a grain is so far away that rounding leaves nothing of its place or size."""
-    is_periodic = cell is not None and cell.is_periodic
-    if len(radius) < (1 if is_periodic else FEW):
+    periodic = cell if cell is not None and cell.is_periodic else None
+    if not len(radius):
         return
-    away = np.abs(position).max(axis=1)
-    size = np.abs(cell.vectors).max() if cell is not None and is_periodic else np.median(away)
-    # what cannot be a length is the packing's to refuse
+    away = np.abs(position - (0.0 if periodic is None else periodic.origin)).max(axis=1)
+    size = np.median(away) if periodic is None else np.abs(periodic.vectors).max()
+    # Packing refuses numbers that cannot be lengths
     far = np.flatnonzero((away < MOST) & (away > FAR * max(radius.max(), size)))
     if len(far):
-        found = f"grain {far[0] + 1} has a coordinate of {away[far[0]]:g}"
-        raise ReadError(f"{where}: {found}, too far away from all others: is the number damaged?")
+        found = f"grain {far[0] + 1} lies {away[far[0]]:g} from the origin"
+        raise ReadError(f"{where}: {found}, too far away: is a number damaged?")
 
 
 def _radius(where: str, rest: dict[str, Any], options: ReadOptions, count: int) -> FloatArray:
     """Take the radii out of the columns, or half the diameters; or the user's for all."""
     own = options.columns
-    # of a size that the user names, the other need not be believed
+    # if the user names one size, the other column is not compared with it
     sizes = own.keys() & {"radius", "diameter"} or {"radius", "diameter"}
     name = first_of(RADIUS_NAMES, rest) if "radius" in sizes else None
     other = first_of(DIAMETER_NAMES, rest) if "diameter" in sizes else None
@@ -207,23 +204,19 @@ def _radius(where: str, rest: dict[str, Any], options: ReadOptions, count: int) 
         row = None if other is None else other_size(radius, rest[other])
         if row is not None:
             names = own.get("radius", name), own.get("diameter", other)
-            raise ReadError(
-                f"{where}: the columns {names[0]!r} and {names[1]!r} contradict each other at "
-                f'grain {row + 1}: name the right one: `columns={{"radius": "{names[0]}"}}` or '
-                f'`columns={{"diameter": "{names[1]}"}}`'
-            )
+            told = f"the columns {names[0]!r} and {names[1]!r} contradict each other"
+            advice = f'`columns={{"radius": "{names[0]}"}}` names one'
+            raise ReadError(f"{where}: {told} at grain {row + 1}: {advice}")
         return radius
     if other is not None:
         return 0.5 * _lengths(where, rest.pop(other), "a diameter")
     like = next((name for name in rest if LIKE_A_RADIUS.search(name)), "...")
-    raise ReadError(
-        f"{where}: no radius: expected a column radius (or diameter), found "
-        f'{", ".join(rest) or "none"}; name it with `columns={{"radius": "{like}"}}`'
-        f"{' (if that is one)' * (like != '...')}, or give one radius for all grains with `radius`"
-    )
+    found, doubt = ", ".join(rest) or "none", " (if that is one)" * (like != "...")
+    advice = f'name it with `columns={{"radius": "{like}"}}`{doubt}, or give all grains a `radius`'
+    raise ReadError(f"{where}: no radius: expected radius or diameter, found {found}; {advice}")
 
 
-def other_size(radius: FloatArray, diameter: npt.NDArray[Any]) -> int | None:
+def other_size(radius: FloatArray, diameter: AnyArray) -> int | None:
     """
     The first grain whose diameter is not twice its radius, as nearly as numbers are printed.
 
@@ -253,11 +246,8 @@ def _refuse_superquadrics(where: str, rest: Columns, radius: FloatArray) -> None
         value = expected[name.lower()]
         count = np.count_nonzero(np.abs(rest[name] - value) > SIX_DIGITS * np.abs(value))
         if count:
-            raise ReadError(
-                f"{where}: {count} of {len(radius)} particles are superquadrics (by the column "
-                f"{name}): fill them with spheres, and say with `bodies` which of these are one "
-                f"particle"
-            )
+            told = f"{count} of {len(radius)} particles are superquadrics (by the column {name})"
+            raise ReadError(f"{where}: {told}: fill them with spheres, to be joined by `bodies`")
 
 
 def first_of(known: Sequence[str], names: Iterable[str]) -> str | None:
@@ -320,13 +310,11 @@ def body_numbers(path: Path, grains: GrainTable, named: str | None) -> IntArray 
         if grains.bodies is not None:
             return grains.bodies
         name = first_of(CLUMP_COLUMNS, columns)
-    # an empty frame may have lost its columns, and grains without ids are grains all the same
+    # an empty frame may have lost its columns; `id` makes each sphere a grain, also without ids
     if name is None or not len(grains.radius) or (name == "id" and name not in columns):
         return None
     if name not in columns:
-        raise ReadError(
-            f"{path}: there is no column {name!r} to say which spheres are one body (`bodies`); "
-            f"the columns are {', '.join(['id', *columns])}"
-        )
+        there = ", ".join(["id", *columns])
+        raise ReadError(f"{path}: `bodies`: there is no column {name!r}; the columns are {there}")
     numbers = whole_numbers(path, columns[name], f": `bodies`: the column {name}")
     return np.where(numbers > 0, numbers, -1) if name.lower() in MOLECULE_COLUMNS else numbers

@@ -13,14 +13,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
-from scanfab.io.columns import whole_numbers
+from scanfab.base.typing import Columns
+from scanfab.io.columns import BODIES, WALLS, whole_numbers
 from scanfab.io.contacts import join_ids
 from scanfab.io.families import numbers_in
 from scanfab.io.files import bare_name, check_memory, first_bytes, plain
-from scanfab.io.reader import BODIES, WALLS, GrainTable, JoinedContacts, Snapshot
+from scanfab.io.reader import GrainTable, JoinedContacts, Snapshot
 from scanfab.io.writer import Left, as_arrays, csv_bytes, more_columns
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
@@ -38,7 +38,6 @@ PARTS |= {"force": ["fx2", "fy2", "fz2"], "force_n": ["fn"]}
 WHOLE = ("id1", "id2", *PARTS["image"])
 # vectors and corner of the cell
 CELL = tuple(f"{vector}{axis}" for vector in "abco" for axis in "xyz")
-# files of early versions end before the counts
 FRAME = ("step", "time", *CELL, "periodic", "grains", "contacts")
 # bytes of memory for each byte of a file
 IN_MEMORY = 12.0
@@ -100,7 +99,7 @@ def _rows(path: Path) -> Any:
         raise ReadError(f"{path}: cannot be read: {str(error).partition(chr(10))[0]}") from None
 
 
-def _columns(path: Path) -> dict[str, npt.NDArray[Any]]:
+def _columns(path: Path) -> Columns:
     """The columns of a companion file: each whole numbers, numbers or texts, as all words are."""
     import polars
 
@@ -130,7 +129,7 @@ def read_contacts(path: Path, grains: GrainTable) -> JoinedContacts:
     table = _columns(path)
     if any(values.dtype.kind == "U" for values in table.values()):
         raise ReadError(f"{path}: expected numbers as {', '.join(table)}, found other words")
-    # any file of grains of this name has the same frame file
+    # the frame file is the same whatever the ending of the grain file
     grain_file = path.with_name(f"{bare_name(path).removesuffix('.contacts.csv')}.csv")
     _check_count(path, len(table["id1"]), "contacts", read_frame(grain_file))
     if grains.id is None:
@@ -144,11 +143,8 @@ def read_contacts(path: Path, grains: GrainTable) -> JoinedContacts:
 def _check_count(path: Path, found: int, what: str, told: FrameData | None) -> None:
     """ReadError if a file has lost rows on its way, or belongs to another frame."""
     if told is not None and getattr(told, what) not in (None, found):
-        expected = f"{getattr(told, what)} by {told.file.name}"
-        raise ReadError(
-            f"{path}: holds {found} {what}, expected {expected}: it was cut, or belongs to another "
-            f"frame (if you took rows out yourself, empty that number)"
-        )
+        expected = f"expected {getattr(told, what)} by {told.file.name}"
+        raise ReadError(f"{path}: holds {found} {what}, {expected}: it was cut, or is of others")
 
 
 class FrameData(NamedTuple):
@@ -184,7 +180,7 @@ def read_frame(path: Path) -> FrameData | None:
     words = {name: word for name, word in zip(rows[0], rows[-1], strict=True) if word}
     along = words.get("periodic", "")
     try:
-        if rows[0] not in (FRAME, FRAME[:-2]) or len(rows) != 2 or set(along) - set("xyz"):
+        if rows[0] != FRAME or len(rows) != 2 or set(along) - set("xyz"):
             raise ValueError(f"expected the line {','.join(FRAME)} and one row")
         cell = None
         if any(name in words for name in CELL):
@@ -220,9 +216,8 @@ def check_contacts_are_there(path: Path, told: FrameData | None) -> None:
     if count or is_empty:
         found = "an empty file" if is_empty else "other words" if file.is_file() else "no such file"
         advice = 'copy it again, or choose `contacts="geometric"`'
-        raise ReadError(
-            f"{file}: expected the {count}contacts of {path.name}, found {found}: {advice}"
-        )
+        expected = f"expected the {count}contacts of {path.name}"
+        raise ReadError(f"{file}: {expected}, found {found}: {advice}")
 
 
 def with_columns(path: Path, grains: GrainTable, told: FrameData | None) -> GrainTable:

@@ -6,30 +6,35 @@ Where a file does not say on which grain its forces act, their sign is proved by
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.arrays import MOST
+from scanfab.base.arrays import MOST, doubles
 from scanfab.base.errors import ReadError, note, warn
-from scanfab.base.typing import FloatArray, IntArray
+from scanfab.base.typing import AnyArray, Columns, FloatArray, IntArray
 from scanfab.io.columns import whole_numbers
-from scanfab.io.reader import GrainTable, JoinedContacts, OtherGrainsError
+from scanfab.io.reader import GrainTable, JoinedContacts
 from scanfab.packing.contacts import ContactList
 
 # an end of a contact within this fraction of a radius from a centre belongs to that grain
 SAME_PLACE = 0.01
 # two grains are neighbours if their distance is below (r1 + r2) times this
 NEAR = 1.1
-# a rule that holds for this share of all contacts holds
+# a rule is taken to hold if it holds for this share of all contacts
 NEARLY_ALL = 0.9
 # what programs call a contact of two grains; whatever else is one with a wall
 OF_GRAINS = ("ss", "ball-ball", "ball-pebble", "pebble-ball", "pebble-pebble", "rball-rball")
 
-Columns = Mapping[str, npt.NDArray[Any]]
+
+class NotContactsError(ReadError):
+    """No column of a file can hold ids: if nobody named the file, it is skipped with a note."""
+
+
+class OtherGrainsError(NotContactsError):
+    """The ids of a file of contacts are not those of the grains."""
 
 
 def rows_of_ids(grains: GrainTable, ids: npt.ArrayLike) -> IntArray:
@@ -135,9 +140,7 @@ def _grains_at(grains: GrainTable, points: FloatArray) -> IntArray:
         points, position = grains.cell.wrap(points), grains.cell.wrap(position)
         # rounding may put a point and its centre on opposite faces: images just outside help
         margin = min(SAME_PLACE * float(radius.max()), float(grains.cell.heights.min()))
-        images, of = grains.cell.images(position, margin)
-        position = np.concatenate([position, images])
-        row = np.concatenate([row, of])
+        position, row, _ = grains.cell.with_images(position, margin)
     distance, nearest = KDTree(position).query(points)
     same = distance < SAME_PLACE * radius[row[nearest]]
     return np.where(same, row[nearest], -1)
@@ -166,10 +169,8 @@ def _refuse_images(path: Path, grains: GrainTable, rows: IntArray, ends: FloatAr
         is_contact = (length > 0.5 * reach) & (length < 1.05 * reach)
         is_image |= np.any(is_same & is_contact & (other != partner[:, None]), axis=1)
     if is_image.sum() > 0.5 * len(one):
-        raise ReadError(
-            f"{path}: {is_image.sum()} contacts end at periodic images of grains, but the sample "
-            f"has no cell: name it with `cell=(LX, LY, LZ)` (and `periodic`)"
-        )
+        told = f"{is_image.sum()} contacts end at periodic images of grains, without a cell"
+        raise ReadError(f"{path}: {told}: name it with `cell=(LX, LY, LZ)` (and `periodic`)")
 
 
 def count_walls(rows: IntArray, count: int) -> IntArray:
@@ -181,7 +182,7 @@ def _join(
     path: Path,
     grains: GrainTable,
     listed: ContactList,
-    named: npt.NDArray[Any],
+    named: AnyArray,
     verb: str,
     walls: bool | Literal["unknown", "negative"],
 ) -> JoinedContacts:
@@ -203,9 +204,8 @@ def _join(
         told = f"{path}: contact {contact + 1} {verb} {end}, which is not in the grain file "
         told += f"({np.count_nonzero(doubtful)} of {len(rows)} contacts)"
         if wrong.any():
-            raise OtherGrainsError(
-                f"{told}: are both of the same step? A periodic sample also needs its cell (`cell`)"
-            )
+            advice = "are both of the same step? A periodic sample also needs its `cell`"
+            raise OtherGrainsError(f"{told}: {advice}")
         warn(f"{told}: these are counted as contacts with walls")
     image, force, force_n = (
         None if values is None else np.asarray(values)[both]
@@ -278,7 +278,7 @@ def join_table(path: Path, grains: GrainTable, found: Columns) -> JoinedContacts
     ids = np.column_stack([whole_numbers(path, found[one]) for one in ("id1", "id2")])
     kind = found.get("kind")
     if kind is not None and kind.dtype.kind == "U":
-        # the second is the wall; its id is of another kind than those of grains
+        # the second end is the wall: its id counts walls, not grains
         ids[~np.isin(np.char.lower(np.char.strip(kind)), OF_GRAINS), 1] = -1
     walls = np.any(ids < 0, axis=1)
     found = {name: values[~walls] for name, values in found.items()}
@@ -286,11 +286,16 @@ def join_table(path: Path, grains: GrainTable, found: Columns) -> JoinedContacts
     grains = _with_ids(path, grains, pairs)
     rows = rows_of_ids(grains, pairs)
     force = _force(path, grains, rows, found) if (rows >= 0).all() else None
-    force_n = _normal_force(path, found) if force is None else None
+    force_n = found.get("fn") if force is None else None
+    if force_n is not None:
+        # compression is positive, and nearly all contacts are under compression
+        doubt = "are above 0, so it cannot be told whether that means compression"
+        sign = _sign(doubles(force_n), f"{path}: the normal forces are left out", doubt)
+        force_n = None if sign is None else sign * doubles(force_n)
     shift = _vectors(path, grains, found, "ix iy iz")
     image = None if shift is None else whole_numbers(path, shift.ravel()).reshape(-1, 3)
     joined = join_ids(path, grains, pairs, force, walls=False, image=image, force_n=force_n)
-    # of a pair in either order, with the image of the second grain from the first
+    # a pair may be listed in either order; the image is that of the second grain
     keys = np.sort(pairs, axis=1)
     if image is not None:
         keys = np.hstack([keys, np.where(pairs[:, :1] > pairs[:, 1:], -image, image)])
@@ -320,15 +325,10 @@ def _with_ids(path: Path, grains: GrainTable, ids: IntArray) -> GrainTable:
             near = length < NEAR * grains.radius[rows].sum(axis=1)
             fits += [base] * bool(np.mean(near) > NEARLY_ALL)
     if len(ids) and len(fits) != 1:
-        raise OtherGrainsError(
-            f"{path}: names grains by numbers, but the grain file has no ids, and as rows these "
-            f'are no neighbours: name the ids of grains with `columns={{"id": ...}}`'
-        )
+        told = 'the grains have no ids, and by rows are no neighbours: `columns={"id": ...}`'
+        raise OtherGrainsError(f"{path}: names grains by numbers, but {told} names their ids")
     for base in fits:
-        note(
-            f"the grains have no ids: contacts name their rows, counted from {base}, since these "
-            f"are neighbours"
-        )
+        note(f"the grains have no ids: contacts name their rows, counted from {base}")
     return grains._replace(id=np.arange(count) + sum(fits))
 
 
@@ -364,13 +364,3 @@ def _force(path: Path, grains: GrainTable, rows: IntArray, found: Columns) -> Fl
         force = normal + tangential
     cure = ": name them as fx1, fy1, fz1 (on the first) or fx2, fy2, fz2 with `contact_columns`"
     return proved_force(path, grains, rows, force, cure)
-
-
-def _normal_force(path: Path, found: Columns) -> FloatArray | None:
-    """The normal force, compression positive: the sign that nearly all have."""
-    values = found.get("fn")
-    if values is None or values.dtype.kind not in "biuf":
-        return None
-    doubt = "are above 0, so it cannot be told whether that means compression"
-    sign = _sign(values.astype(np.float64), f"{path}: the normal forces are left out", doubt)
-    return None if sign is None else sign * values.astype(np.float64)

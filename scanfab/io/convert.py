@@ -12,7 +12,7 @@ from typing import Any
 from scanfab.base.errors import SettingsError, note
 from scanfab.base.files import check_folder, whole_file
 from scanfab.base.option import refuse_unknown
-from scanfab.io.companions import HEADS, companion_there, companions_of
+from scanfab.io.companions import HEADS, companion_kind, companion_there, companions_of
 from scanfab.io.files import COMPRESSED_SUFFIXES, bare_name
 from scanfab.io.options import parse_frames
 from scanfab.io.reader import installed_readers
@@ -84,7 +84,8 @@ def convert(
     ('grains.vtp', 800, 30000)
     """
     out = Path(out)
-    is_folder = STEP not in out.name and (out.is_dir() or (to is not None and not out.suffix))
+    is_new = to is not None and not out.suffix and not out.exists()
+    is_folder = STEP not in out.name and (out.is_dir() or is_new)
     if is_folder and to is None:
         raise SettingsError(f"{out}: a folder has no format: name one as `to`")
     writer = writer_for(out) if to is None else writer_named(to)
@@ -93,7 +94,7 @@ def convert(
     refuse_unknown("convert", reading, [*READING, "to", "frames"])
     found = _packings(source, parse_frames(frames), reading)
     if STEP not in pattern.name:
-        # there must be no second frame, which is known before the file is touched
+        # look for a second frame before the file is touched
         first = list(islice(found, 2))
         if len(first) > 1:
             where = f"a folder, or a file with {STEP} in its name, or one frame by `frames`"
@@ -124,27 +125,18 @@ def _packings(source: Any, chosen: slice, reading: dict[str, Any]) -> Iterator[t
     elif reading:
         raise SettingsError(f"`{next(iter(reading))}` is for files that are yet to be read")
     if isinstance(source, Series):
-        _tell_left_out(source)
+        for one in source.contacts:
+            if companion_kind(one.largest) is None:
+                note(f"{one.pattern}: of contacts only pairs, images and forces are written")
         return ((frame.number, frame.read()) for frame in source[chosen])
     packings = [source] if isinstance(source, Packing) else source
     if not isinstance(packings, Iterable):
         raise SettingsError(f"source: expected a path, a Series or packings, found {source!r}")
     bounds = (chosen.start, chosen.stop, chosen.step)
     if any((bound or 0) < 0 for bound in bounds):
-        # counted from the end, so that all must be known first
+        # a bound counts from the end, so all packings are needed first
         return iter(list(enumerate(packings))[chosen])
     return islice(enumerate(packings), *bounds)
-
-
-def _tell_left_out(series: Series) -> None:
-    """A note for each kind of contact files on the columns that a packing has no place for."""
-    for family in series.contacts:
-        ask = getattr(family.reader, "left_out", None)
-        file = next(iter(family.files.values()))
-        names = ["whatever else stands there"] if ask is None else ask(file)
-        if names:
-            kept = "contacts are kept as pairs, images and forces"
-            note(f"{family.pattern}: {kept}; left out: {', '.join(names)}")
 
 
 def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> None:
@@ -167,13 +159,13 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
         names = " and ".join(file.name for file in there)
         raise SettingsError(f"{path}: {names} may belong to {other.name}: choose another name")
     with ExitStack() as files:
-        # the first file to be opened is the last to take its place: with the grains all is there
+        # files take their places in reverse order: the grain file last, when all others are there
         left = writer.write(packing, files.enter_context(whole_file(path)))
         made = companions_of(packing, path, left)
         for file, data in made.items():
             files.enter_context(whole_file(file)).write_bytes(data)
     for file in set(there) - made.keys():
-        # an earlier packing of this name has left it
+        # it belonged to an earlier packing of this name
         with suppress(OSError):
             file.unlink()
     for text in left.notes:

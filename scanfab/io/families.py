@@ -18,16 +18,10 @@ from fnmatch import fnmatch
 from itertools import chain, takewhile
 from pathlib import Path
 
-from scanfab.base.errors import ReadError, UnknownFormatError, note, warn
+from scanfab.base.errors import ReadError, note, warn
 from scanfab.base.files import kind_of
 from scanfab.io.files import bare_name
-from scanfab.io.reader import (
-    FileKind,
-    Reader,
-    ReadOptions,
-    installed_readers,
-    reader_for,
-)
+from scanfab.io.reader import FileKind, Reader, ReadOptions, installed_readers, reader_for
 
 PathLike = str | os.PathLike[str]
 Numbered = list[tuple[int | None, Path]]
@@ -144,11 +138,9 @@ def sort_into_families(
     show which number in a name is the step.
     """
     files = set(files)
-    return [
-        _family_of(members, files, options, len(group) > 1)
-        for group in (group_by_name(files) if groups is None else groups)
-        if (members := [pair for pair in group if pair[1] in files])
-    ]
+    groups = group_by_name(files) if groups is None else groups
+    own = [([one for one in group if one[1] in files], len(group) > 1) for group in groups]
+    return [_family_of(members, files, options, several) for members, several in own if members]
 
 
 def group_by_name(*listings: Iterable[Path]) -> list[Numbered]:
@@ -192,7 +184,7 @@ def _split(group: list[Path]) -> Iterable[Numbered]:
 
 def numbers_in(file: Path) -> tuple[int, ...]:
     """The numbers in a name, of which one may be the step."""
-    # the ending of a name (.mp4) is not a number of the frame, unless it is nothing else (dump.100)
+    # digits in the ending (.mp4) are no step, unless the whole ending is a number (dump.100)
     name = Path(bare_name(file))
     text = name.name if name.suffix[1:].isdigit() else name.stem
     return tuple(map(int, NUMBER.findall(text)))
@@ -203,22 +195,20 @@ def _family_of(
 ) -> Family:
     """The family of some files; its pattern matches none of the others ``among`` which they are."""
     files: dict[int | None, Path] = {}
-    clash = problem = reader = None
+    clash = None
     for step, file in members:
         if files.setdefault(step, file) is not file:
             clash = f"two files for one step: {files[step]} and {file}: name one of them"
     pattern = _glob([file for _, file in members], among)
     family = Family(pattern, files, None, "other", None, clash, has_steps)
-    kind: FileKind = "other"
+    reader = None
     try:
         reader = reader_for(family.largest, options)
         kind = "other" if reader is None else reader.kind(family.largest)
-    except UnknownFormatError:
-        raise
     except ReadError as error:
-        # in a folder one damaged file is skipped; alone it is the error
-        problem = str(error)
-    return replace(family, reader=reader, kind=kind, problem=problem)
+        # a folder is read without its damaged files; of a single file this is the error
+        return replace(family, reader=reader, problem=str(error))
+    return replace(family, reader=reader, kind=kind)
 
 
 def _glob(members: list[Path], among: Iterable[Path]) -> str:
@@ -330,10 +320,8 @@ def contacts_beside(
     if own:
         note(f"contacts are read from {', '.join(one.pattern for one in own)}, beside the grains")
     elif doubtful:
-        note(
-            f"skipped {some(doubtful)}: contacts beside the grains, but neither step nor name "
-            f"tells that they belong to {grains.pattern}: if they do, name them with `contacts`"
-        )
+        told = f"neither step nor name tells that they belong to {grains.pattern}"
+        note(f"skipped {some(doubtful)}: contacts, but {told}: if they do, name them by `contacts`")
     return families, own
 
 

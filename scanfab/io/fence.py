@@ -16,7 +16,6 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -30,6 +29,8 @@ Answer = TypeVar("Answer")
 SECONDS, PER_SECOND = 8.0, 10e6
 # bytes of memory that any file may take, and how many times its size a large one may take
 MEMORY, GROWTH = 512e6, 100
+_workers: dict[int, tuple[threading.Lock, list[Any]]] = {}
+"""The lock of each process, and its worker if that waits; a forked process has its own."""
 
 
 def fenced(function: Callable[..., Answer], path: Path, *more: Any) -> Answer:
@@ -55,7 +56,7 @@ def fenced(function: Callable[..., Answer], path: Path, *more: Any) -> Answer:
     size = file.stat().st_size
     check_memory(path, 2.0 * size)
     limits = min(MEMORY + GROWTH * size, free_memory()), SECONDS + size / PER_SECOND
-    lock, idle = _own(os.getpid())
+    lock, idle = _workers.setdefault(os.getpid(), (threading.Lock(), []))
     with lock:
         worker = idle.pop() if idle else _start()
         try:
@@ -66,19 +67,13 @@ def fenced(function: Callable[..., Answer], path: Path, *more: Any) -> Answer:
         except (OSError, EOFError, pickle.UnpicklingError):
             is_sound, answer = False, "its library crashed, or took too much time or memory"
         finally:
-            # it ended; or we were interrupted, and its next answer would be to this question
+            # it ended; or we were interrupted, and its next answer would belong to this question
             if not idle:
                 with suppress(OSError), worker:
                     worker.kill()
     if not is_sound:
         raise ReadError(f"{path}: cannot be read: {answer}")
     return answer  # type: ignore[no-any-return]
-
-
-@cache
-def _own(process: int) -> tuple[threading.Lock, list[Any]]:
-    """The lock of a process, and its worker if that waits; a forked process has its own."""
-    return threading.Lock(), []
 
 
 def _start() -> Any:

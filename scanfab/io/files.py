@@ -23,16 +23,12 @@ from scanfab.base.errors import ReadError, warn
 from scanfab.base.files import check_file, free_memory
 
 COMPRESSED_SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".lz4")
-# part of Python since 3.14
+# in the standard library since Python 3.14
 ZSTD = "compression.zstd" if sys.version_info >= (3, 14) else "backports.zstd"
-DECOMPRESSORS = {
-    b"\x1f\x8b": "gzip",
-    b"BZh": "bz2",
-    b"\xfd7zXZ\x00": "lzma",
-    b"\x28\xb5\x2f\xfd": ZSTD,
-    b"\x50\x2a\x4d\x18": ZSTD,  # a frame to skip, with which pzstd begins
-    b"\x04\x22\x4d\x18": "lz4.frame",
-}
+DECOMPRESSORS = {b"\x1f\x8b": "gzip", b"BZh": "bz2", b"\xfd7zXZ\x00": "lzma"}
+# zstd, and a frame to skip with which pzstd begins
+DECOMPRESSORS |= {b"\x28\xb5\x2f\xfd": ZSTD, b"\x50\x2a\x4d\x18": ZSTD}
+DECOMPRESSORS |= {b"\x04\x22\x4d\x18": "lz4.frame"}
 """The module that opens a file, by the first bytes of the file."""
 MAGIC_BYTES = max(map(len, DECOMPRESSORS))
 # how many times its compressed size a file may grow to; up to ANYWAY bytes, any file may
@@ -42,7 +38,7 @@ ANYWAY = 64 << 20
 KEPT = 16
 # bytes that are copied at a time
 PART = 4 << 20
-# of the name of the folder that holds the copies of a process
+# folders of decompressed copies are named so
 PREFIX = "scanfab-"
 Stamp = tuple[str, int, int, int]
 """Tells a file from other files, and from itself after it was changed."""
@@ -106,7 +102,7 @@ def pieces(path: Path, size: int = PART) -> Iterator[bytes]:
         with open(path, "rb") as packed, packed if module is None else module.open(packed) as file:
             while piece := file.read(size):
                 unpacked += len(piece)
-                # by what was read so far, a bomb is known long before its end
+                # checked while reading, so that a bomb is found long before its end
                 check_times(path, packed.tell(), unpacked)
                 yield piece
     except (OSError, EOFError, RuntimeError, zlib.error, lzma.LZMAError, zstd_error) as error:
@@ -132,20 +128,16 @@ def check_times(path: Path, packed: int, unpacked: float) -> None:
     """ReadError if a file would unpack to far more than one so small can hold."""
     times = _times.get()
     if unpacked > max(ANYWAY, times * packed):
-        raise ReadError(
-            f"{path}: {packed:,} bytes of it unpack to more than {times:g} times as many: if it "
-            f"is a dump, allow more with `max_unpacked`"
-        )
+        told = f"{packed:,} bytes of it unpack to more than {times:g} times as many"
+        raise ReadError(f"{path}: {told}: if it is a dump, allow more with `max_unpacked`")
 
 
 def check_memory(path: Path, needed: float) -> None:
     """ReadError if there are not so many bytes for what a file holds."""
     free = free_memory()
     if needed > free:
-        raise ReadError(
-            f"{path}: needs about {needed / 1e9:.1f} GB of memory to be read, and "
-            f"{free / 1e9:.1f} GB are free"
-        )
+        sizes = f"about {needed / 1e9:.1f} GB of memory, and {free / 1e9:.1f} GB are free"
+        raise ReadError(f"{path}: to read it takes {sizes}")
 
 
 def file_inside(index: Path, name: str) -> Path:
@@ -161,9 +153,8 @@ def file_inside(index: Path, name: str) -> Path:
     folder = os.path.abspath(index.parent)
     file = os.path.normpath(os.path.join(folder, name.replace("\\", "/")))
     if "\0" in name or os.path.commonpath([folder, file]) != folder or file == folder:
-        raise ReadError(
-            f"{index}: names {name!r}, which does not lie in its folder: move the files together"
-        )
+        told = "which does not lie in its folder: move the files together"
+        raise ReadError(f"{index}: names {name!r}, {told}")
     path = index.parent / os.path.relpath(file, folder)
     # a name may be too long for any file
     if not os.path.isfile(path):
@@ -190,10 +181,9 @@ def temporary_copy(content: Iterable[bytes], name: str) -> Path:
     except BaseException as error:
         shutil.rmtree(folder, ignore_errors=True)
         if isinstance(error, OSError):
-            raise ReadError(
-                f"{name}: its content cannot be written to {tempfile.tempdir or 'any folder'}: "
-                f"{_reason(error)}: make room, or name another folder for temporary files by TMPDIR"
-            ) from None
+            told = f"{_reason(error)}: make room there, or name another folder by TMPDIR"
+            place = tempfile.tempdir or "any folder"
+            raise ReadError(f"{name}: cannot be written to {place}: {told}") from None
         raise
 
 
@@ -206,7 +196,7 @@ def _folder(process: int) -> str:
 
 
 def _remove_at_end(folder: str) -> None:
-    # under another name no thread that is still reading can put a copy into it
+    # renamed first, so that no thread that is still reading can add a copy
     last = f"{folder}-removed"
     with suppress(OSError):
         os.rename(folder, last)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Container, Iterator
 from contextlib import suppress
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from scanfab.base.errors import PackingError, ReadError, warn
 from scanfab.base.option import refuse_unknown, unusable
@@ -21,7 +21,7 @@ from scanfab.io.options import take_reading
 from scanfab.io.series import ENDLESS, Series
 from scanfab.io.sources import READING, as_text, read_series
 
-# seconds between two looks at the files, or so many times what the last look took
+# seconds between two looks at the files, or this many times what the last look took
 PAUSE, PAUSES = 0.2, 3.0
 # a file that did not change for so many seconds is whole, if it can be read to its end
 QUIET = 1.0
@@ -76,13 +76,9 @@ def follow_series(
     return FollowedSeries(os.fspath(source), seconds, take_reading(dict(options)))
 
 
-class _Taken(NamedTuple):
-    """A frame that was handed on, and how its files were then."""
-
-    frame: Frame
-    size: int
-    """Of the file of grains, in bytes."""
-    has_contacts: bool
+State = tuple[Path, int, int, list[Path]]
+"""Where a frame lies (file, first byte, last byte), and its contact files: once a frame was taken,
+this may not change any more."""
 
 
 class FollowedSeries(Series):
@@ -95,7 +91,7 @@ class FollowedSeries(Series):
         """Is called each time that there is nothing to do but to wait."""
         self._seconds = math.inf if seconds is None else seconds
         self._is_over = False
-        self._taken: list[_Taken] = []
+        self._taken: list[tuple[Frame, State]] = []
         self._since = time.monotonic()
         """When the last frame was taken."""
         self._seen: dict[Path, tuple[Stamp, float]] = {}
@@ -123,7 +119,7 @@ class FollowedSeries(Series):
             while self._taken and self._told:
                 warnings.warn(self._told.pop(0).message, stacklevel=2)
             if number < len(self._taken):
-                yield self._taken[number].frame
+                yield self._taken[number][0]
                 number += 1
             elif self._is_over:
                 return
@@ -161,21 +157,18 @@ class FollowedSeries(Series):
         if any(self._is_whole(frame, has_later=frame is not waiting[-1]) for frame in waiting):
             self._take(waiting[0])
         elif self._is_over or waited >= self._seconds:
-            # from now on nothing is waited for, not even contact files
+            # stop waiting, also for contact files
             self._seconds = 0.0
             if any(map(self._can_be_read, waiting)):
                 self._take(waiting[0])
                 return
             self._is_over = True
             if waiting:
-                warn(
-                    f"{waiting[0].snapshot.path}: is left out, as it was not whole when following "
-                    f"ended: {self._problem}"
-                )
+                path = waiting[0].snapshot.path
+                warn(f"{path}: is left out, as it was not whole at the end: {self._problem}")
 
     def _take(self, frame: Frame) -> None:
-        has_contacts = any(_contacts(frame.series, frame))
-        self._taken.append(_Taken(frame, _size(frame.snapshot.path), has_contacts))
+        self._taken.append((frame, _state(frame.series, frame)))
         self._since = time.monotonic()
 
     def _frames_of(self, series: Series) -> list[Frame]:
@@ -187,10 +180,8 @@ class FollowedSeries(Series):
         """Open the series again if files have changed; ReadError if it cannot be gone on with."""
         source = Path(self.sources[0])
         if not source.exists():
-            raise ReadError(
-                f"{source}: has vanished while it was followed, after {len(self._taken)} frames of "
-                f"it were taken: bring it back and go on with `resume`"
-            )
+            told = f"has vanished while it was followed, after {len(self._taken)} frames of it"
+            raise ReadError(f"{source}: {told}: bring it back and go on with `resume`")
         names = files_in(source) if source.is_dir() else [source]
         quiet = [self._quiet(path) for path in names]
         looked = [(path, self._seen.get(path)) for path in names]
@@ -215,22 +206,12 @@ class FollowedSeries(Series):
 
     def _check_taken(self, series: Series) -> None:
         """ReadError if the frames that were taken are not the first of the series any more."""
-        frames = self._frames_of(series) if self._taken else []
-        there = {frame.snapshot.path for frame in frames}
-        taken = {one.frame.snapshot.path for one in self._taken}
-        for old, new in zip_longest(self._taken, frames[: len(self._taken)]):
-            path, what = old.frame.snapshot.path, ""
-            if path not in there:
-                what = "has vanished after its frame was taken"
-            elif new is not None and new.snapshot.path not in taken:
-                path, what = new.snapshot.path, "is new, and belongs before frames that were taken"
-            # one file of many snapshots may grow
-            elif new is None or (len(taken) > 1 and _size(path) != old.size):
-                what = "has changed after its frame was taken"
-            elif not old.has_contacts and any(_contacts(series, new)):
-                what = "was taken before its contact file came"
-            if what:
-                raise ReadError(f"{path}: {what}: compute the finished folder without `follow`")
+        frames = self._frames_of(series)[: len(self._taken)] if self._taken else []
+        for (taken, old), frame in zip_longest(self._taken, frames):
+            if frame is None or _state(series, frame) != old:
+                told = f"was taken as frame {taken.number}, but since then files up to it"
+                advice = "compute the finished folder without `follow`"
+                raise ReadError(f"{old[0]}: {told} have changed or come: {advice}")
 
     def _is_whole(self, frame: Frame, *, has_later: bool) -> bool:
         """Whether all files of a frame are there, are not written any more, and can be read."""
@@ -243,8 +224,8 @@ class FollowedSeries(Series):
             return False
         if has_later or frame.number:
             return self._can_be_read(frame)
-        # of the first frame alone nobody knows whether contact files will come, nor whether the
-        # number in its name is its step
+        # while there is one frame only, nobody knows whether contact files will come, nor whether
+        # the number in its name is a step
         may_come = series.contacts_from in ("auto", "beside") and not series.contacts
         has_step = frame.step is not None or frame.name_step is None
         return has_step and self._can_be_read(frame, needs_contacts=may_come)
@@ -269,9 +250,11 @@ class FollowedSeries(Series):
         return time.monotonic() - self._seen[path][1]
 
 
-def _size(path: Path) -> int:
-    """The size of a file in bytes; 0 if it is not there."""
-    return path.stat().st_size if path.exists() else 0
+def _state(series: Series, frame: Frame) -> State:
+    """How a frame is now."""
+    path, stop = frame.snapshot.path, frame.snapshot.stop
+    stop = path.stat().st_size if stop is None and path.exists() else stop or 0
+    return path, frame.snapshot.start, stop, [*filter(None, _contacts(series, frame))]
 
 
 def _contacts(series: Series, frame: Frame) -> list[Path | None]:

@@ -10,24 +10,11 @@ import numpy as np
 
 from scanfab.base.errors import PackingError, ReadError, note, warn
 from scanfab.io.columns import body_numbers
-from scanfab.io.companions import (
-    FrameData,
-    check_contacts_are_there,
-    companion_kind,
-    with_columns,
-)
-from scanfab.io.families import Family, are_tied
+from scanfab.io.companions import FrameData, check_contacts_are_there, companion_kind, with_columns
+from scanfab.io.contacts import NotContactsError, OtherGrainsError
+from scanfab.io.families import are_tied
 from scanfab.io.files import unpacking_up_to
-from scanfab.io.reader import (
-    Carries,
-    GrainTable,
-    JoinedContacts,
-    NotContactsError,
-    OtherGrainsError,
-    Reader,
-    ReadOptions,
-    Snapshot,
-)
+from scanfab.io.reader import Carries, GrainTable, JoinedContacts, Reader, ReadOptions, Snapshot
 from scanfab.packing.contacts import ListedWallForces
 from scanfab.packing.packing import Packing, check_lengths
 
@@ -89,12 +76,17 @@ class Frame:
         known = replace(series.known, snapshots={})
         # a series whose space is not known yet looks for it in the frames before
         is_known = series.dim == 3 or known.space is not None
-        steps = (self.name_step, self.step) if is_known else tuple(series.grains.files)
-        grains, *contacts = (_of_steps(one, steps) for one in (series.grains, *series.contacts))
+        steps = {None, self.name_step, self.step} | (set() if is_known else {*series.grains.files})
+        families = []
+        for one in (series.grains, *series.contacts):
+            # plus one more: if a family has one file only, that may belong to any step
+            wanted = {*steps, next((step for step in one.files if step not in steps), None)}
+            files = {step: file.absolute() for step, file in one.files.items() if step in wanted}
+            families.append(replace(one, files=files))
         parts = tuple(part.absolute() for part in snapshot.parts)
         return replace(
             self,
-            series=replace(series, grains=grains, contacts=tuple(contacts), known=known),
+            series=replace(series, grains=families[0], contacts=tuple(families[1:]), known=known),
             snapshot=replace(snapshot, path=snapshot.path.absolute(), parts=parts),
         )
 
@@ -160,15 +152,11 @@ class Frame:
         if not lists and takes_own:
             check_contacts_are_there(path, self.told)
         if not lists and series.contacts_from == "grains":
-            raise ReadError(
-                f'{path}: `contacts="file"` was asked for, but there is no contact file'
-            )
+            raise ReadError(f'{path}: there is no contact file, which `contacts="file"` needs')
         if not lists and series.contacts_from == "path":
-            warn(
-                f"{named}: lists contacts with walls only: contacts between grains are found by "
-                f"geometry, unless `contacts` names their file"
-            )
-        # the contacts file that a conversion has left beside the grains lists no walls
+            told = "lists contacts with walls only: those between grains are found by geometry"
+            warn(f"{named}: {told}, unless `contacts` names their file")
+        # a contacts file that `convert` wrote lists no walls: the grain file counts them
         if grains.wall_contacts is not None and (
             takes_own or any(companion_kind(file) == "contacts" for file in files)
         ):
@@ -195,7 +183,7 @@ class Frame:
         files: list[Path] = []
         parts: list[JoinedContacts] = []
         if series.contacts:
-            # contacts are joined by lengths and ids: what is wrong with those comes first
+            # contacts are joined by lengths and ids, so errors in these are reported first
             id = np.arange(len(grains.radius)) if grains.id is None else grains.id
             check_lengths(grains.position, grains.radius, id)
         for family in series.contacts:
@@ -210,16 +198,13 @@ class Frame:
                 is_theirs = series.contacts_from != "beside" or are_tied(series.grains, family)
                 is_sure = isinstance(error, OtherGrainsError) and is_theirs
                 if not isinstance(error, NotContactsError) or options.contact_columns or is_sure:
-                    raise ReadError(
-                        f"{error} (this file lies beside the grains; "
-                        f'`contacts="geometric"` leaves it alone)'
-                    ) from None
+                    advice = 'lies beside the grains; `contacts="geometric"` leaves it alone'
+                    raise ReadError(f"{error} (this file {advice})") from None
                 note(f"skipped {error}")
         if series.contacts and not files:
             step, time = self.name_step if self.step is None else self.step, self.snapshot.time
-            moment = f"frame {self.number}" if step is None else f"step {step}"
-            if self.step is None and time is not None:
-                moment = f"time {time:g}"
+            moment = f"step {step}" if step is not None else f"frame {self.number}"
+            moment = f"time {time:g}" if self.step is None and time is not None else moment
             patterns = ", ".join(family.pattern for family in series.contacts)
             message = f"{self.snapshot.path}: no contact file for {moment} among {patterns}"
             if series.contacts_from == "path":
@@ -260,20 +245,9 @@ class Frame:
             return options
         found = cells.at(self.number, self.name_step if self.step is None else self.step)
         if found is None:
-            name = f"step {self.step}" if cells.key == "step" else f"frame {self.number}"
-            raise ReadError(
-                f"{cells.path}: names no cell for {name}, which is {self.snapshot.path}: add a row "
-                f"for it"
-            )
+            frame = f"frame {self.number}, step {self.step}, {self.snapshot.path}"
+            raise ReadError(f"{cells.path}: has no row with the cell of {frame}")
         return replace(options, cell=found)
-
-
-def _of_steps(family: Family, steps: tuple[int | None, ...]) -> Family:
-    """The files of some steps, and one more: a family's only file may be of any step."""
-    wanted = {None, *steps}
-    wanted.add(next((step for step in family.files if step not in wanted), None))
-    files = {step: path.absolute() for step, path in family.files.items() if step in wanted}
-    return replace(family, files=files)
 
 
 def _wall_forces(walls: list[JoinedContacts]) -> ListedWallForces | None:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from scanfab.base.typing import Columns
 from scanfab.io.fence import fenced
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -17,10 +17,10 @@ MAGIC = b"\x89HDF\r\n\x1a\n"
 class HdfFile(NamedTuple):
     """Arrays and attributes of a file, by the paths of their groups and datasets."""
 
-    arrays: dict[str, npt.NDArray[Any]]
+    arrays: Columns
     attributes: dict[str, dict[str, Any]]
 
-    def below(self, group: str) -> dict[str, npt.NDArray[Any]]:
+    def below(self, group: str) -> Columns:
         """The arrays that stand directly in a group, by their names; single numbers are none."""
         named = ((name, values) for name, values in self.arrays.items() if values.ndim)
         found = ((name.rpartition("/"), values) for name, values in named)
@@ -77,7 +77,7 @@ def read_in_worker(path: str, with_data: bool) -> HdfFile:
     return found
 
 
-def _take(name: str, one: Any, with_data: bool, arrays: dict[str, npt.NDArray[Any]]) -> None:
+def _take(name: str, one: Any, with_data: bool, arrays: Columns) -> None:
     """Put the values of a dataset into `arrays` if they are numbers or texts."""
     import h5py
 

@@ -10,9 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from scanfab.base.errors import ReadError
+from scanfab.base.typing import Columns
 from scanfab.io.files import first_bytes
 from scanfab.io.reader import Snapshot
-from scanfab.io.text import Columns, CutError, Layout, is_number, read_rows, text_of, words_of
+from scanfab.io.text import CutError, Layout, is_number, read_rows, text_of, words_of
 
 # bytes of a file that are looked at, and the rows among them
 HEAD, SAMPLE = 1 << 18, 20
@@ -84,8 +85,10 @@ def text_table(path: Path, skip: int) -> TextTable:
             raise CutError(f"{path}: the file ends within its line of names: it is incomplete")
         width = len(rows[0]) if rows else len(names)
     elif first > skip:
-        names = _names_in_comment(lines[first - 1], width)
-    # a row below names that was cut is found when the table is read
+        # the line above the rows may be their names, as numpy.savetxt writes them
+        words = re.split(r"[\s,;]+", lines[first - 1].strip().lstrip("#%!/").strip())
+        names = words if len(words) == width and not any(map(is_number, words)) else None
+    # rows below names are checked when the table is read
     for number, row in zip(numbers if names is None else (), rows, strict=False):
         if len(row) != width:
             wrong = f"expected {width} columns as above, found {len(row)}"
@@ -125,18 +128,14 @@ def read_text(
     """
     names = table.layout.names
     if table.rows and len(names) != len(table.rows[0]):
-        raise ReadError(
-            f"{path}, line {table.layout.line}: the columns have {len(names)} names, but "
-            f"{len(table.rows[0])} columns follow: skip the names with `skip`, and name columns by "
-            f"their numbers with `columns`"
-        )
+        told = f"expected {len(names)} columns as there are names, found {len(table.rows[0])}"
+        advice = "leave the names out by `skip`, and use `columns`"
+        raise ReadError(f"{path}, line {table.layout.line}: {told}: {advice}")
     rows = text_of(Snapshot(path, start=table.start))
     first = WITH_COMMA.search(rows) if table.layout.comma else None
     if first and all(THOUSANDS.fullmatch(one[0]) for one in WITH_COMMA.finditer(rows)):
-        raise ReadError(
-            f"{path}: the comma in {first[0].decode()!r} may be a decimal sign or a sign of "
-            f"thousands, as in all numbers: write them with a point"
-        )
+        doubt = "may be a decimal sign or one of thousands: write numbers with a point"
+        raise ReadError(f"{path}: the comma in {first[0].decode()!r} {doubt}")
     optional = [name for name in names if name not in numbers]
     return read_rows(Snapshot(path), rows, table.layout._replace(whole=whole, optional=optional))
 
@@ -158,14 +157,8 @@ def _score(lines: Sequence[str], separator: str, comma: bool) -> float:
     words = [word for row in rows for word in row]
     alike = sum(len(row) == len(rows[0]) > 1 for row in rows) / len(rows)
     numbers = sum(not word or is_number(word, comma) for word in words) / max(len(words), 1)
-    # what no separator parts is one column, of a table of blanks
+    # if no separator splits the rows, it is a table of blanks with one column
     return alike * (1e-3 + numbers) if alike or separator == " " else -1.0
-
-
-def _names_in_comment(comment: str, width: int) -> list[str] | None:
-    """The names in the line above the rows, as ``numpy.savetxt`` writes them, if it holds names."""
-    words = re.split(r"[\s,;]+", comment.strip().lstrip("#%!/").strip())
-    return words if len(words) == width and not any(map(is_number, words)) else None
 
 
 class FrameFile:

@@ -18,16 +18,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.arrays import doubles
 from scanfab.base.errors import ReadError, warn
-from scanfab.base.typing import FloatArray, IntArray
+from scanfab.base.typing import AnyArray, Columns, FloatArray, IntArray
 from scanfab.io.fence import fenced
 from scanfab.io.files import check_memory, file_inside, first_bytes, plain
 from scanfab.io.hdf import is_hdf, read_hdf_file
-
-Arrays = dict[str, npt.NDArray[Any]]
 
 # files that hold a mesh; and files that list the pieces of one frame
 MESHES = {"polydata", "unstructuredgrid", "unstructured_grid", "rectilineargrid", "xdmf"}
@@ -58,15 +55,15 @@ class Mesh(NamedTuple):
 
     points: FloatArray
     """Shape (N, 3); of a box with coordinates along its axes, its two corners."""
-    point_arrays: Arrays
+    point_arrays: Columns
     """N rows each."""
     lines: IntArray
     """The points at both ends of each line, shape (M, 2)."""
-    line_arrays: Arrays
+    line_arrays: Columns
     """M rows each."""
     has_faces: bool
     """Whether there are triangles, boxes and the like."""
-    field_arrays: Arrays
+    field_arrays: Columns
     """Of the file as a whole, with any number of rows."""
 
 
@@ -110,9 +107,8 @@ def read_mesh(path: Path, parts: Sequence[Path] = ()) -> Mesh:
 def _read_one(path: Path) -> Mesh:
     form, head = form_of(path), first_bytes(path)
     if form is None or not holds_mesh(form):
-        raise ReadError(
-            f"{path}: expected a VTK file with points, found {form or 'something else'}"
-        )
+        found = form or "something else"
+        raise ReadError(f"{path}: expected a VTK file with points, found {found}")
     if form in PIECES:
         pieces = listed(path, "Piece", "Source")
         if any(form_of(piece) in PIECES for piece in pieces):
@@ -160,9 +156,9 @@ def listed(path: Path, tag: str, key: str) -> list[Path]:
     return [file_inside(path, name) for name in names]
 
 
-def joined_arrays(parts: Sequence[Arrays]) -> Arrays:
+def joined_arrays(parts: Sequence[Columns]) -> Columns:
     """The arrays that all parts have, with as many components, one behind the other."""
-    found: Arrays = {}
+    found: Columns = {}
     for name in parts[0]:
         own = [one[name] for one in parts if name in one]
         if len(own) == len(parts) and len({one.shape[1:] for one in own}) == 1:
@@ -292,11 +288,9 @@ def _check_counts(content: bytes) -> None:
                 stored = _stored(content, array, root, end)
                 if section == "CellData" and stored > expected:
                     # VTK would give the values to other lines than theirs
-                    raise ValueError(
-                        f"{name} has {stored} values for {expected} contacts: YADE's VTKRecorder "
-                        f"loses those that cross a periodic cell: use export.VTKExporter for "
-                        f'contacts, or `contacts="geometric"`'
-                    )
+                    told = f"{name} has {stored} values for {expected} contacts: VTKRecorder"
+                    advice = 'use VTKExporter or `contacts="geometric"`'
+                    raise ValueError(f"{told} loses those across a periodic cell: {advice}")
                 if stored != expected:
                     raise ValueError(f"{name} has {stored} of {expected} values")
     except (ElementTree.ParseError, ValueError, LookupError, TypeError) as error:
@@ -322,20 +316,20 @@ def _stored(content: bytes, array: ElementTree.Element, root: ElementTree.Elemen
     kind = f"{'>' if root.get('byte_order') == 'BigEndian' else '<'}u{width}"
     size, full, last = np.frombuffer(head.ljust(3 * width, b"\0"), kind, 3).tolist()
     if root.get("compressor"):
-        # there are so many blocks, which are all full but perhaps the last one
+        # all blocks are full, but perhaps the last one
         size = size * full - (full - last if size and last else 0)
     return int(size) // np.dtype(array.attrib["type"].lower()).itemsize
 
 
-def _numpy(array: Any) -> npt.NDArray[Any]:
+def _numpy(array: Any) -> AnyArray:
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
     return vtk_to_numpy(array)  # type: ignore[no-untyped-call,no-any-return]
 
 
-def _arrays(attributes: Any, rows: int | None) -> Arrays:
+def _arrays(attributes: Any, rows: int | None) -> Columns:
     """The arrays of points, cells or the file that have a name; None: any number of rows."""
-    found: Arrays = {}
+    found: Columns = {}
     for place in range(attributes.GetNumberOfArrays()):
         one = attributes.GetAbstractArray(place)
         name = one.GetName()

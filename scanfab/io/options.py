@@ -21,9 +21,8 @@ from scanfab.base.option import (
     whole,
 )
 
-above_0 = number("a number above 0", lambda value: 0 < value < math.inf)
+parse_positive = optional(number("a number above 0", lambda value: 0 < value < math.inf))
 parse_skip = whole("how many lines to skip, 0 or more", lambda value: 0 <= value < 2**31)
-DIMENSIONS = ("auto", "2", "3")
 
 
 def _reader_names() -> Iterable[str]:
@@ -60,14 +59,14 @@ def parse_columns(name: str, value: Any) -> dict[str, str] | None:
     """Standard names to a file's own, from a mapping or from ``NAME=COLUMN,NAME=COLUMN``."""
     if value is None or isinstance(value, Mapping):
         return None if value is None else dict(value)
-    names = {}
+    names: dict[str, str] = {}
     for part in str(value).split(","):
-        standard, equals, own = part.partition("=")
-        if not (equals and standard.strip() and own.strip()):
+        standard, _, own = map(str.strip, part.partition("="))
+        if not (standard and own):
             raise unusable(name, 'NAME=COLUMN such as "radius=c_rad,x=px"', part)
-        if standard.strip() in names:
-            raise unusable(name, f"one column as {standard.strip()}", value)
-        names[standard.strip()] = own.strip()
+        if standard in names:
+            raise unusable(name, f"one column as {standard}", value)
+        names[standard] = own
     return names
 
 
@@ -75,12 +74,11 @@ def parse_cell(name: str, value: Any) -> tuple[float, ...] | str | PathLike[str]
     """Three or six numbers, or the name of a file that has those of each frame."""
     if value is None or (isinstance(value, str | PathLike) and Path(value).is_file()):
         return value
-    expected = "three lengths LX LY LZ above 0, or six numbers with XY XZ YZ, or a CSV file with "
-    parse = numbers(
-        f"{expected}those of each frame", lambda cell: len(cell) in (3, 6) and min(cell[:3]) > 0
+    expected = (
+        "three lengths LX LY LZ above 0, or six numbers with XY XZ YZ, or a CSV file with those "
+        "of each frame"
     )
-    cell: tuple[float, ...] = parse(name, value)
-    return cell
+    return numbers(expected, lambda cell: len(cell) in (3, 6) and min(cell[:3]) > 0)(name, value)
 
 
 def parse_frames(text: str | int | slice | None, name: str = "frames") -> slice:
@@ -110,7 +108,7 @@ def parse_periodic(name: str, value: Any) -> str | None:
 
 def parse_dim(name: str, value: Any) -> str | int:
     """``auto``, or a number of dimensions."""
-    word = one_of(*DIMENSIONS)(name, str(value))
+    word = one_of("auto", "2", "3")(name, str(value))
     return word if word == "auto" else int(word)
 
 
@@ -119,50 +117,46 @@ class Reading:
     """The options of ``read_series``."""
 
     format: str | None = reading(parse_format, metavar="NAME", choices=_reader_names)
-    """Reader to use (default: by content)."""
+    """Reader to use (default: chosen by the content of the file)."""
     columns: dict[str, str] | None = reading(parse_columns, metavar="NAMES")
     """
-    Names of columns that are not the usual ones: "radius=c_rad,x=px"; of tables without names their
-    numbers from 1: "x=1,y=2,z=3,diameter=4".
+    Names of columns that differ from the usual ones: "radius=c_rad,x=px". The columns of a table
+    without names have numbers from 1: "x=1,y=2,z=3,diameter=4".
     """
     contact_columns: str | None = reading(parse_text, metavar="KEYWORDS")
     """
-    Columns of a dump local: LIGGGHTS keywords "pos id force", or LAMMPS names "id1=NAME,id2=NAME",
-    which serve tables too.
+    What the columns of a dump local hold: LIGGGHTS keywords "pos id force", or LAMMPS names
+    "id1=NAME,id2=NAME", which also serve tables of contacts.
     """
     skip: int = reading(parse_skip, default=0)
-    """How many lines to skip before a table of text."""
-    radius: float | None = reading(optional(above_0), metavar="L")
-    """Radius for dumps without one, in the dump's units."""
+    """How many lines to skip at the top of a table of text."""
+    radius: float | None = reading(parse_positive, metavar="L")
+    """Radius of all grains in the dump's units, for dumps without radii."""
     cell: tuple[float, ...] | None = reading(parse_cell, metavar="LX LY LZ [XY XZ YZ]|FILE.csv")
     """
-    The cell, for formats that do not carry it (periodic in xyz unless `periodic`); FILE.csv has one
-    for each step or frame: step lx ly lz, and xy xz yz if tilted.
+    The cell, for formats that do not carry it. It is periodic in x, y and z unless `periodic` says
+    otherwise. FILE.csv has the cell of each step or frame: step lx ly lz, and xy xz yz if tilted.
     """
     periodic: str | None = reading(parse_periodic, metavar="xyz")
-    """Periodic directions (default: the dump's)."""
+    """Periodic directions (default: those of the dump)."""
     bodies: str | None = reading(parse_text, metavar="COLUMN")
     """
     Column that says which clump a sphere belongs to (default: id_multisphere, clumpId, clump_id or
-    clump, if there is one; id: each sphere is a grain).
+    clump, if there is one); id: each sphere is a grain of its own.
     """
-    max_unpacked: float | None = reading(optional(above_0), metavar="TIMES")
+    max_unpacked: float | None = reading(parse_positive, metavar="TIMES")
     """How many times its compressed size a file may grow to (default: 1000)."""
     contacts: str | PathLike[str] = reading(
-        parse_contacts,
-        default="auto",
-        metavar="PATH|file|geometric",
-        choices=("file", "geometric"),
-        files=True,
+        parse_contacts, default="auto", choices=("file", "geometric"), also="PATH"
     )
     """
-    Contacts: a file, folder or glob matched by step; from the dump's own contact files; or by
-    geometry (default: file if there is one, else geometric).
+    Where contacts come from. PATH: a file, folder or glob, matched by step; file: the contact files
+    of the dump; geometric: the geometry (default: file if there is one, else geometric).
     """
-    dim: str | int = reading(parse_dim, default="auto", metavar="auto|2|3", choices=DIMENSIONS)
+    dim: str | int = reading(parse_dim, default="auto", choices=("auto", "2", "3"))
     """
-    2: discs in a coordinate plane; 3: spheres; auto: 2 if all centres of the first frame with any,
-    ten at least, share exactly one coordinate, for the whole series.
+    2: discs in a coordinate plane; 3: spheres; auto: 2 if the first frame with grains has at least
+    ten, whose centres all share exactly one coordinate. This decides for the whole series.
     """
 
 

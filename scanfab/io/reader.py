@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Protocol
 
-import numpy.typing as npt
-
 from scanfab.base.errors import ReadError, UnknownFormatError
 from scanfab.base.plugins import Offer, having, load_plugins
-from scanfab.base.typing import FloatArray, IntArray
-from scanfab.io.files import bare_name
+from scanfab.base.typing import AnyArray, FloatArray, IntArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList, ListedWallForces
 
@@ -23,10 +19,6 @@ GROUP = "scanfab.readers"
 """The entry point by which packages offer readers."""
 TABLE = "table"
 """The reader that any text is tried with."""
-BODIES = "scanfab_bodies"
-"""A column of this name is the number of each sphere's body, whatever other columns say."""
-WALLS = "scanfab_wall_contacts"
-"""A column of this name is the number of contacts with walls of each grain."""
 
 FileKind = Literal["grains", "index", "start", "points", "contacts", "cell", "other"]
 """
@@ -35,14 +27,6 @@ simulation starts from, which are no frame beside its dumps; ``points``: grains 
 radius, unless the user gives one; ``cell``: the periodic cell of grains in another file, whose
 reader finds it; ``other``: neither grains nor contacts (a wall mesh, a box).
 """
-
-
-class NotContactsError(ReadError):
-    """No column of a file can hold ids: if nobody named the file, it is skipped with a note."""
-
-
-class OtherGrainsError(NotContactsError):
-    """The ids of a file of contacts are not those of the grains."""
 
 
 Carries = Literal["cell", "box", "nothing"]
@@ -103,7 +87,7 @@ class GrainTable(NamedTuple):
     """Shape (N,), dump's length unit."""
     id: IntArray | None
     """Shape (N,); None if the dump has none."""
-    columns: Mapping[str, npt.NDArray[Any]]
+    columns: Mapping[str, AnyArray]
     """What else the dump says of each grain, by its own names."""
     cell: Cell | None
     contacts: ContactList | None = None
@@ -142,9 +126,7 @@ class Reader(Protocol):
     lists a file, or None: in a folder the listed ones are no frames. One that cannot
     know what a file holds without what users tell of it (the columns of a table) has a method
     ``told(options)`` that answers with a reader that does know. One of tables that may hold
-    anything says ``is_table = True``: in a folder they count only where there are no dumps. One
-    whose contact files have columns that no packing has a place for may have a method
-    ``left_out(path)`` that answers with their names, for ``convert`` to tell.
+    anything says ``is_table = True``: in a folder they count only where there are no dumps.
     """
 
     name: str
@@ -212,9 +194,8 @@ def lacking(plugin: object) -> str | None:
 def plugin_named(offers: Mapping[str, Offer], what: str, name: str) -> Any:
     """The ``reader`` or ``writer`` that a user names; UnknownFormatError lists those that exist."""
     if name not in offers:
-        raise UnknownFormatError(
-            f"there is no {what} called {name!r}; the {what}s are {', '.join(offers)}"
-        )
+        there = f"the {what}s are {', '.join(offers)}"
+        raise UnknownFormatError(f"there is no {what} called {name!r}; {there}")
     advice = lacking(offers[name].plugin)
     if advice is not None:
         raise UnknownFormatError(f"{name} needs another package: {advice}")
@@ -233,51 +214,33 @@ def _told(reader: Reader, options: ReadOptions | None) -> Reader:
     return told
 
 
-def _all_readers(options: ReadOptions | None) -> list[Reader]:
-    """All readers; a format that any program may write comes after the programs' own."""
-    readers = [_told(one.plugin, options) for one in installed_readers().values()]
-    return sorted(readers, key=lambda reader: bool(getattr(reader, "generic", False)))
-
-
-def _readers_by_ending(path: Path, options: ReadOptions | None) -> list[Reader]:
-    """The readers of files with such an ending; the reader of tables comes last."""
-    readers, name = _all_readers(options), bare_name(path).lower()
-    likely = [one for one in readers if name.endswith(one.extensions) and one.name != TABLE]
-    return [*likely, *(one for one in readers if one.name == TABLE)]
-
-
 def reader_for(path: Path, options: ReadOptions | None = None) -> Reader | None:
     """The reader that a user names, or that knows the file; any text may be a table."""
     if options is not None and options.format is not None:
         return reader_named(options.format, options)
-    for reader in _all_readers(options):
+    # formats that any program may write are asked last
+    offers = installed_readers().values()
+    for one in sorted(offers, key=lambda one: getattr(one.plugin, "generic", False)):
+        reader = _told(one.plugin, options)
         try:
             is_known = reader.recognises(path)
         except ReadError:
             raise
         # a plugin may raise anything
         except Exception as error:
-            raise ReadError(
-                f"{path}: the reader {reader.name!r} failed: {type(error).__name__}: {error}"
-            ) from error
+            reason = f"the reader {reader.name!r} failed: {type(error).__name__}: {error}"
+            raise ReadError(f"{path}: {reason}") from error
         if is_known and (advice := lacking(reader)) is not None:
             raise ReadError(f"{path}: {reader.name} needs another package: {advice}")
         if is_known:
             return reader
-    # an extension alone proves little: many programs write .txt
-    for reader in _readers_by_ending(path, options):
-        with suppress(ReadError):
-            if reader.kind(path) != "other":
-                return reader
-    return None
+    return None if why_no_table(path, options) else reader_named(TABLE, options)
 
 
-def why_not(path: Path, options: ReadOptions) -> str:
-    """What the last reader of files with such an ending says of one that it cannot read."""
-    reason = ""
-    for reader in _readers_by_ending(path, options):
-        try:
-            reader.kind(path)
-        except ReadError as error:
-            reason = str(error).removeprefix(f"{path}").lstrip(":, ")
-    return reason
+def why_no_table(path: Path, options: ReadOptions | None) -> str:
+    """Why a file cannot be read as a table of text; empty if it can."""
+    try:
+        reader_named(TABLE, options).kind(path)
+    except ReadError as error:
+        return str(error).removeprefix(f"{path}").lstrip(":, ")
+    return ""

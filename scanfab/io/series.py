@@ -21,9 +21,9 @@ from scanfab.io.files import Stamp, stamp_of, unpacking_up_to
 from scanfab.io.frame import Frame
 from scanfab.io.layout import FrameFile
 from scanfab.io.reader import ReadOptions, Snapshot
-from scanfab.packing.plane import flat_space, space_of, spelt_plane
+from scanfab.packing.packing import flat_space, space_of, spelt_plane
 
-# more frames than there can be: the end of frames that nobody has counted
+# more frames than there can be: where a slice ends while its frames are not counted
 ENDLESS = 2**62
 # relative difference of two times that are the same: programs write them with six digits or more
 ROUNDING = 2e-6
@@ -129,10 +129,8 @@ class Series:
         if isinstance(key, slice):
             numbers = self.numbers_of(key)
             if numbers.step < 0:
-                raise SettingsError(
-                    "the frames of a series stay in the order of their steps, found a step below "
-                    "0: list(series)[::-1] goes backwards"
-                )
+                told = "frames stay in the order of their steps: list(series)[::-1] goes backwards"
+                raise SettingsError(told)
             return self._with(numbers)
         place = index(key)
         found = list(islice(self, place, place + 1) if place >= 0 else deque(self, -place))
@@ -194,16 +192,14 @@ class Series:
                 return SPACE
             found = flat_space(first) if self.dim == 2 else space_of(first)
             if found.is_plane and self.dim == "auto":
-                note(
-                    f"{self.name}: all centres lie in {found} ({spelt_plane(first, found)}): they "
-                    f"are read as discs, in 2D; `dim=3` reads them as spheres"
-                )
+                told = "they are read as discs, in 2D; `dim=3` reads them as spheres"
+                where = spelt_plane(first, found)
+                note(f"{self.name}: all centres lie in {found} ({where}): {told}")
             self.known.space = found
         own, decided = space_of(position), self.known.space
         if own.is_plane and not decided.is_plane:
-            raise PackingError(
-                f"{other_space(own, decided)}; `dim=2` reads all as discs, `dim=3` all as spheres"
-            )
+            all_one = "`dim=2` reads all as discs, `dim=3` all as spheres"
+            raise PackingError(f"{other_space(own, decided)}; {all_one}")
         return decided
 
     def _centres_before(self, number: int) -> Iterator[FloatArray]:
@@ -309,7 +305,7 @@ class Series:
         """
         dumps: list[Path] = []
         if self.grains.kind == "index" and self.grains.reader is not None:
-            # a dump that is not there has been told of
+            # a missing dump was reported when its frame was read
             with suppress(ReadError):
                 listed = [(one.path, *one.parts) for one in self.grains.reader.snapshots(path)]
                 dumps = [file for file in dict.fromkeys(chain(*listed)) if file.is_file()]

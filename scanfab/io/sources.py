@@ -12,33 +12,17 @@ from typing import Any
 
 from scanfab.base.errors import ReadError, UnknownFormatError, note, warn
 from scanfab.base.option import refuse_unknown, takes_options, unusable
-from scanfab.io.families import (
-    Family,
-    Numbered,
-    PathLike,
-    are_tied,
-    contacts_beside,
-    expanded,
-    files_around,
-    files_in,
-    files_of,
-    group_by_name,
-    named_once,
-    some,
-    sort_into_families,
-    without_tables,
-)
+from scanfab.io import families as sorting
+from scanfab.io.families import Family, Numbered, PathLike, named_once, some
 from scanfab.io.files import first_bytes, unpacking_up_to
 from scanfab.io.layout import FrameFile
 from scanfab.io.options import READING_OPTIONS, take_reading
-from scanfab.io.reader import FileKind, ReadOptions, why_not
+from scanfab.io.reader import FileKind, ReadOptions, why_no_table
 from scanfab.io.series import ContactsFrom, Series
 from scanfab.packing.packing import Packing
 
 READING = tuple(one.name for one in READING_OPTIONS)
 """The options of :func:`read_series`, by which commands and manifests know them too."""
-# sub-folders that are looked into for the advice in an error
-MOST_FOLDERS = 50
 # how a fabric table begins, in whatever format
 TABLE_WORDS = (b"source", b"frame", b"variant", b"alpha_vs")
 GRAINS: tuple[FileKind, ...] = ("grains", "index", "start", "points")
@@ -175,8 +159,14 @@ def read_series(
         cells = FrameFile(Path(frame_cell), ["lx", "ly", "lz"], ["xy", "xz", "yz"], positive=3)
     told |= {"columns": told["columns"] or {}, "cell": None if cells else frame_cell}
     options = ReadOptions(**told)
+    if isinstance(source, str | os.PathLike) or not isinstance(source, Iterable):
+        source = [source]
+    given = list(source)
+    if not given or not all(isinstance(path, str | os.PathLike) for path in given):
+        expected = "the path of a folder or file, or several of files"
+        raise unusable("source", expected, arguments["source"])
     with unpacking_up_to(options.max_unpacked):
-        series = _series(_given(source), contacts, options)
+        series = _series(named_once(given), contacts, options)
     return replace(series, cells=cells, reading=reading, dim=dim)
 
 
@@ -188,36 +178,28 @@ def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
     return [read_series(group, **options) for group in groups.values()]
 
 
-def _given(source: Any) -> list[PathLike]:
-    """What is named, one by one, each file and folder once."""
-    one = isinstance(source, str | os.PathLike) or not isinstance(source, Iterable)
-    given = [source] if one else list(source)
-    if not given or not all(isinstance(path, str | os.PathLike) for path in given):
-        raise unusable("source", "the path of a folder or file, or several of files", source)
-    return named_once(given)
-
-
 def _series(given: Sequence[PathLike], contacts: PathLike, options: ReadOptions) -> Series:
     """The series of what is named: its files sorted out."""
     paths = [Path(one) for one in given]
-    files = [file for path in paths for file in files_of(path)]
-    around = [] if any(path.is_dir() for path in paths) else files_around(files)
-    groups = group_by_name(files, around)
-    families = sort_into_families(files, options, groups)
+    files = [file for path in paths for file in sorting.files_of(path)]
+    around = [] if any(path.is_dir() for path in paths) else sorting.files_around(files)
+    groups = sorting.group_by_name(files, around)
+    families = sorting.sort_into_families(files, options, groups)
     if options.format is None:
-        families = without_tables(families, paths)
+        families = sorting.without_tables(families, paths)
     grains = _choose_grains(paths, families, options)
     _tell_skipped([one for one in families if one is not grains and one.kind != "contacts"])
-    is_lone = paths[0].is_dir() and len(paths) == len(grains.files) == 1
-    if is_lone and (below := _series_below(paths[0])):
-        note(f"{paths[0]}: {Path(grains.pattern).name} alone is read, but {below}")
     chosen, origin = _choose_contacts(grains, families, groups if around else [], contacts, options)
     for family in (grains, *chosen):
         if family.clash is not None:
             raise ReadError(family.clash)
-    name = as_text(os.fspath(given[0]) if len(given) == 1 else _common_folder(paths))
     sources = tuple(os.fspath(path) for path in given)
-    return Series(name, grains, tuple(chosen), origin, options, sources=sources)
+    name = sources[0]
+    if len(sources) > 1:
+        are_alike = len({path.is_absolute() for path in paths}) == 1
+        folders = [str(path.parent if are_alike else path.parent.absolute()) for path in paths]
+        name = os.path.commonpath(folders) or "."
+    return Series(as_text(name), grains, tuple(chosen), origin, options, sources=sources)
 
 
 def _choose_grains(
@@ -249,8 +231,9 @@ def _no_grains(
         held = ", ".join(f"{HOLDS[one.kind]} ({Path(one.pattern).name})" for one in known[:5])
         return ReadError(f"{where}: no grains: expected points with a radius, found {held}")
     folders = [path for path in paths if path.is_dir()]
-    if below := ", ".join(filter(None, map(_series_below, folders))):
-        return ReadError(f"{where}: the folder holds no dumps, but {below}")
+    below = [f"{one}" for path in folders for one in sorted(path.glob("[!.]*")) if one.is_dir()]
+    if below:
+        return ReadError(f"{where}: the folder holds no dumps, but folders: name {some(below)}")
     if not families:
         return ReadError(f"{where}: the folder holds no files")
     for table in set(paths).difference(folders):
@@ -259,22 +242,11 @@ def _no_grains(
             if all(word in data for word in TABLE_WORDS):
                 advice = "scanfab compare or scanfab report take it"
                 return ReadError(f"{table}: this is a fabric table, not a dump: {advice}")
-    reason = why_not(paths[0], options) if len(paths) == 1 and not folders else ""
+    reason = why_no_table(paths[0], options) if len(paths) == 1 and not folders else ""
     return UnknownFormatError(
         f"{where}: no reader knows the format; scanfab formats lists those that exist"
         + (f"; as a table it cannot be read: {reason}" if reason else "")
     )
-
-
-def _series_below(folder: Path) -> str:
-    """Which sub-folders hold grains, as the end of a sentence; empty if none does."""
-    below = sorted(one for one in folder.iterdir() if one.is_dir() and one.name[0] != ".")
-    found = []
-    for one in below[:MOST_FOLDERS]:
-        with suppress(OSError, ReadError):
-            families = sort_into_families(files_in(one), ReadOptions())
-            found += [str(one)] if any(family.kind in GRAINS for family in families) else []
-    return f"there are series in its folders: name them as sources: {some(found)}" if found else ""
 
 
 def _tell_skipped(families: Sequence[Family]) -> None:
@@ -312,21 +284,22 @@ def _choose_contacts(
     own = [family for family in families if family.kind == "contacts"]
     is_beside = bool(around) and not own
     if is_beside:
-        families, own = contacts_beside(grains, around, options)
+        families, own = sorting.contacts_beside(grains, around, options)
     in_grains = getattr(grains.reader, "lists_contacts", False)
     if contacts == "file" and not (own or in_grains):
-        raise ReadError(
-            f'{grains.pattern}: `contacts="file"` was asked for, but there is no contact file'
-        )
+        lacks = 'there is no contact file, which `contacts="file"` needs'
+        raise ReadError(f"{grains.pattern}: {lacks}")
     if contacts == "file":
         return own, "path" if own else "grains"
     if own:
         return own, "beside" if is_beside else "auto"
-    # a file that cannot be read, and may be the contacts by its name and number, is an error
+    # a file that cannot be read is an error if, by name and number, it may be the contact file
     damaged = [
         replace(one, kind="contacts", files=dict.fromkeys(grains.files, one.largest), clash=None)
         for one in families
-        if one.problem is not None and len(one.files) == len(grains.files) and are_tied(grains, one)
+        if one.problem is not None
+        and len(one.files) == len(grains.files)
+        and sorting.are_tied(grains, one)
     ]
     if options.contact_columns and not (damaged or in_grains):
         missing = "there is no file of contacts with such columns"
@@ -336,8 +309,8 @@ def _choose_contacts(
 
 def _named_contacts(contacts: PathLike, options: ReadOptions) -> list[Family]:
     """Contact files from a file, a folder or a glob."""
-    files = [file for one in expanded(contacts) for file in files_of(Path(one))]
-    families = sort_into_families(files, options)
+    files = [file for one in sorting.expanded(contacts) for file in sorting.files_of(Path(one))]
+    families = sorting.sort_into_families(files, options)
     found = [family for family in families if family.kind == "contacts"]
     if not found:
         problem = next((family.problem for family in families if family.problem), None)
@@ -349,9 +322,3 @@ def _named_contacts(contacts: PathLike, options: ReadOptions) -> list[Family]:
 def as_text(name: str) -> str:
     """A name as a table can hold it: those of files need be no text."""
     return name.encode("utf-8", "backslashreplace").decode()
-
-
-def _common_folder(paths: list[Path]) -> str:
-    are_alike = len({path.is_absolute() for path in paths}) == 1
-    folders = [str(path.parent if are_alike else path.parent.absolute()) for path in paths]
-    return os.path.commonpath(folders) or "."

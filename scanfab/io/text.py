@@ -20,11 +20,10 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import ReadError, warn
+from scanfab.base.typing import Columns
 from scanfab.io.fence import fenced
 from scanfab.io.files import check_memory, grows, plain
 from scanfab.io.reader import Snapshot
-
-Columns = dict[str, npt.NDArray[Any]]
 
 NUMBER = re.compile(
     r"\s*[-+]?(?:(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?|(?:nan|inf|infinity))\s*\Z",
@@ -74,12 +73,7 @@ class Layout(NamedTuple):
 
 
 def read_rows(
-    snapshot: Snapshot,
-    rows: bytes,
-    layout: Layout,
-    *,
-    count: int | None = None,
-    what: str = "rows",
+    snapshot: Snapshot, rows: bytes, layout: Layout, *, count: int | None = None, what: str = "rows"
 ) -> Columns:
     """
     The columns of a table of text, by name.
@@ -133,14 +127,15 @@ def read_rows(
     body = rows.lstrip(edge)
     layout = layout._replace(line=layout.line + rows.count(b"\n", 0, len(rows) - len(body)))
     has_end = not body or body.rstrip(b" \t").endswith(b"\n")
-    rows = body.rstrip(edge) + b"\n" if body else body
+    # as a rule there is nothing to strip, and no copy to be made
+    is_clean = body.endswith(b"\n") and not body[-2:-1].isspace()
+    rows = body if is_clean or not body else body.rstrip(edge) + b"\n"
     found = rows.count(b"\n")
     if count is not None and found != count:
         step = "" if snapshot.step is None else f", step {snapshot.step}"
-        raise (CutError if found < count or not has_end else ReadError)(
-            f"{snapshot.path}{step}: the header counts {count} {what}, found {found}: the "
-            f"file is incomplete or damaged"
-        )
+        told = f"the header counts {count} {what}, found {found}: the file is incomplete or damaged"
+        error = CutError if found < count or not has_end else ReadError
+        raise error(f"{snapshot.path}{step}: {told}")
     if not rows:
         kinds = {name: np.int64 if name in layout.whole else np.float64 for name in layout.names}
         return {name: np.zeros(0, kind) for name, kind in kinds.items()}
@@ -164,7 +159,7 @@ def columns_of(_path: str, rows: bytes, layout: Layout) -> Columns | None:
     if b"\r" in rows or rows.startswith(LIKE_COMPRESSED):
         return None
     rows = _regular(rows, layout)
-    # with a decimal comma a point may stand for thousands, which only words tell
+    # beside a decimal comma a point may be a sign of thousands, which only the words show
     found = None if layout.comma else _parsed(rows, layout, by_words=False)
     if found is not None:
         return found
@@ -183,7 +178,7 @@ def _regular(rows: bytes, layout: Layout) -> bytes:
         kept: npt.NDArray[np.bool_] = text != ord(" ")
         kept[1:] |= kept[:-1].copy()
         return _stripped(text[kept].tobytes())
-    # the first row speaks for all: a search for blanks around each of them would take too long
+    # only the first row is checked for blanks around it: to check all would take too long
     return rows if first == first.strip() else _stripped(rows)
 
 

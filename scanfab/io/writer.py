@@ -14,18 +14,16 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError, UnknownFormatError
 from scanfab.base.plugins import Offer
-from scanfab.io.columns import DIAMETER_NAMES, first_of, other_size
-from scanfab.io.reader import BODIES, WALLS, installed, plugin_named
+from scanfab.base.typing import AnyArray, Columns
+from scanfab.io.columns import BODIES, DIAMETER_NAMES, WALLS, first_of, other_size
+from scanfab.io.reader import installed, plugin_named
 from scanfab.packing.bodies import CLUMP_COLUMNS
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList
 from scanfab.packing.packing import Packing
-
-Columns = dict[str, npt.NDArray[Any]]
 
 GROUP = "scanfab.writers"
 # columns of a source may not have these names, in any spelling
@@ -113,7 +111,7 @@ def as_arrays(packing: Packing) -> Arrays:
     bodies, cell, listed = packing.bodies, packing.cell, packing.contacts
     numbers = None if bodies is None else bodies.number
     if bodies is None and first_of(CLUMP_COLUMNS, packing.columns) is not None:
-        # without this column, a reader would join the spheres that another column numbers
+        # otherwise a reader would join the spheres that another column numbers
         numbers = np.full(len(packing), -1)
     walls = packing.wall_contacts if packing.wall_contacts.any() else None
     grains = {"id": packing.id, "radius": packing.radius, BODIES: numbers, WALLS: walls}
@@ -162,7 +160,7 @@ def _own_columns(packing: Packing) -> tuple[Columns, list[str]]:
     return found, notes
 
 
-def flat(columns: Mapping[str, npt.NDArray[Any]]) -> Columns:
+def flat(columns: Mapping[str, AnyArray]) -> Columns:
     """Columns of one value for each grain: ``v_x v_y v_z`` for vectors, 0 and 1 for truths."""
     found: Columns = {}
     for name, values in columns.items():
@@ -230,7 +228,7 @@ def cell_of(path: Path, arrays: Mapping[str, Any]) -> Cell | None:
         raise ReadError(f"{path}: cell, origin and periodic are no cell: {error}") from None
 
 
-def contacts_of(pairs: npt.NDArray[Any], arrays: Mapping[str, Any]) -> ContactList:
+def contacts_of(pairs: AnyArray, arrays: Mapping[str, Any]) -> ContactList:
     """The contacts among the arrays of a file; the packing checks them."""
     return ContactList(
         pairs, arrays.get("image"), arrays.get("force"), force_n=arrays.get("force_n")

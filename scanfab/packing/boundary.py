@@ -14,14 +14,10 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.typing import BoolArray
 from scanfab.packing.packing import Packing
 
-OPERATORS = {
-    ">": np.greater,
-    ">=": np.greater_equal,
-    "<": np.less,
-    "<=": np.less_equal,
-}
 # values that a message lists one by one
 MOST_LISTED = 10
+# classes of one column, and particles, with which it may tell a boundary
+MOST_CLASSES, FEWEST = 20, 50
 # columns that sort particles into classes
 CLASS_COLUMNS = ("type", "mask", "material", "matid", "materialid", "mat", "group")
 
@@ -42,8 +38,10 @@ class BoundaryRule:
 
     text: str
     column: str
-    operator: str
     ranges: tuple[tuple[float, float], ...]
+    """Smallest and largest values."""
+    is_negated: bool
+    """Whether the particles are those with values in none of the ranges."""
 
     @classmethod
     def parse(cls, text: str) -> BoundaryRule:
@@ -52,18 +50,22 @@ class BoundaryRule:
         try:
             if match is None:
                 raise ValueError
-            operator = "=" if match[2] == "==" else match[2]
-            ranges = tuple(_range(part) for part in match[3].split(","))
+            operator, ranges = match[2], tuple(_range(part) for part in match[3].split(","))
             if any(low > high for low, high in ranges):
                 raise ValueError
-            if operator not in ("=", "!=") and (len(ranges) > 1 or ranges[0][0] != ranges[0][1]):
-                raise ValueError
+            if operator[0] in "<>":
+                ((value, same),) = ranges
+                if value != same:
+                    raise ValueError
+                end = np.inf if operator[0] == ">" else -np.inf
+                value = value if operator.endswith("=") else float(np.nextafter(value, end))
+                ranges = ((min(value, end), max(value, end)),)
         except ValueError:
             raise SettingsError(
                 f"boundary: expected COLUMN=VALUE, COLUMN=V1,V2, COLUMN=FROM..TO, or one of "
                 f'> >= < <= !=, such as `boundary="id>=13723"`, found {text!r}'
             ) from None
-        return cls(text, match[1], operator, ranges)
+        return cls(text, match[1], ranges, operator == "!=")
 
     def select(self, packing: Packing) -> BoolArray:
         """
@@ -84,11 +86,8 @@ class BoundaryRule:
                 f"{len(gaps)} particles (the first is in row {np.argmax(gaps) + 1}): expected one "
                 f"for each"
             )
-        if self.operator in ("=", "!="):
-            within = [(values >= low) & (values <= high) for low, high in self.ranges]
-            chosen: BoolArray = np.any(within, axis=0)
-            return chosen if self.operator == "=" else ~chosen
-        return np.asarray(OPERATORS[self.operator](values, self.ranges[0][0]))
+        within = [(values >= low) & (values <= high) for low, high in self.ranges]
+        return np.asarray(np.any(within, axis=0) != self.is_negated)
 
 
 def select_boundary(packing: Packing, rules: Sequence[BoundaryRule]) -> BoolArray:
@@ -110,17 +109,14 @@ def existing_values(packing: Packing, rules: Sequence[BoundaryRule]) -> str:
     """The values that the columns of some expressions have, for messages."""
     if len(packing) == 0:
         return "there are no particles"
-    return "; ".join(
-        f"{name} is {_values(_column(packing, name))}"
-        for name in dict.fromkeys(rule.column for rule in rules)
-    )
-
-
-def _values(column: npt.NDArray[Any]) -> str:
-    found = np.unique(column)
-    if found.size > MOST_LISTED:
-        return f"{found[0]:g} to {found[-1]:g}"
-    return " or ".join(f"{value:g}" for value in found)
+    told = []
+    for name in dict.fromkeys(rule.column for rule in rules):
+        found = np.unique(_column(packing, name))
+        values = " or ".join(f"{value:g}" for value in found[:MOST_LISTED])
+        told.append(
+            f"{name} is {values if found.size <= MOST_LISTED else f'{found[0]:g} to {found[-1]:g}'}"
+        )
+    return "; ".join(told)
 
 
 def enclosing_class(packing: Packing) -> str | None:
@@ -130,21 +126,19 @@ def enclosing_class(packing: Packing) -> str | None:
     All particles of the class lie farther out than nearly all others, measured in the box of the
     sample, round or square.
     """
-    columns = {
-        name: values
-        for name, values in packing.columns.items()
-        if name.lower() in CLASS_COLUMNS and values.ndim == 1 and values.dtype.kind in "iuf"
-    }
-    if len(packing) < 50 or not columns:
+    classes: list[tuple[str, npt.NDArray[Any], npt.NDArray[Any]]] = []
+    for name, values in packing.columns.items():
+        if name.lower() in CLASS_COLUMNS and values.ndim == 1 and values.dtype.kind in "iuf":
+            # a side column may have gaps
+            found = np.unique(values[values == values])
+            classes += [(name, values, found)] if 2 <= found.size <= MOST_CLASSES else []
+    if len(packing) < FEWEST or not classes:
         return None
     low, high = packing.position.min(axis=0), packing.position.max(axis=0)
     scaled = (packing.position - 0.5 * (low + high)) / np.maximum(high - low, 1e-300)
     distances = np.linalg.norm(scaled, axis=1), np.abs(scaled).max(axis=1)
-    for name, values in columns.items():
-        classes = np.unique(values[values == values])  # a side column may have gaps
-        if not 2 <= classes.size <= 20:
-            continue
-        for value in classes:
+    for name, values, found in classes:
+        for value in found:
             inside = values != value
             if any(d[~inside].min() > np.quantile(d[inside], 0.98) for d in distances):
                 return f"{name}={value:g}"

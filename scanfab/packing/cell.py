@@ -13,7 +13,7 @@ from scanfab.base.errors import PackingError
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.packing.lattice import Lattice, reduced_lattice
+from scanfab.packing.lattice import Lattice
 
 # longest periodic edge over the smallest height: the search for images cannot count further
 WIDEST = 1e9
@@ -48,6 +48,9 @@ class Cell:
     array([[0.5, 2.5, 9. ]])
     """
 
+    vectors: FloatArray
+    origin: FloatArray
+
     def __init__(
         self,
         vectors: npt.ArrayLike,
@@ -56,13 +59,13 @@ class Cell:
         space: Space = SPACE,
     ) -> None:
         try:
-            lattice = np.asarray(vectors, dtype=np.float64)
-            self.vectors: FloatArray = np.diag(lattice) if lattice.shape == (3,) else lattice
-            self.origin: FloatArray = np.asarray(origin, dtype=np.float64)
-            fits = self.vectors.shape == (3, 3) and self.origin.shape == (3,)
+            self.vectors = np.asarray(vectors, dtype=np.float64)
+            self.origin = np.asarray(origin, dtype=np.float64)
         except (TypeError, ValueError):
-            fits = False
-        if not fits:
+            self.vectors = self.origin = np.zeros(0)
+        if self.vectors.shape == (3,):
+            self.vectors = np.diag(self.vectors)
+        if self.vectors.shape != (3, 3) or self.origin.shape != (3,):
             raise PackingError(
                 f"a cell needs vectors of shape (3, 3) or (3,) and an origin of shape (3,), "
                 f"found {vectors!r} and {origin!r}"
@@ -215,7 +218,7 @@ class Cell:
     @cached_property
     def lattice(self) -> Lattice:
         """The periodic vectors, reduced: the same lattice by vectors that are short."""
-        return reduced_lattice(self.vectors, self.periodic)
+        return Lattice.of(self.vectors, self.periodic)
 
     @property
     def short_vectors(self) -> FloatArray:
@@ -240,11 +243,11 @@ class Cell:
         """
         return self.lattice.nearest(np.asarray(branch, dtype=np.float64))
 
-    def images(
+    def with_images(
         self, position: FloatArray, margin: float
-    ) -> tuple[FloatArray, npt.NDArray[np.intp]]:
+    ) -> tuple[FloatArray, npt.NDArray[np.intp], IntArray]:
         """
-        The periodic images of points that lie outside the cell, but within a margin of it.
+        Points in the cell, and their periodic images that lie outside within a margin of it.
 
         Parameters
         ----------
@@ -256,19 +259,29 @@ class Cell:
         Returns
         -------
         position : ndarray, shape (K, 3)
-            The images.
+            The points and their images, all of one point behind one another.
         row : ndarray of int, shape (K,)
-            The point that each image repeats.
+            The point that each one is, or repeats.
+        image : ndarray of int, shape (K, 3)
+            Lattice translation from that point; 0 for the point itself. Those of one point ascend.
         """
-        fractions = self.fractional(position)
-        reach = np.where(self.periodic, margin / self.heights, 0.0)
-        images, rows = [np.zeros((0, 3))], [np.arange(0)]
-        for shift in product(*(range(-int(n), int(n) + 1) for n in np.ceil(reach))):
-            if any(shift):
-                near = (fractions + shift >= -reach) & (fractions + shift <= 1.0 + reach)
-                rows.append(np.flatnonzero(np.all(near | ~np.array(self.periodic), axis=1)))
-                images.append(position[rows[-1]] + np.array(shift, np.float64) @ self.vectors)
-        return np.concatenate(images), np.concatenate(rows)
+        periodic = list(self.periodic)
+        fractions, reach = self.fractional(position)[:, periodic], margin / self.heights[periodic]
+        # only points near a face have images near the cell
+        near = np.flatnonzero(np.any((fractions <= reach) | (fractions >= 1.0 - reach), axis=1))
+        shifts = np.array(list(product(*(range(-int(n), int(n) + 1) for n in np.ceil(reach)))))
+        rows = []
+        for shift in shifts:
+            moved = fractions[near] + shift
+            inside = np.all((moved >= -reach) & (moved <= 1.0 + reach), axis=1)
+            rows.append(near[inside] if shift.any() else np.arange(len(position)))
+        row = np.concatenate(rows)
+        image = np.zeros((len(row), 3), np.int64)
+        image[:, periodic] = np.repeat(shifts, [len(some) for some in rows], axis=0)
+        order = np.argsort(row, kind="stable")
+        row, image = row[order], image[order]
+        places = np.take(position, row, axis=0) + image.astype(np.float64) @ self.vectors
+        return places, row, image
 
     def images_near_origin(
         self, position: FloatArray, reach: FloatArray
@@ -291,11 +304,10 @@ class Cell:
             The point that each image repeats.
         """
         nearest = position + self.nearest_image(position) @ self.vectors
-        most = np.floor(reach.max(initial=0.0) / self.lattice.heights + 1.0).astype(int)
-        images, rows = [np.zeros((0, 3))], [np.arange(0)]
-        for steps in product(*(range(-n, n + 1) for n in most)):
-            moved = nearest + np.array(steps, dtype=np.float64) @ self.lattice.vectors
-            chosen = np.flatnonzero(np.linalg.norm(moved, axis=1) < reach)
-            images.append(moved[chosen])
-            rows.append(chosen)
+        most = np.floor(reach.max(initial=0.0) / self.lattice.heights + 1.0)
+        images, rows = [], []
+        for shift in self.lattice.steps(most) @ self.lattice.vectors:
+            moved = nearest + shift
+            rows.append(np.flatnonzero(np.linalg.norm(moved, axis=1) < reach))
+            images.append(moved[rows[-1]])
         return np.concatenate(images), np.concatenate(rows)

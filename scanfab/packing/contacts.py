@@ -11,7 +11,7 @@ import numpy.typing as npt
 from scanfab.base.arrays import cast, grains_named
 from scanfab.base.errors import PackingError, warn
 from scanfab.base.spelling import counted
-from scanfab.base.typing import BoolArray, FloatArray, IntArray
+from scanfab.base.typing import BoolArray, FloatArray, IntArray, RowArray
 from scanfab.packing.bodies import Bodies
 from scanfab.packing.cell import Cell
 
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from scanfab.packing.packing import Packing
 
 ContactSource = Literal["file", "geometric"]
+
+# contacts whose geometry is worked out at a time: some megabytes
+CHUNK = 1 << 16
 
 
 class ContactList(NamedTuple):
@@ -101,8 +104,8 @@ class Contacts:
     (array([[1., 0., 0.]]), array([[0.75, 0.  , 0.  ]]))
     """
 
-    pairs: IntArray
-    image: IntArray
+    pairs: RowArray
+    image: RowArray
     normal: FloatArray
     point: FloatArray
     force: FloatArray | None
@@ -129,7 +132,7 @@ class Contacts:
             forces = " with normal forces"
         return f"{counted(len(self), 'contact')} {whence}{forces}"
 
-    def neighbours(self, bodies: Bodies | None, without: BoolArray | None = None) -> IntArray:
+    def neighbours(self, bodies: Bodies | None, without: BoolArray | None = None) -> RowArray:
         """
         The pairs of grains that touch, each once, in however many points.
 
@@ -157,12 +160,12 @@ class Contacts:
 
 
 def branches(
-    position: FloatArray, pairs: IntArray, image: IntArray, cell: Cell | None
+    position: FloatArray, pairs: RowArray, image: RowArray, cell: Cell | None
 ) -> FloatArray:
     """From the first to the second place of each pair, shape (M, 3), dump's length unit."""
-    one, two = pairs.T
-    branch: FloatArray = position[two] - position[one]
-    return branch if cell is None else branch + image @ cell.vectors
+    branch: FloatArray = np.take(position, pairs[:, 1], axis=0)
+    branch -= np.take(position, pairs[:, 0], axis=0)
+    return branch if cell is None else branch + image.astype(np.float64) @ cell.vectors
 
 
 def resolve_contacts(listed: ContactList, packing: Packing, turns: IntArray | None) -> Contacts:
@@ -196,26 +199,79 @@ def resolve_contacts(listed: ContactList, packing: Packing, turns: IntArray | No
     rows = np.arange(len(pairs))
     if packing.bodies is not None:
         rows = np.flatnonzero(packing.bodies.between(pairs, image))
-        pairs, image = pairs[rows], image[rows]
-    branch = branches(packing.position, pairs, image, packing.cell)
-    length: FloatArray = np.linalg.norm(branch, axis=1)
-    _refuse_itself(pairs, image, packing)
-    if listed.source == "file":
+    _refuse_itself(pairs[rows], image[rows], packing)
+    rows = rows[_first_of_each(pairs[rows], image[rows])]
+    force, force_n = (None if one is None else one[rows] for one in (force, force_n))
+    return contacts_of(packing, pairs[rows], image[rows], listed.source, force, force_n)
+
+
+def contacts_of(
+    packing: Packing,
+    pairs: RowArray,
+    image: RowArray,
+    source: ContactSource,
+    force: FloatArray | None = None,
+    force_n: FloatArray | None = None,
+) -> Contacts:
+    """
+    Contacts by pairs of rows and images, each once, with their normals and points.
+
+    Parameters
+    ----------
+    packing : Packing
+        Its grains.
+    pairs, image, force : ndarray
+        As in :class:`Contacts`.
+    source : str
+        ``file``, whose contacts are refused if they are too far apart, or ``geometric``.
+    force_n : ndarray, shape (M,) or (M, 3), optional
+        Normal force, or a force whose normal part it is.
+
+    Warns
+    -----
+    ScanfabWarning
+        If two centres are the same: such a contact has no direction, and is left out.
+    """
+    pairs, image = pairs.astype(np.int32, copy=False), image.astype(np.int32, copy=False)
+    normal, point, length = geometry(packing.position, packing.radius, pairs, image, packing.cell)
+    if source == "file":
         _refuse_long(pairs, length, packing)
-    keep = _first_of_each(pairs, image)
-    same = length[keep] == 0
-    if np.any(same):
-        warn_of_same_centre(pairs[keep][same], packing.id)
-        keep = keep[~same]
-    pairs, image, branch, length = pairs[keep], image[keep], branch[keep], length[keep]
-    normal = branch / length[:, None]
-    radius = packing.radius[pairs]
-    middle = 0.5 * (length + radius[:, 0] - radius[:, 1])
-    point = packing.position[pairs[:, 0]] + middle[:, None] * normal
-    force, force_n = (None if one is None else one[rows[keep]] for one in (force, force_n))
+    if not length.all():
+        same = length == 0.0
+        one, two = packing.id[pairs[np.argmax(same)]]
+        warn(
+            f"the grains {one} and {two} have the same centre ({same.sum()} such pairs): a contact "
+            f"between them has no direction and is left out"
+        )
+        pairs, image, normal, point = pairs[~same], image[~same], normal[~same], point[~same]
+        force, force_n = (None if values is None else values[~same] for values in (force, force_n))
     if force_n is not None and force_n.ndim == 2:
         force_n = np.einsum("ci,ci->c", force_n, normal)
-    return Contacts(pairs, image, normal, point, force, listed.source, force_n)
+    return Contacts(pairs, image, normal, point, force, source, force_n)
+
+
+def geometry(
+    position: FloatArray, radius: FloatArray, pairs: RowArray, image: RowArray, cell: Cell | None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """
+    Unit normals, middles of the overlaps or gaps, and distances of the centres of pairs.
+
+    Of shape (M, 3), (M, 3) and (M,), lengths in the dump's unit. The normal of grains with the same
+    centre is 0, as it has no direction.
+    """
+    normal, point = np.empty((len(pairs), 3)), np.empty((len(pairs), 3))
+    length = np.empty(len(pairs))
+    # some pairs at a time, so that what is known of them on the way takes little memory
+    for start in range(0, len(pairs), CHUNK):
+        some = slice(start, start + CHUNK)
+        one, two = pairs[some].T
+        branch = branches(position, pairs[some], image[some], cell)
+        apart = np.linalg.norm(branch, axis=1)
+        normal[some] = branch / np.where(apart > 0.0, apart, 1.0)[:, None]
+        middle = 0.5 * (apart + radius[one] - radius[two])
+        point[some] = np.take(position, one, axis=0) + middle[:, None] * normal[some]
+        length[some] = apart
+    return normal, point, length
 
 
 def _forces(listed: ContactList, count: int) -> tuple[FloatArray | None, FloatArray | None]:
@@ -233,58 +289,50 @@ def _images(
     listed: ContactList, pairs: IntArray, packing: Packing, turns: IntArray | None
 ) -> IntArray:
     """Lattice translations of the second grains, from positions inside the cell."""
-    cell = packing.cell
+    cell, (one, two) = packing.cell, pairs.T
     if listed.image is not None:
         image: IntArray = cast("image", listed.image, np.int64, (len(pairs), 3))
         if np.any(image[:, ~np.array((False,) * 3 if cell is None else cell.periodic)]):
             raise PackingError("image: a contact passes a face that is not periodic")
-        if turns is None:
-            return image
-        return image + turns[pairs[:, 1]] - turns[pairs[:, 0]]
+        return image if turns is None else image + turns[two] - turns[one]
     if cell is None:
         return np.zeros((len(pairs), 3), np.int64)
-    branch = packing.position[pairs[:, 1]] - packing.position[pairs[:, 0]]
-    image = cell.nearest_image(branch)
-    _refuse_ambiguous(pairs, branch + image @ cell.vectors, packing)
+    image = cell.nearest_image(packing.position[two] - packing.position[one])
+    # a list without images cannot mean both images through which a pair touches
+    branch, reach = (
+        branches(packing.position, pairs, image, cell),
+        packing.radius[pairs].sum(axis=1),
+    )
+    close = np.flatnonzero((cell.lattice.shortest < 2.0 * reach) & (one != two))
+    for step in cell.lattice.within(2.0 * float(reach[close].max(initial=0.0))):
+        touches = np.linalg.norm(branch[close] + step, axis=1) < reach[close]
+        if touches.any():
+            first, second = packing.id[pairs[close[np.argmax(touches)]]]
+            raise PackingError(
+                f"the grains {first} and {second} touch through more than one image, and the "
+                f"contact list does not say through which: the cell is too thin for this format; "
+                f'find the contacts by geometry (`contacts="geometric"`)'
+            )
     return image
 
 
-def _refuse_ambiguous(pairs: IntArray, branch: FloatArray, packing: Packing) -> None:
-    """An error if a pair touches through two images, of which the list cannot mean both."""
-    assert packing.cell is not None
-    reach = packing.radius[pairs].sum(axis=1)
-    close = np.flatnonzero(packing.cell.lattice.shortest < 2 * reach)
-    close = close[pairs[close, 0] != pairs[close, 1]]
-    if close.size == 0:
-        return
-    for step in packing.cell.lattice.steps:
-        touches = np.linalg.norm(branch[close] + step, axis=1) < reach[close]
-        if touches.any():
-            one, two = packing.id[pairs[close[np.argmax(touches)]]]
-            raise PackingError(
-                f"the grains {one} and {two} touch through more than one image, and the contact "
-                f"list does not say through which: the cell is too thin for this format; find the "
-                f'contacts by geometry (`contacts="geometric"`)'
-            )
-
-
 def _refuse_itself(pairs: IntArray, image: IntArray, packing: Packing) -> None:
+    """PackingError if a grain is listed as a contact of itself, not of an image of it."""
     itself = (pairs[:, 0] == pairs[:, 1]) & ~image.any(axis=1)
-    if not np.any(itself):
+    if not itself.any():
         return
-    advice = ""
-    if packing.is_periodic:
-        advice = (
-            "; if it touches its own image, the list does not say which one: find the contacts by "
-            'geometry (`contacts="geometric"`)'
-        )
+    advice = (
+        "; if it touches its own image, the list does not say which one: find the contacts by "
+        'geometry (`contacts="geometric"`)'
+    )
     raise PackingError(
-        f"{grains_named(packing.id[pairs[:, 0]], itself)}: in contact with itself{advice}"
+        f"{grains_named(packing.id[pairs[:, 0]], itself)}: in contact with itself"
+        f"{advice if packing.is_periodic else ''}"
     )
 
 
-def _refuse_long(pairs: IntArray, length: FloatArray, packing: Packing) -> None:
-    """An error if the centres of a listed contact are too far apart for a contact."""
+def _refuse_long(pairs: RowArray, length: FloatArray, packing: Packing) -> None:
+    """PackingError if the centres of a listed contact are too far apart for a contact."""
     radius = packing.radius[pairs]
     # a gap of half a grain, by the smaller of the two
     excess = length - radius.sum(axis=1) - radius.min(axis=1)
@@ -292,30 +340,21 @@ def _refuse_long(pairs: IntArray, length: FloatArray, packing: Packing) -> None:
         return
     worst = int(np.argmax(excess))
     one, two = packing.id[pairs[worst]]
-    advice = (
-        "is this the contact list of another step?"
-        if packing.is_periodic
-        else "if the sample is periodic, name its cell (`cell` and `periodic`); "
-        "otherwise the contact list belongs to another step"
-    )
+    advice = "is this the contact list of another step?"
+    if not packing.is_periodic:
+        advice = (
+            "if the sample is periodic, name its cell (`cell` and `periodic`); otherwise the "
+            "contact list belongs to another step"
+        )
     raise PackingError(
         f"the grains {one} and {two} are listed as a contact, but their centres are "
         f"{length[worst]:g} apart and their radii add up to {radius[worst].sum():g}: {advice}"
     )
 
 
-def warn_of_same_centre(pairs: IntArray, id: IntArray) -> None:
-    """Say that contacts between grains of one centre are left out."""
-    one, two = id[pairs[0]]
-    warn(
-        f"the grains {one} and {two} have the same centre ({len(pairs)} such pairs): a contact "
-        f"between them has no direction and is left out"
-    )
-
-
-def _first_of_each(pairs: IntArray, image: IntArray) -> npt.NDArray[np.intp]:
+def _first_of_each(pairs: RowArray, image: RowArray) -> npt.NDArray[np.intp]:
     """Rows of the first mention of each contact, whichever grain is named first."""
-    low, high = pairs.min(axis=1), pairs.max(axis=1)
+    low, high = pairs.min(axis=1).astype(np.int64), pairs.max(axis=1)
     # a number for each image, and for the opposite one the same below zero
     base = 2 * int(np.abs(image).max(initial=0)) + 1
     code = image @ base ** np.arange(3)
@@ -354,26 +393,3 @@ class WallForces(NamedTuple):
     """Where it touches the wall, next to where the grain is, shape (K, 3); dump's length unit."""
     force: FloatArray
     """On the grain, shape (K, 3); dump's force unit."""
-
-
-def resolve_wall_forces(
-    listed: ListedWallForces, position: FloatArray, cell: Cell | None
-) -> WallForces:
-    """
-    Listed forces of walls, each beside its grain.
-
-    Raises
-    ------
-    PackingError
-        If a contact names a row that does not exist, or a number is not finite.
-    """
-    row = cast("wall_forces: row", listed.row, np.int64, (None,))
-    point = cast("wall_forces: point", listed.point, np.float64, (len(row), 3))
-    force = cast("wall_forces: force", listed.force, np.float64, (len(row), 3))
-    if np.any((row < 0) | (row >= len(position))):
-        raise PackingError(f"wall_forces: names a row that is none of {len(position)} grains")
-    if not (np.isfinite(point).all() and np.isfinite(force).all()):
-        raise PackingError("wall_forces: expected finite points and forces")
-    if cell is not None and cell.is_periodic:
-        point = point + cell.nearest_image(point - position[row]) @ cell.vectors
-    return WallForces(row, point, force)

@@ -12,31 +12,39 @@ from scanfab.base.errors import Note, PackingError
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
-from scanfab.packing.periodicity import fitting_periods
-from scanfab.packing.plane import FEWEST, space_of, spelt_plane
+from scanfab.packing.packing import FEWEST, Packing, space_of, spelt_plane
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox
 
 # names of columns that may say which spheres are one body, in lower case
 COLUMNS = (*CLUMP_COLUMNS, *MOLECULE_COLUMNS)
-# a clump is smaller than this part of the sample, or of the period
+# A clump is smaller than this part of the sample, or of the period.
 SMALL = 0.5
-# times the median of all: a body that is no longer is like the others
+# A body that is no longer than this, over the median of all, is like the others.
 LONG = 3.0
-TINY = float(np.finfo(float).tiny)
 # contacts a grain that no packing of spheres has
 MANY_CONTACTS = 30
-# solids in the box of their surfaces, in its volume: only clumps of many spheres overlap as much
+# Volume of the grains over that of the box of their surfaces: only clumps of many spheres overlap
+# as much.
 SOLIDS = 20.0
-# of the period, without any grain
+# part of a period without any grain
 EMPTY = 0.2
-# sums of two radii: grains whose neighbours are not further apart touch, but for rounding
+# Over the sum of two radii: grains whose neighbours are not further apart touch, but for rounding.
 CLOSED = 1.01
 # what formats without a cell lack, and what makes up for it
 CELL_LACKS = {
     "nothing": ("this format carries no cell", "`cell=(LX, LY, LZ)`"),
     "box": ("this format has a box, but does not say whether it repeats", '`periodic="xyz"`'),
 }
+# grains of a face, at most, that tell whether it fits the opposite one
+MOST_GRAINS = 2000
+# In mean radii: lengths that differ by no more are one period, as contacts overlap a little.
+SAME = 0.1
+# Contacts through a face, over those through the middle: 0.6 to 1.5 in periodic samples, up to 0.3
+# between flat walls.
+FITS = 0.5
+# Of these contacts, the share that may overlap more, as those do where a contact is oblique.
+BEYOND = 0.4
 
 
 def refuse_impossible(sample: Sample) -> None:
@@ -48,21 +56,20 @@ def refuse_impossible(sample: Sample) -> None:
     PackingError
         If the solids do not fit into their own box by far.
     """
-    packing = sample.packing
-    position, radius = packing.position[sample.grains], packing.radius[sample.grains]
-    # who lists contacts has them from a program that knew the radii; in clumps, spheres may lie on
-    # top of one another
+    packing, radius = sample.packing, sample.packing.radius[sample.grains]
+    # a program that lists contacts knew the radii; in clumps, spheres may lie on top of one another
     listed = packing.contacts is not None and packing.contacts.source == "file"
     if len(radius) < FEWEST or listed or packing.bodies is not None:
         return
     extents = SurfaceBox.of(packing, sample.grains).extents[list(packing.space.along)]
-    # over the size of the box: volumes of many grains may be beyond all numbers
+    # relative to the box, as the volumes of many grains may be beyond all numbers
     scale = np.exp(np.log(extents).mean())
     solid = float(np.sum(packing.space.volume(radius / scale)))
     if solid >= SOLIDS:
         raise PackingError(
             f"the grains' volumes add up to {solid:.3g} times that of the box that they lie in "
-            f"({_sizes(position, radius)}): check the units of radius and position"
+            f"({_sizes(packing.position[sample.grains], radius)}): check the units of radius and "
+            f"position"
         )
 
 
@@ -173,8 +180,7 @@ def _spread_bodies(sample: Sample) -> str:
         periodic = np.array(cell.periodic)
     rows = np.flatnonzero(bodies.has_many)
     heads, _, extents = _extents_of(position[rows], bodies.head[rows])
-    size = np.maximum(np.where(periodic, 1.0, np.ptp(position, axis=0)), TINY)
-    wide = extents > SMALL * size
+    wide = extents > SMALL * np.where(periodic, 1.0, np.ptp(position, axis=0))
     # in a sample of few large clumps all are as long
     alone = (extents > LONG * np.median(extents, axis=0)) | wide.all(axis=1, keepdims=True)
     spread = heads[(wide & (periodic | alone)).any(axis=1)]
@@ -267,7 +273,59 @@ def _sizes(position: FloatArray, radius: FloatArray) -> str:
     return f"radii {radius.min():.3g} to {radius.max():.3g}, centres within {extent:.3g}"
 
 
-# each says in a sentence what is doubtful, and nothing if nothing is
+def fitting_periods(packing: Packing) -> list[float | None]:
+    """
+    The period along x, y and z at which grains of opposite faces touch; None where they do not.
+
+    Parameters
+    ----------
+    packing : Packing
+        With contacts. Its cell does not count; only upright faces are compared.
+    """
+    return [_period(packing, axis) for axis in range(3)]
+
+
+def _period(packing: Packing, axis: int) -> float | None:
+    """The length by which one face is moved so that about as many pairs touch as inside."""
+    from scipy.spatial import KDTree
+
+    along, radius = packing.position[:, axis], packing.radius
+    if len(along) < FEWEST:
+        return None
+    low, high, layer = float(along.min()), float(along.max()), 2.0 * float(radius.max())
+    # where rounding leaves nothing of the layer there is no face
+    if not 3.0 * layer <= high - low < layer / np.finfo(float).eps:
+        return None
+    face, opposite = np.flatnonzero(along < low + layer), np.flatnonzero(along > high - layer)
+    across = np.delete(packing.position, axis, axis=1)
+    middle = np.median(across[face], axis=0)
+    nearest = np.argsort(np.linalg.norm(across[face] - middle, axis=1))[:MOST_GRAINS]
+    some = face[nearest] if len(face) > MOST_GRAINS else face
+    reach = radius[some] + float(radius[opposite].max())
+    near = KDTree(across[opposite]).query_ball_point(across[some], reach)
+    one = np.repeat(some, [len(rows) for rows in near])
+    two = opposite[np.concatenate([np.asarray(rows, np.int64) for rows in near])]
+    # the periods at which these pairs would touch
+    room = (radius[one] + radius[two]) ** 2 - np.sum((across[one] - across[two]) ** 2, axis=1)
+    meets = room > 0
+    lengths = np.sort(along[two[meets]] - along[one[meets]] + np.sqrt(room[meets]))
+    if len(lengths) < FEWEST:
+        return None
+    ends = np.searchsorted(lengths, lengths + SAME * float(radius.mean()), side="right")
+    counts = ends - np.arange(len(lengths))
+    counts[len(lengths) - ends > BEYOND * counts] = 0
+    best = int(np.argmax(counts))
+    # contacts whose grains lie on both sides of the middle
+    assert packing.contacts is not None
+    is_above = along[packing.contacts.pairs] >= 0.5 * (low + high)
+    through = np.count_nonzero(is_above[:, 0] != is_above[:, 1])
+    expected = len(some) / len(face) * through
+    if expected < FEWEST or counts[best] < max(FEWEST, FITS * expected):
+        return None
+    return float(np.median(lengths[best : ends[best]]))
+
+
+# Each rule says in a sentence what is doubtful, and nothing if nothing is.
 RULES: dict[str, Callable[[Sample], str]] = {
     "plane": _read_as_spheres,
     "clumps": _clumps,

@@ -69,13 +69,14 @@ def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
     count = _number(packing, rows)
     most = max(SHARE * count, 1.0)
     flown: list[int] = []
-    if count >= FEWEST:
-        ends = list(product(_open_axes(packing), (-1.0, 1.0)))
-        least = RADII * float(packing.radius[rows].max())
-        # nearly always nothing is even that far away; SciPy takes longer to load than that to see
-        if not any(_group_at_end(packing, left, *end, least) for end in ends):
-            ends = []
-        far = _far(packing, rows) if ends else least
+    # no image of a grain lies elsewhere along these axes
+    periods = np.zeros((0, 3)) if packing.cell is None else packing.cell.lattice.vectors
+    axes = [axis for axis in sorted(packing.space.along) if not periods[:, axis].any()]
+    ends = list(product(axes, (-1.0, 1.0))) if count >= FEWEST else []
+    far = RADII * float(packing.radius[rows].max(initial=0.0))
+    # Nearly always nothing is even that far away. SciPy takes longer to load than that to see.
+    if any(_group_at_end(packing, left, *end, far) for end in ends):
+        far = max(far, TIMES * _usual_gap(packing, rows))
         for axis, sign in ends:
             while _number(packing, flown) <= most and (
                 group := _group_at_end(packing, left, axis, sign, far)
@@ -117,21 +118,14 @@ def _number(packing: Packing, rows: IntArray | list[int]) -> int:
     return len(rows) if packing.bodies is None else len(np.unique(packing.bodies.head[rows]))
 
 
-def _far(packing: Packing, rows: IntArray) -> float:
-    """The gap from which on a grain is far away."""
+def _usual_gap(packing: Packing, rows: IntArray) -> float:
+    """The gap to the nearest neighbour that all but a few grains are below."""
     from scipy.spatial import KDTree
 
     some = rows[:: len(rows) // SOME + 1]
     distance, near = KDTree(packing.position[rows]).query(packing.position[some], k=2)
     gaps = distance[:, 1] - packing.radius[some] - packing.radius[rows[near[:, 1]]]
-    usual = np.quantile(gaps, 1.0 - LONELY)
-    return float(max(TIMES * usual, RADII * packing.radius[rows].max()))
-
-
-def _open_axes(packing: Packing) -> list[int]:
-    """Axes along which nothing repeats: no image of a grain lies elsewhere along them."""
-    periods = np.zeros((0, 3)) if packing.cell is None else packing.cell.lattice.vectors
-    return [k for k in sorted(packing.space.along) if not periods[:, k].any()]
+    return float(np.quantile(gaps, 1.0 - LONELY))
 
 
 def _group_at_end(

@@ -22,9 +22,10 @@ from scanfab.packing.contacts import (
     ListedWallForces,
     WallForces,
     resolve_contacts,
-    resolve_wall_forces,
 )
-from scanfab.packing.plane import cell_in_plane, flat_space, refuse_outside
+
+# centres below which to lie in one plane may be chance
+FEWEST = 10
 
 
 class Packing:
@@ -100,20 +101,23 @@ class Packing:
         self.radius: FloatArray = cast(
             "radius", np.full(count, radii) if radii.ndim == 0 else radii, np.float64, (count,)
         )
-        numbers = np.arange(count) if id is None else id
-        self.id: IntArray = cast("id", numbers, np.int64, (count,))
+        self.id: IntArray = cast("id", np.arange(count) if id is None else id, np.int64, (count,))
         check_lengths(centres, self.radius, self.id)
-        if id is not None:
-            _check_ids(self.id)
+        ordered = np.sort(self.id)
+        again = ordered[1:][ordered[1:] == ordered[:-1]]
+        if again.size:
+            raise PackingError(
+                f"the id {again[0]} occurs twice: {count - again.size} ids for {count} grains"
+            )
         if isinstance(space, Space):
-            refuse_outside(centres, space)
+            _refuse_outside(centres, space)
         else:
             space = flat_space(centres) if space == 2 else SPACE
         self.space: Space = space
         if cell is not None and self.space.is_plane:
-            cell = cell_in_plane(cell, self.space)
+            cell = _cell_in_plane(cell, self.space)
         self.cell, turns = cell, None
-        self.position: FloatArray = centres
+        self.position = centres
         if cell is not None and not cell.surely_holds(centres):
             self.position, turns = cell.place(centres)
         self.position.flags.writeable = False
@@ -127,7 +131,7 @@ class Packing:
         self.wall_contacts: IntArray = _wall_contacts(wall_contacts, count)
         self.wall_forces: WallForces | None = None
         if wall_forces is not None:
-            self.wall_forces = resolve_wall_forces(wall_forces, self.position, cell)
+            self.wall_forces = _wall_forces(wall_forces, self.position, cell)
         self.step = None if step is None else int(step)
         self.time = None if time is None else float(time)
         self.contacts: Contacts | None = None
@@ -143,10 +147,9 @@ class Packing:
         if len(self):
             low, high = self.radius.min(), self.radius.max()
             what += f" of radius {low:.4g}" + ("" if low == high else f" to {high:.4g}")
-        if self.space.is_plane:
-            what += f", 2D in {self.space}"
+        what += f", 2D in {self.space}" if self.space.is_plane else ""
         if self.bodies is not None:
-            what += f", parts of {counted(len(np.unique(self.bodies.head)), 'grain')}"
+            what += f", parts of {counted(int(self.bodies.is_head.sum()), 'grain')}"
         what += ", contacts not known" if self.contacts is None else f", {self.contacts.in_words()}"
         what += "" if self.step is None else f", step {self.step}"
         return f"Packing: {what}" + ("" if self.cell is None else f"\n  {self.cell!r}")
@@ -196,7 +199,7 @@ class Packing:
 
 
 def _centres(position: npt.ArrayLike, dim: int | Space | None) -> tuple[FloatArray, int | Space]:
-    """Positions of three coordinates, from those of three or of two, and their dimension."""
+    """Positions with three coordinates, of discs 0 along z, and 2, 3 or the space they lie in."""
     if dim not in (None, 2, 3) and not isinstance(dim, Space):
         raise PackingError(f"dim: expected 2 or 3, found {dim!r}")
     try:
@@ -213,7 +216,7 @@ def _centres(position: npt.ArrayLike, dim: int | Space | None) -> tuple[FloatArr
 
 def _wall_contacts(values: npt.ArrayLike | None, count: int) -> IntArray:
     if values is None:
-        # one number, seen as many times
+        # one zero, seen at all places
         return np.broadcast_to(np.int64(0), count)
     numbers = cast("wall_contacts", values, np.int64, (count,))
     if np.any(numbers < 0):
@@ -221,18 +224,32 @@ def _wall_contacts(values: npt.ArrayLike | None, count: int) -> IntArray:
     return numbers
 
 
+def _wall_forces(listed: ListedWallForces, position: FloatArray, cell: Cell | None) -> WallForces:
+    """Listed forces of walls, each beside its grain; PackingError if they cannot be forces."""
+    row = cast("wall_forces: row", listed.row, np.int64, (None,))
+    point = cast("wall_forces: point", listed.point, np.float64, (len(row), 3))
+    force = cast("wall_forces: force", listed.force, np.float64, (len(row), 3))
+    if np.any((row < 0) | (row >= len(position))):
+        raise PackingError(f"wall_forces: names a row that is none of {len(position)} grains")
+    if not (np.isfinite(point).all() and np.isfinite(force).all()):
+        raise PackingError("wall_forces: expected finite points and forces")
+    if cell is not None and cell.is_periodic:
+        point = point + cell.nearest_image(point - position[row]) @ cell.vectors
+    return WallForces(row, point, force)
+
+
 def check_lengths(position: FloatArray, radius: FloatArray, id: IntArray) -> None:
     """PackingError that names the first grain whose position or radius cannot be a length."""
     if all_within(position, -MOST, MOST) and all_within(radius, LEAST, MOST):
         return
     finite = np.isfinite(position).all(axis=1) & np.isfinite(radius)
-    odd = (np.abs(position) > MOST).any(axis=1) | (radius > MOST) | (radius < LEAST)
-    reasons = [
-        (~finite, "position and radius must be finite numbers"),
-        (radius <= 0, "the radius must be larger than zero"),
-        (odd, f"a radius below {LEAST:g} or a number above {MOST:g} cannot be a length"),
-    ]
-    wrong, reason = next((wrong, reason) for wrong, reason in reasons if wrong.any())
+    odd = ~(np.abs(position) <= MOST).all(axis=1) | ~((radius >= LEAST) & (radius <= MOST))
+    reasons = {
+        "position and radius must be finite numbers": ~finite,
+        "the radius must be larger than zero": radius <= 0,
+        f"a radius below {LEAST:g} or a number above {MOST:g} cannot be a length": odd,
+    }
+    reason, wrong = next((reason, wrong) for reason, wrong in reasons.items() if wrong.any())
     first = int(np.argmax(wrong))
     place = ", ".join(f"{x:g}" for x in position[first])
     raise PackingError(
@@ -240,11 +257,81 @@ def check_lengths(position: FloatArray, radius: FloatArray, id: IntArray) -> Non
     )
 
 
-def _check_ids(id: IntArray) -> None:
-    """PackingError if an id occurs twice."""
-    ordered = np.sort(id)
-    again = ordered[1:][ordered[1:] == ordered[:-1]]
-    if again.size:
+def space_of(position: FloatArray) -> Space:
+    """
+    The plane in which centres surely lie; all space where that is not sure.
+
+    They lie in one if they are ten at least, and all share exactly one coordinate.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.packing.packing import space_of
+    >>> line = np.arange(12.0)
+    >>> space_of(np.column_stack([line, line**2, np.ones(12)]))
+    Space: the plane x-y
+    """
+    if len(position) < FEWEST:
+        return SPACE
+    # as a rule a few centres show that no coordinate is shared by all
+    few = np.flatnonzero((position[:FEWEST] == position[0]).all(axis=0))
+    shared = [int(axis) for axis in few if np.all(position[:, axis] == position[0, axis])]
+    return Space(shared[0]) if len(shared) == 1 else SPACE
+
+
+def flat_space(position: FloatArray) -> Space:
+    """
+    The plane of discs; of several that hold all centres the one across z, or else y.
+
+    Raises
+    ------
+    PackingError
+        If they do not share a coordinate.
+    """
+    shared = np.flatnonzero((position == position[:1]).all(axis=0))
+    if len(shared) == 0:
+        extents = ", ".join(f"{edge:.4g}" for edge in np.ptp(position, axis=0))
         raise PackingError(
-            f"the id {again[0]} occurs twice: {id.size - again.size} ids for {id.size} grains"
+            f"the centres do not lie in one coordinate plane (they take {extents} along x, y, z): "
+            f"expected discs that share one coordinate exactly; `dim=3` reads them as spheres"
         )
+    return Space(int(shared[-1]))
+
+
+def spelt_plane(position: FloatArray, space: Space) -> str:
+    """Where the plane of some centres lies: ``z = 0``."""
+    assert space.across is not None
+    return f"{'xyz'[space.across]} = {position[0, space.across]:g}"
+
+
+def _refuse_outside(position: FloatArray, space: Space) -> None:
+    """PackingError if centres do not lie in the plane of a series."""
+    if space.across is None or not len(position):
+        return
+    along, name = position[:, space.across], "xyz"[space.across]
+    elsewhere = along[along != along[0]]
+    if elsewhere.size:
+        raise PackingError(
+            f"the series is read as discs in {space}, as its first frame has them, but here "
+            f"centres lie at {name} = {along[0]:g} and at {name} = {elsewhere[0]:g}: `dim=3` reads "
+            f"all frames as spheres"
+        )
+
+
+def _cell_in_plane(cell: Cell, space: Space) -> Cell:
+    """
+    The cell of discs, which does not repeat across their plane.
+
+    One of its vectors stands across the plane, and the others lie in it; PackingError if they
+    cannot.
+    """
+    leaving = np.flatnonzero(cell.vectors[:, space.across])
+    if len(leaving) != 1:
+        raise PackingError(
+            f"the cell's vectors {cell.vectors.tolist()} do not fit discs in {space}: expected two "
+            f"of them in the plane, and one that leads out of it"
+        )
+    vectors, periodic = cell.vectors.copy(), list(cell.periodic)
+    vectors[leaving[0]] *= space.normal
+    periodic[leaving[0]] = False
+    return Cell(vectors, (periodic[0], periodic[1], periodic[2]), cell.origin, space)

@@ -18,7 +18,7 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.base.plugins import having, load_plugins
-from scanfab.base.typing import BoolArray, IntArray
+from scanfab.base.typing import BoolArray, IntArray, RowArray
 from scanfab.packing.bodies import Bodies
 from scanfab.packing.contacts import Contacts
 
@@ -52,11 +52,11 @@ class Touching:
         return self.numbers - self.ends(self.neighbours) + self.ends(left)
 
     @property
-    def neighbours(self) -> IntArray:
+    def neighbours(self) -> RowArray:
         """Pairs of grains that touch, each once: rows of their first spheres, shape (K, 2)."""
         return self.contacts.neighbours(self.bodies)
 
-    def ends(self, pairs: IntArray) -> IntArray:
+    def ends(self, pairs: RowArray) -> IntArray:
         """How often each grain stands in some pairs, at each of its spheres, shape (N,)."""
         numbers = np.bincount(pairs.ravel(), minlength=len(self.grains))
         return numbers if self.bodies is None else numbers[self.bodies.head]

@@ -111,7 +111,7 @@ class Sample:
             )
         return self.packing.contacts
 
-    @property
+    @cached_property
     def grains(self) -> BoolArray:
         """Particles that are not boundary, shape (N,): of clumps, each of the spheres."""
         return ~self.boundary
@@ -176,18 +176,19 @@ class Sample:
         return notes_of_escaped(self.packing, self.grains, self.escaped)
 
     @cached_property
+    def touching(self) -> Touching:
+        """What a rule tells the rattlers by."""
+        options = self.min_contacts, self.packing.bodies, self.min_force
+        return Touching(self.contacts, self.contact_numbers, self.grains, *options)
+
+    @cached_property
     def rattlers(self) -> BoolArray:
         """Grains that are rattlers by the rule, shape (N,)."""
-        told = self.rattler_rule(self._touching)
+        told = self.rattler_rule(self.touching)
         found: BoolArray = cast("rattlers", told, np.bool_, (len(self.packing),))
         if self.packing.bodies is not None:
             found = found[self.packing.bodies.head]
         return self.grains & found
-
-    @property
-    def _touching(self) -> Touching:
-        options = self.min_contacts, self.packing.bodies, self.min_force
-        return Touching(self.contacts, self.contact_numbers, self.grains, *options)
 
     @cached_property
     def contact_numbers(self) -> IntArray:
@@ -204,11 +205,6 @@ class Sample:
         np.add.at(ends, bodies.head, walls)
         return ends[bodies.head]
 
-    @cached_property
-    def contact_numbers_without_rattlers(self) -> IntArray:
-        """The same without rattlers as neighbours."""
-        return self._touching.numbers_without(~self.contacts_without(self.rattlers))
-
     def numbers_of(self, variant: Variant) -> IntArray:
         """
         Number of neighbours of each particle, those that the variant leaves out not counted.
@@ -222,9 +218,12 @@ class Sample:
         -------
         ndarray of int, shape (N,)
         """
-        if variant.without_rattlers:
-            return self.contact_numbers_without_rattlers
-        return self.contact_numbers
+        return self._numbers_left if variant.without_rattlers else self.contact_numbers
+
+    @cached_property
+    def _numbers_left(self) -> IntArray:
+        """Number of neighbours without rattlers, shape (N,)."""
+        return self.touching.numbers_without(~self.contacts_without(self.rattlers))
 
     def removed(self, variant: Variant) -> BoolArray:
         """
@@ -259,9 +258,8 @@ class Sample:
         -------
         ndarray of bool, shape (N,)
         """
-        if not variant.in_window:
+        if not variant.in_window or window is None:
             return self.grains
-        assert window is not None
         bodies = self.packing.bodies
         places = self.packing.position if bodies is None else bodies.place
         return self.grains & window.contains(places, self.packing)
@@ -282,11 +280,9 @@ class Sample:
         ndarray of bool, shape (N,)
         """
         left = self.grains & ~self.removed(variant)
-        if not variant.in_window:
+        if not variant.in_window or window is None:
             return left
-        assert window is not None
-        position, radius = self.packing.position, self.packing.radius
-        return left & window.may_meet(position, radius, self.packing)
+        return left & window.may_meet(self.packing.position, self.packing.radius, self.packing)
 
     def contacts_without(self, left_out: BoolArray) -> BoolArray:
         """
@@ -319,12 +315,10 @@ class Sample:
         -------
         ndarray of bool, shape (M,)
         """
-        contacts = self.contacts
         chosen = self.contacts_without(self.boundary | self.removed(variant))
-        if variant.in_window:
-            assert window is not None
-            chosen &= window.contains(contacts.point, self.packing)
-        return np.asarray(chosen)
+        if not variant.in_window or window is None:
+            return chosen
+        return chosen & window.contains(self.contacts.point, self.packing)
 
     def coordination(self, variant: Variant, window: Window | None) -> float | None:
         """
@@ -345,9 +339,7 @@ class Sample:
             None if there is no grain.
         """
         counted = self.once(self.counted(variant, window) & ~self.removed(variant))
-        if not counted.any():
-            return None
-        return float(self.numbers_of(variant)[counted].mean())
+        return float(self.numbers_of(variant)[counted].mean()) if counted.any() else None
 
 
 @dataclass(frozen=True)

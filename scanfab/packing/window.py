@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanfab.base.arrays import cast
+from scanfab.base.arrays import cast, compressed, in_parts
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
-from scanfab.base.shapes import ellipse, ellipsoid
+from scanfab.base.shapes import ellipsoid
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import BoolArray, FloatArray
@@ -79,7 +79,9 @@ class Window:
         -------
         ndarray of bool, shape (N,)
         """
-        return self.shape.contains(self.branches(points, packing))
+        return np.asarray(
+            in_parts(lambda some: self.shape.contains(self.branches(some, packing)), points)
+        )
 
     def may_meet(self, points: FloatArray, radius: FloatArray, packing: Packing) -> BoolArray:
         """
@@ -98,13 +100,18 @@ class Window:
         -------
         ndarray of bool, shape (N,)
         """
-        # which image is the nearest to the centre says little of a long window
-        branch, shifts = self.images(points, packing, float(radius.max(initial=0.0)))
-        meets = np.zeros(len(points), bool)
-        for shift in shifts:
-            left = np.flatnonzero(~meets)
-            meets[left] = self.shape.may_meet(branch[left] + shift, radius[left])
-        return meets
+        largest = float(radius.max(initial=0.0))
+
+        def meets_any_image(points: FloatArray, radius: FloatArray) -> BoolArray:
+            # which image is the nearest to the centre says little of a long window
+            branch, shifts = self.images(points, packing, largest)
+            meets = np.zeros(len(points), bool)
+            for shift in shifts:
+                left = np.flatnonzero(~meets)
+                meets[left] = self.shape.may_meet(branch[left] + shift, radius[left])
+            return meets
+
+        return np.asarray(in_parts(meets_any_image, points, radius))
 
     def __post_init__(self) -> None:
         """PackingError if the centre is no point."""
@@ -225,8 +232,9 @@ class SurfaceBox:
     @classmethod
     def of(cls, packing: Packing, grains: BoolArray) -> SurfaceBox:
         """That of some particles of a packing."""
-        position = np.compress(grains, packing.position, axis=0)
-        radius = packing.radius[grains]
+        position, radius = (
+            compressed(grains, values) for values in (packing.position, packing.radius)
+        )
         # one coordinate at a time: that is faster by far for millions of grains
         low = np.array([(along - radius).min() for along in position.T])
         high = np.array([(along + radius).max() for along in position.T])
@@ -321,6 +329,5 @@ def inner_ellipsoid(position: FloatArray, largest: float, space: Space = SPACE) 
     if scale <= 0.0:
         return None
     semi_axes = scale * np.sqrt(variance)
-    if space.is_plane:
-        return Window(center, ellipse(semi_axes, space, axes.T @ space.basis[:2]))
-    return Window(center, ellipsoid(semi_axes, axes.T))
+    turn = axes.T @ space.basis[: space.dimension]
+    return Window(center, ellipsoid(semi_axes, turn, space))

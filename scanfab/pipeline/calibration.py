@@ -1,4 +1,4 @@
-"""How many lines are enough: ladders of spacing, directions, cut-off and RV for one frame."""
+"""How many lines are enough: one frame scanned with finer and finer settings, by ladders."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import logging
 import math
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import groupby
 from typing import Annotated, Any
@@ -42,12 +42,12 @@ STEPS = (3, 5, 8, 16, 32, 64, 128)
 CUTOFFS = tuple(0.25 * k for k in range(13))
 # fractions of half the smallest extent
 RV_FRACTIONS = (0.4, 0.5, 0.6, 0.67, 0.7, 0.8)
-# what a scan may add to the sample's own error: a quarter of it adds 3 %
+# the scan's error as a fraction of the sample's own: together they are 3 % above the latter
 OF_SAMPLE = 0.25
-# of the recommended settings, and how often they are tried
+# most directions to recommend, and how often recommended settings are tried and refined
 MOST_DIRECTIONS, ROUNDS = 2905, 5
-# how likely chance alone makes any two steps of a ladder differ, and how sure standard errors of 16
-# replicates are
+# probability that two steps of a ladder differ by chance alone, and degrees of freedom of the
+# difference of two values with standard errors of 16 replicates each
 CHANCE, FREEDOM = 0.05, 30
 PAPER = {"spacing": " (the paper: 0.1)", "rv": " (the paper: 0.67 to 0.7)"}
 
@@ -172,15 +172,35 @@ def calibrate(
     settings = Settings(variants=variants, **options)
     if settings.lists_gaps or len(settings.rvs) > 1:
         raise SettingsError("calibrate: its ladders take neither cutoffs, moment nor several rv")
-    return _Calibrator(source, settings, frame).all()
+    one = _OneFrame(source, settings, frame)
+    settings, cutoffs = one.settings, one.cutoffs()
+    spacings, directions, rvs = (one.ladder(name) for name in ("spacing", "directions", "rv"))
+    ladders = {"spacing": spacings, "directions": directions, "cutoff": cutoffs, "rv": rvs}
+    cutoff = settings.cutoff.value if settings.cutoff.unit == "rmin" else PAPER_CUTOFF
+    at_cutoff = [row for row in cutoffs if row.value == cutoff] or cutoffs
+    sample = _largest(at_cutoff, "alpha_vs_axial_sample_se")
+    target = max(settings.tolerance, OF_SAMPLE * (sample or 0.0))
+    best, recommended = one.recommended(spacings, directions, target)
+    findings = [_finding(name, rows) for name, rows in ladders.items() if rows]
+    reached, own = (
+        "unknown" if error is None else f"{error:.2g}"
+        for error in (_largest(best, "alpha_vs_axial_se"), sample)
+    )
+    findings.append(
+        f"recommended: scan's error {reached} (wanted {target:.2g}; the sample's own is {own}) "
+        f"in {best[0].seconds:.2g} s"
+    )
+    rows = [row for ladder in ladders.values() for row in ladder]
+    return Calibration((*rows, *best), tuple(findings), recommended)
 
 
-class _Calibrator:
-    """One frame, and the first frame of its series that has grains, which makes the plan."""
+class _OneFrame:
+    """One frame, scanned with one choice of settings after the other."""
 
     def __init__(self, source: Source, settings: Settings, frame: int) -> None:
         frames = Frames(source, replace(settings, frames=parse_frames(frame, "frame")))
         self.number, wanted = frames.one()
+        # the first frame of the series that has grains makes the plan
         first = frames.first()
         if first is None:
             raise PackingError("no frame has any grains: there is nothing to calibrate")
@@ -192,71 +212,40 @@ class _Calibrator:
         self.name, self.sample, self.space = frames.name, sample, self.first.packing.space
         self.settings = settings_in(settings, self.space)
         tell(sample.doubts_of_escaped(), f"frame {self.number}")
-        self.r_min = float(self.first.packing.radius[self.first.grains].min())
         # these notes concern every step
         tell(make_plan(self.settings, self.first).notes)
 
-    def all(self) -> Calibration:
-        """The ladders, what they say, and what follows."""
-        settings = self.settings
-        cutoffs = self._cutoffs()
-        spacings, directions, rvs = (
-            judged(list(self._ladder(name)), self.space.dimension)
-            for name in ("spacing", "directions", "rv")
-        )
-        ladders = {"spacing": spacings, "directions": directions, "cutoff": cutoffs, "rv": rvs}
-        cutoff = settings.cutoff.value if settings.cutoff.unit == "rmin" else PAPER_CUTOFF
-        at_cutoff = [row for row in cutoffs if row.value == cutoff] or cutoffs
-        sample = _largest(at_cutoff, "alpha_vs_axial_sample_se")
-        target = max(settings.tolerance, OF_SAMPLE * (sample or 0.0))
-        best, options = self._recommended(spacings, directions, target)
-        findings = [_finding(name, rows) for name, rows in ladders.items() if rows]
-        reached, own = (
-            "unknown" if one is None else f"{one:.2g}"
-            for one in (_largest(best, "alpha_vs_axial_se"), sample)
-        )
-        findings.append(
-            f"recommended: scan's error {reached} (wanted {target:.2g}; the sample's own is {own}) "
-            f"in {best[0].seconds:.2g} s"
-        )
-        rows = [row for ladder in ladders.values() for row in ladder]
-        return Calibration((*rows, *best), tuple(findings), options)
-
-    def _steps(self, ladder: str) -> dict[float, Settings]:
-        """The settings of each step, by the value that is changed."""
+    def ladder(self, name: str) -> list[StepRow]:
+        """The rows of a ladder, without the steps whose settings do not fit the sample."""
         settings, space = self.settings, self.space
-        if ladder == "spacing":
+        steps: dict[float, dict[str, Any]] = {}
+        if name == "spacing":
             rule = settings.directions or usual_rule(space)
-            lengths = {value: Length(value, "rmin") for value in SPACINGS}
-            return {
-                value: replace(settings, spacing=length, directions=rule)
-                for value, length in lengths.items()
-            }
-        if ladder == "directions":
+            for value in SPACINGS:
+                steps[value] = {"spacing": Length(value, "rmin"), "directions": rule}
+        elif name == "directions":
             spacing = settings.spacing or Length(FIXED_SPACING, "rmin")
             rules = [direction_rule(f"lebedev:{degree}") for degree in DEGREES]
             if space.is_plane:
                 rules = [rule_of(count, space) for count in STEPS]
-            return {len(one): replace(settings, spacing=spacing, directions=one) for one in rules}
-        # a surface that a file draws is an RV without a ladder of sizes
-        if not settings.needs_window or settings.rv_shape not in SHAPES:
-            return {}
-        variants = "".join(variant for variant in settings.variants if variant in "cd")
-        words: dict[str, Any] = {"rv_radius": None, "rv_size": (), "variants": variants}
-        return {value: replace(settings, rv=value, **words) for value in RV_FRACTIONS}
-
-    def _ladder(self, ladder: str) -> Iterator[StepRow]:
-        """The rows of all steps but those whose settings do not fit the sample."""
-        for value, settings in self._steps(ladder).items():
+            steps = {len(rule): {"spacing": spacing, "directions": rule} for rule in rules}
+        elif settings.needs_window and settings.rv_shape in SHAPES:
+            # a surface that a file draws is an RV of one size
+            variants = "".join(variant for variant in settings.variants if variant in "cd")
+            words = {"rv_radius": None, "rv_size": (), "variants": variants}
+            steps = {value: {"rv": value, **words} for value in RV_FRACTIONS}
+        rows: list[StepRow] = []
+        for value, changed in steps.items():
             try:
-                yield from self._measured(ladder, value, settings)[0]
+                rows += self.measured(name, value, replace(settings, **changed))[0]
             except SettingsError as error:
-                tell([Note("step_left_out", f"{ladder} {value:g} left out: {error}")])
+                tell([Note("step_left_out", f"{name} {value:g} left out: {error}")])
+        return judged(rows, space.dimension)
 
-    def _cutoffs(self) -> list[StepRow]:
+    def cutoffs(self) -> list[StepRow]:
         """One scan for all cut-offs; SettingsError if a variant has no void fabric at any."""
         lengths = tuple(Length(value, "rmin") for value in CUTOFFS)
-        rows, _ = self._measured("cutoff", None, replace(self.settings, cutoffs=lengths))
+        rows, _ = self.measured("cutoff", None, replace(self.settings, cutoffs=lengths))
         for variant in self.settings.variants:
             if all(row.alpha_vs_axial is None for row in rows if row.variant == variant):
                 raise SettingsError(
@@ -265,10 +254,10 @@ class _Calibrator:
                 )
         return rows
 
-    def _measured(
+    def measured(
         self, ladder: str, value: float | None, settings: Settings
     ) -> tuple[list[StepRow], Measurement]:
-        """The rows of one step, and what they were made from; no value: that of each cut-off."""
+        """The rows of one step, and their measurement; without a value each row has its cut-off."""
         begun = time.perf_counter()
         plan = make_plan(settings, self.first)
         shadow = self.space.shadow(self.sample.packing.radius[self.sample.grains])
@@ -281,6 +270,7 @@ class _Calibrator:
         result = compute_frame(self.sample, plan, number=self.number, source=self.name)
         seconds = time.perf_counter() - begun
         LOGGER.info("%s %s: %.2g s", ladder, "" if value is None else f"{value:g}", seconds)
+        r_min = float(self.first.packing.radius[self.first.grains].min())
         rows, window = [], plan.window
         for row in result.rows:
             # errors at other cut-offs than the scan's stand in the rows themselves
@@ -289,7 +279,7 @@ class _Calibrator:
             step = StepRow(
                 **{one.name: row[one.name] for one in fields(StepRow) if one.name in row},
                 ladder=ladder,
-                value=round(row.cutoff / self.r_min, 9) if value is None else value,
+                value=round(row.cutoff / r_min, 9) if value is None else value,
                 rule=plan.rule.name,
                 degree=plan.rule.degree,
                 rule_bias=plan.rule.bias,
@@ -301,7 +291,7 @@ class _Calibrator:
             rows.append(step)
         return rows, result.measurements[0]
 
-    def _recommended(
+    def recommended(
         self, spacings: list[StepRow], directions: list[StepRow], target: float
     ) -> tuple[list[StepRow], dict[str, str]]:
         """
@@ -315,7 +305,7 @@ class _Calibrator:
         other_lines = replace(self.settings, tolerance=target, seed=self.settings.seed + 1)
         for _ in range(ROUNDS):
             trial = replace(other_lines, spacing=Length(spacing, "rmin"), directions=rule)
-            _, found = self._measured("recommended", len(rule), trial)
+            _, found = self.measured("recommended", len(rule), trial)
             errors = [Goal().errors(found.sums, found.plan, one) for one in found.plan.variants]
             missing = missing_work(errors, found.plan, found.sums.replicates)
             if missing <= 1.0:
@@ -325,7 +315,7 @@ class _Calibrator:
                 spacing = float(f"{spacing * self.space.apart(MOST_DIRECTIONS / wanted):.2g}")
             rule = rule_of(min(math.ceil(wanted), MOST_DIRECTIONS), self.space)
         best = replace(self.settings, spacing=Length(spacing, "rmin"), directions=rule)
-        rows, _ = self._measured("recommended", len(rule), best)
+        rows, _ = self.measured("recommended", len(rule), best)
         return rows, {"spacing": f"{spacing:g}rmin", "directions": rule.name}
 
 
@@ -388,13 +378,13 @@ def _finding(ladder: str, rows: list[StepRow]) -> str:
             said = f"from {steady:g} on nothing changes within the errors"
         return f"{ladder}: {said}{PAPER.get(ladder, '')}"
     variant = rows[0].variant
-    own = {row.value: row.alpha_vs_axial for row in rows if row.variant == variant}
-    known = {value: alpha for value, alpha in own.items() if alpha is not None}
-    best = max(known, key=lambda value: abs(known[value]))
+    own = {row.value: row.alpha_vs_axial or 0.0 for row in rows if row.variant == variant}
+    best = max(own, key=lambda value: abs(own[value]))
     said = (
         f"cut-off: it decides what is measured; in {variant} the anisotropy is largest "
-        f"({known[best]:.2g}) at {best:g} r_min"
+        f"({own[best]:.2g}) at {best:g} r_min"
     )
-    if PAPER_CUTOFF not in known or known[best] == 0:
-        return said
-    return f"{said}; at the paper's 1 r_min it is {known[PAPER_CUTOFF] / known[best]:.0%} of that"
+    paper = own.get(PAPER_CUTOFF)
+    if paper:
+        said += f"; at the paper's 1 r_min it is {paper / own[best]:.0%} of that"
+    return said

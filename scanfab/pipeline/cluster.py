@@ -7,12 +7,11 @@ import logging
 import os
 import platform
 import socket
-import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future, InvalidStateError
+from concurrent.futures import CancelledError, Executor, Future
 from contextlib import contextmanager, suppress
-from functools import cache, partial
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -24,12 +23,10 @@ from scanfab.io.families import PathLike
 PACKAGES = ("scanfab", "numpy", "numba", "scipy", "polars", "dask", "distributed")
 # seconds within which a scheduler answers when it is called
 TIMEOUT = 10.0
-# seconds between two questions while frames are computed, and for which it may leave one open
-BEAT, SILENCE = 2.0, 60.0
+# seconds that a scheduler may take to answer while frames are computed
+SILENCE = 60.0
 # how often Dask computes a frame again that raises an error
 RETRIES = 2
-# names that tell what a folder holds
-MOST_NAMES = 5
 
 
 class ClusterError(ScanfabError):
@@ -82,37 +79,43 @@ def dask_executor(
     if (scheduler is None) == (scheduler_file is None):
         raise SettingsError("a cluster is named by just one of `scheduler` and `scheduler_file`")
     try:
-        import distributed
+        from distributed import Client
     except ImportError:
         raise SettingsError(
             "a Dask cluster needs the package distributed: pip install 'scanfab[cluster]'"
         ) from None
-    connect: Any = distributed.Client
     address = str(scheduler) if scheduler_file is None else _address_in(Path(scheduler_file))
-    with _quiet():
-        _check_that_one_listens(address)
-        try:
-            client = connect(address, timeout=TIMEOUT, set_as_default=False)
-        except Exception as error:
-            raise _no_answer(address, str(error)) from None
-        try:
-            yield DaskExecutor(client, address)
-        finally:
-            client.close(timeout=2)
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Silence what Dask logs of lost connections: the error that we raise says it."""
-    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
-    levels = [one.level for one in loggers]
-    for one in loggers:
-        one.setLevel(logging.CRITICAL + 1)
+    # Dask logs lost connections, which the error that we raise says
+    levels = {name: logging.getLogger(name).level for name in ("distributed", "distributed.client")}
+    for name in levels:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    client = None
     try:
-        yield
+        client = _connected(Client, address)
+        yield DaskExecutor(client, address)
     finally:
-        for one, level in zip(loggers, levels, strict=True):
-            one.setLevel(level)
+        if client is not None:
+            client.close(timeout=2)
+        for name, level in levels.items():
+            logging.getLogger(name).setLevel(level)
+
+
+def _connected(connect: Any, address: str) -> Any:
+    """The client of a scheduler; ClusterError if none answers at this address."""
+    kind, _, place = address.rpartition("://")
+    host, _, port = place.rpartition(":")
+    try:
+        if kind in ("", "tcp"):
+            with socket.create_connection((host.strip("[]"), int(port)), TIMEOUT) as stream:
+                stream.settimeout(TIMEOUT)
+                # a scheduler speaks first; Dask would wait without an end for one that does not
+                if not stream.recv(1):
+                    raise ConnectionError("it says nothing")
+        return connect(address, timeout=TIMEOUT, set_as_default=False)
+    except Exception as error:
+        what = f"no Dask scheduler answers there within {TIMEOUT:g} s ({error})"
+        advice = "start one by `dask scheduler`, and name the address that it prints"
+        raise ClusterError(f"{address}: {what}: {advice}, as tcp://HOST:8786") from None
 
 
 def _address_in(path: Path) -> str:
@@ -122,42 +125,9 @@ def _address_in(path: Path) -> str:
         with suppress(OSError, ValueError, KeyError, TypeError):
             return str(json.loads(path.read_text("utf-8"))["address"])
         time.sleep(0.1)
+    expected = f"expected the file that a Dask scheduler writes, within {TIMEOUT:g} s"
     found = "something else" if path.exists() else "nothing"
-    raise ClusterError(
-        f"{path}: expected the file that a Dask scheduler writes, with its address, within "
-        f"{TIMEOUT:g} s, found {found}: is the scheduler started with this file?"
-    )
-
-
-def _check_that_one_listens(address: str) -> None:
-    """ClusterError if nobody answers there; addresses of other kinds than tcp are left to Dask."""
-    kind, _, place = address.rpartition("://")
-    host, _, port = place.rpartition(":")
-    if kind not in ("", "tcp"):
-        return
-    if not host or not port.isdigit():
-        raise ClusterError(f"{address}: expected the address of a scheduler, as tcp://HOST:8786")
-    try:
-        with socket.create_connection((host.strip("[]"), int(port)), TIMEOUT) as stream:
-            stream.settimeout(TIMEOUT)
-            # a scheduler speaks first; if it does not, Dask would wait for it without an end
-            speaks = bool(stream.recv(1))
-    except TimeoutError:
-        speaks = False
-    except (OSError, OverflowError) as error:
-        raise ClusterError(
-            f"{address}: no scheduler is there ({error}): start one with `dask scheduler`, or name "
-            f"the address that it prints"
-        ) from None
-    if not speaks:
-        raise _no_answer(address, "it says nothing")
-
-
-def _no_answer(address: str, reason: str) -> ClusterError:
-    return ClusterError(
-        f"{address}: does not answer as a Dask scheduler within {TIMEOUT:g} s ({reason}): is "
-        f"another program there, another version of Dask, or does it hang?"
-    )
+    raise ClusterError(f"{path}: {expected}, found {found}: is it started with this file?")
 
 
 class DaskExecutor(Executor):
@@ -165,139 +135,66 @@ class DaskExecutor(Executor):
 
     def __init__(self, client: Any, address: str) -> None:
         self.client, self.address = client, address
-        self._is_silent = False
-        self.threads: dict[str, int] = self._asked_for_threads()
-        """How many threads each worker had a moment ago."""
-        threading.Thread(target=self._watch, daemon=True).start()
-        if not self.threads:
+        self._submit: Callable[..., Future[Any]]
+        self._submit = client.get_executor(pure=False, retries=RETRIES).submit
+        if not self._threads():
             # a warning, so that --quiet shows it too: nothing else tells why nothing happens
-            warn(
-                f"{address}: the scheduler has no workers yet: frames wait for them, without a "
-                f"limit: start some with `dask worker {address}`"
-            )
-
-    def room(self) -> int:
-        """How many frames may be under way: one for each thread, so that none waits at a worker."""
-        return max(sum(self.threads.values()), 1)
+            what = "the scheduler has no workers yet: frames wait for them, without a limit"
+            warn(f"{address}: {what}: start some with `dask worker {address}`")
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Have a function computed by a worker; one that has a ``path`` reads that file."""
-        future: Future[Any] = Future()
-        job, path = partial(fn, *args, **kwargs), getattr(fn, "path", None)
-        try:
-            sent = self.client.submit(
-                computed_there, job, path, versions_here(), pure=False, retries=RETRIES
-            )
-        except Exception:
-            raise self._gone() from None
-        # what is not waited for any more is neither computed nor kept there
-        future.add_done_callback(lambda _: sent.release())
-        sent.add_done_callback(partial(self._settle, future, fn, path))
-        return future
+        return self._submit(computed_there, fn, versions_here(), *args, **kwargs)
 
-    def _asked_for_threads(self) -> dict[str, int]:
-        return dict(self.client.nthreads(callback_timeout=SILENCE))
+    def room(self) -> int:
+        """How many frames may be under way: one for each thread of the workers, and at least 1."""
+        return max(self._threads(), 1)
 
-    def _watch(self) -> None:
+    def _threads(self) -> int:
         """
-        Ask for the workers every few seconds; leave a scheduler that does not answer.
+        How many threads the workers have now; ClusterError if the scheduler does not say it.
 
         A scheduler that is stopped, or lies behind a network that swallows what is sent, closes no
-        connection: whoever waits for a frame would wait without an end.
+        connection: without this question a run would wait for its frames for ever.
         """
-        while self.client.status in ("running", "connecting"):
-            time.sleep(BEAT)
-            try:
-                self.threads = self._asked_for_threads()
-            except Exception as error:
-                self._is_silent = isinstance(error, TimeoutError)
-                with suppress(Exception):
-                    # all that is waited for ends with it
-                    self.client.close(timeout=TIMEOUT)
-                return
+        try:
+            return sum(self.client.nthreads(callback_timeout=SILENCE).values())
+        except Exception as error:
+            raise self.explained(error, "") from None
 
-    def _gone(self) -> ClusterError:
-        what = f"has not answered for {SILENCE:g} s" if self._is_silent else "has gone"
-        return ClusterError(
-            f"{self.address}: the scheduler {what} while frames were computed: start it again, "
-            f"and go on with `resume`"
-        )
-
-    def _settle(self, future: Future[Any], job: Any, path: Path | None, sent: Any) -> None:
-        """Hand on what has become of a frame, unless nobody waits for it any more."""
-        with suppress(InvalidStateError):
-            try:
-                future.set_result(self._result_of(sent, job, path))
-            except ScanfabError as error:
-                future.set_exception(error)
-
-    def _result_of(self, sent: Any, job: Any, path: Path | None) -> Any:
-        """What a worker has returned; all that can go wrong is a ScanfabError."""
+    def explained(self, error: Exception, job: object) -> Exception:
+        """What users are told of an error of a job, or of asking the scheduler."""
         from distributed.scheduler import KilledWorker
 
-        try:
-            # it is there; without a limit Dask would wait for ever if the scheduler stops just now
-            found = sent.result(timeout=SILENCE)
-        except ScanfabError:
-            raise
-        except KilledWorker as error:
-            raise DeadWorkersError(
-                f"{job}: the workers that computed it died, {error.allowed_failures + 1} one after "
-                f"the other: had they too little memory?"
-            ) from None
-        except Exception as error:
-            if sent.status != "error" or self.client.status != "running":
-                self._is_silent |= isinstance(error, TimeoutError)
-                raise self._gone() from None
-            text = f"{job}: {type(error).__name__} at a worker: {error}"
-            if isinstance(error, ImportError):
-                text += f": it needs the same packages as this process ({versions_here()})"
-            raise ClusterError(text) from None
-        if isinstance(found, ClusterError):
-            # a file that is not there for this process either is an error of its frame
-            raise found if path is None or path.exists() else ReadError(str(found))
-        return found
+        if isinstance(error, ScanfabError):
+            return error
+        if isinstance(error, KilledWorker):
+            died = f"{error.allowed_failures + 1} one after the other: had they too little memory?"
+            return DeadWorkersError(f"{job}: the workers that computed it died, {died}")
+        if isinstance(error, CancelledError) or not job:
+            is_silent = isinstance(error, TimeoutError)
+            what = f"has not answered for {SILENCE:g} s" if is_silent else "has gone"
+            what = f"the scheduler {what} while frames were computed"
+            return ClusterError(f"{self.address}: {what}: start it again, and go on with `resume`")
+        return ClusterError(f"{job}: {type(error).__name__} at a worker: {error}")
 
 
-def computed_there(job: partial[Any], path: Path | None, versions: dict[str, str]) -> Any:
-    """
-    What a function returns, called by a worker.
-
-    A ClusterError is returned, not raised, if this worker cannot do what others can: to compute the
-    frame once more would not help.
-    """
-    from distributed import get_worker
-
-    worker, theirs = get_worker().address, versions_here()
+def computed_there(
+    fn: Callable[..., Any], versions: dict[str, str], *args: Any, **kwargs: Any
+) -> Any:
+    """What a function returns, called by a worker; ScanfabError if this worker cannot do it."""
+    here, path, theirs = platform.node(), getattr(fn, "path", None), versions_here()
     if theirs != versions:
-        told = ", ".join(
-            f"{name} {theirs.get(name)} there and {mine} here"
-            for name, mine in versions.items()
-            if theirs.get(name) != mine
+        there, mine = (
+            dict(theirs.items() - versions.items()),
+            dict(versions.items() - theirs.items()),
         )
-        return ClusterError(
-            f"{worker}: this worker has other versions than this process: {told}: the same are "
-            f"needed for the same numbers"
-        )
-    try:
-        return job()
-    except Exception:
-        if path is None or os.access(path, os.R_OK):
-            raise
-        return ClusterError(
-            f"{worker}: this worker cannot read {path}: it sees {_view(path)}: workers need the "
-            f"same files by the same paths as this process"
-        )
-
-
-def _view(path: Path) -> str:
-    """What is there in place of a file that cannot be read."""
-    found = next(folder for folder in path.parents if folder.exists())
-    with suppress(OSError):
-        names = sorted(os.listdir(found))
-        more = ", ..." if len(names) > MOST_NAMES else ""
-        return f"{found} with {', '.join(names[:MOST_NAMES]) + more if names else 'nothing'} in it"
-    return f"{found}, which it cannot list"
+        what = f"the worker on {here} has {there}, but this process {mine}"
+        raise ClusterError(f"{what}: the same versions are needed for the same numbers")
+    if path is not None and not os.access(path, os.R_OK):
+        need = "workers need the same files by the same paths as this process"
+        raise ReadError(f"{path}: the worker on {here} cannot read it: {need}")
+    return fn(*args, **kwargs)
 
 
 @cache

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 import platform
+import threading
 import time
 import warnings
 from collections import deque
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from concurrent.futures import Executor, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,7 +30,6 @@ from scanfab.pipeline.frames import Frames, Source
 from scanfab.pipeline.plan import Plan, make_plan, plan_without_grains
 from scanfab.pipeline.settings import MAX_CHORDS, Settings
 from scanfab.pipeline.strain import Flips
-from scanfab.pipeline.told import heard_by_thread
 from scanfab.scan.directions import DirectionRule
 from scanfab.table.row import Row
 from scanfab.table.table import Table
@@ -37,6 +37,13 @@ from scanfab.table.table import Table
 LOGGER = logging.getLogger("scanfab")
 
 Observer = Callable[[FrameResult], None]
+
+# codes of notes that are true of later frames too: a grain that flew away goes on flying
+ONCE_A_SERIES = {ESCAPED, "other_bodies", "grains_left"}
+# seconds after which a run that waits for a frame looks again how many may be under way
+PAUSE = 2.0
+# what a thread of another process was warned of while it computed a frame
+_heard = threading.local()
 
 
 @takes_options(options_of(Settings))
@@ -148,23 +155,61 @@ def compute_frames(
     list of Row
         None are empty: frames that are skipped are left out.
     """
-    run = _Run(Frames(source, settings))
-    with _pool(settings.workers, executor) as pool:
-        for computed in in_order(pool, run.jobs(done, observe), settings.on_error == "skip"):
-            run.tell(computed)
+    if not isinstance(executor, Executor | None):
+        raise unusable("executor", "a concurrent.futures.Executor", executor)
+    frames = Frames(source, settings)
+    plan, notes = _plan(frames), _SeriesNotes(frames.settings)
+    own = ThreadPoolExecutor(settings.workers)
+    try:
+        jobs = _jobs(frames, plan, done, observe, is_far=executor is not None)
+        for computed in _in_order(jobs, executor or own, settings, own):
+            notes.tell(computed)
             if computed.rows:
                 yield computed.rows
-    if not run.has_grains:
-        tell([run.frames.without_grains()], run.frames.name)
+    finally:
+        # an interrupted run does not wait for the frames under way
+        own.shutdown(wait=False, cancel_futures=True)
+    if math.isnan(plan.cutoff):
+        tell([Note("no_grains", "no frame has any grains")], frames.name)
 
 
-@dataclass(frozen=True, eq=False)
-class _Computed:
+def _plan(frames: Frames) -> Plan:
+    """The plan of a series, by its first frame that has grains."""
+    # an error in a file of strains comes before the first frame
+    plan = plan_without_grains(frames.settings)
+    first = frames.first()
+    if first is not None:
+        _, frame, sample = first
+        tell(frames.notes(frame, sample))
+        plan = make_plan(frames.settings, sample)
+        tell(plan.notes)
+    return plan
+
+
+def _jobs(
+    frames: Frames, plan: Plan, done: Container[int], observe: Observer | None, is_far: bool
+) -> Iterator[_Job | None]:
+    """The chosen frames that are not done; None where the next is still to come."""
+    for due in frames.as_they_come():
+        if due is None:
+            yield None
+            continue
+        number, frame = due
+        known = frames.ready.pop(number, frame)
+        if number in done or known is None:
+            continue
+        if is_far and isinstance(frame, Frame):
+            # another process reads the frame itself, even if it was read here
+            known = frame.alone()
+        yield _Job(known, plan, number, frames.name, observe, _here())
+
+
+class _Computed(NamedTuple):
     """What comes back of a frame, also from another process."""
 
     number: int
-    rows: list[Row] = field(default_factory=list)
-    notes: tuple[Note, ...] = ()
+    rows: list[Row]
+    notes: tuple[Note, ...]
     cell: Cell | None = None
     """None also if the frame has no grains."""
     grouping: Grouping | None = None
@@ -174,185 +219,109 @@ class _Computed:
 
 
 @dataclass(frozen=True, eq=False)
-class _FrameJob:
-    """One frame to be computed, here or in another process."""
+class _Job:
+    """One frame to be computed, by a thread of this process or by another process."""
 
     frame: Sample | Packing | Frame
     plan: Plan
     number: int
     source: str
     observe: Observer | None
-    file: Frame | None = None
-    """Where another process finds the frame, if it lies in files."""
-    home: tuple[str, int] = field(default_factory=lambda: _here())
-    """The machine and process that hears warnings."""
+    home: tuple[str, int]
+    """The machine and process in which warnings are heard."""
 
     def __str__(self) -> str:
         return f"frame {self.number}"
 
-    def __getstate__(self) -> dict[str, Any]:
-        # what was read here, is read again there
-        if self.file is None:
-            return dict(vars(self))
-        alone = self.file.alone()
-        return {**vars(self), "frame": alone, "file": alone}
-
     @property
     def path(self) -> Path | None:
-        """Where the frame is read from, if it lies in a file."""
-        return None if self.file is None else self.file.snapshot.path.absolute()
+        """The file of the frame, if it lies in one."""
+        return self.frame.snapshot.path if isinstance(self.frame, Frame) else None
 
     def __call__(self, threads: int) -> _Computed:
+        if _here() != self.home:
+            # threads of a worker compute frames side by side, so each keeps its own warnings
+            warnings.simplefilter("always")
+            warnings.showwarning = _hear
+        begun, _heard.warnings = time.perf_counter(), []
         plan = replace(self.plan, workers=threads)
-        if _here() == self.home:
-            return self._computed(plan)
-        with heard_by_thread() as caught:
-            found = self._computed(plan)
-        return replace(found, heard=tuple(caught))
-
-    def _computed(self, plan: Plan) -> _Computed:
-        begun = time.perf_counter()
         found = compute_frame(self.frame, plan, number=self.number, source=self.source)
-        seconds = time.perf_counter() - begun
+        seconds, packing = time.perf_counter() - begun, found.sample.packing
         grains = found.sample.number(found.sample.grains)
         LOGGER.info("%s: frame %d: %d grains in %.2g s", self.source, self.number, grains, seconds)
         if self.observe is not None:
             self.observe(found)
-        packing, grouping = found.sample.packing, None
+        grouping = None
         if packing.bodies is not None:
             grouping = Grouping(packing.id, packing.id[packing.bodies.head])
-        cell = packing.cell if grains else None
-        return _Computed(self.number, found.rows, found.notes, cell, grouping)
+        cell, heard = packing.cell if grains else None, tuple(_heard.warnings)
+        return _Computed(self.number, found.rows, found.notes, cell, grouping, heard)
 
 
 def _here() -> tuple[str, int]:
     return platform.node(), os.getpid()
 
 
-class _Run:
-    """
-    One series under way.
+def _hear(message: Any, *_: Any, **__: Any) -> None:
+    """Take the place of ``warnings.showwarning`` in the process of a worker."""
+    getattr(_heard, "warnings", []).append(message)
 
-    The first frame that has grains makes the plan; from there on frames do not depend on one
-    another.
-    """
 
-    def __init__(self, frames: Frames) -> None:
-        self.frames = frames
-        self.has_grains = False
-        self._flips = Flips(frames.settings.frames.step)
-        self._first_grouping: tuple[int, Grouping] | None = None
-        self._told_once: set[str] = set()
+class _SeriesNotes:
+    """Tells the notes of the frames of one series, in their order."""
 
-    def jobs(self, done: Container[int], observe: Observer | None) -> Iterator[_FrameJob | None]:
-        """The chosen frames that are not done; None where one is still to come."""
-        plan = self._plan()
-        for due in self.frames.as_they_come():
-            if due is None:
-                yield None
-                continue
-            number, frame = due
-            known = self.frames.ready.pop(number, frame)
-            if number not in done and known is not None:
-                file = frame if isinstance(frame, Frame) else None
-                yield _FrameJob(known, plan, number, self.frames.name, observe, file)
-
-    def _plan(self) -> Plan:
-        """Settings end here."""
-        settings = self.frames.settings
-        # an error in a file of strains comes before the first frame
-        plan = plan_without_grains(settings)
-        first = self.frames.first()
-        if first is None:
-            return plan
-        self.has_grains = True
-        _, frame, sample = first
-        tell(self.frames.notes(frame, sample))
-        plan = make_plan(settings, sample)
-        tell(plan.notes)
-        return plan
+    def __init__(self, settings: Settings) -> None:
+        self._flips = Flips(settings.frames.step)
+        self._first: tuple[int, Grouping] | None = None
+        self._told: set[str] = set()
 
     def tell(self, computed: _Computed) -> None:
         """Tell what there is to tell of a frame."""
         for warning in computed.heard:
             warnings.warn(warning, stacklevel=3)
-        # a grain that flew away goes on flying: once a series is enough
-        notes = [one for one in computed.notes if one.code not in {ESCAPED} & self._told_once]
-        self._told_once |= {one.code for one in notes}
-        tell(notes, f"frame {computed.number}")
+        notes = list(computed.notes)
+        if computed.grouping is not None:
+            self._first = self._first or (computed.number, computed.grouping)
+            notes += filter(None, [regrouped(*self._first, computed.grouping)])
+        for note in notes:
+            if note.code not in ONCE_A_SERIES & self._told:
+                tell([note], f"frame {computed.number}")
+            self._told.add(note.code)
         tell(self._flips.notes(computed.number, computed.cell))
-        if computed.grouping is None:
-            return
-        if self._first_grouping is None:
-            self._first_grouping = computed.number, computed.grouping
-        note = regrouped(*self._first_grouping, computed.grouping)
-        if note is not None and note.code not in self._told_once:
-            self._told_once.add(note.code)
-            tell([note], f"frame {computed.number}")
 
 
-@contextmanager
-def _pool(workers: int, executor: Executor | None) -> Iterator[_Pool]:
-    """What computes frames; with few frames, each has more threads of this process for its scan."""
-    if isinstance(executor, DaskExecutor):
-        yield _Pool(executor, executor.room)
-    elif isinstance(executor, Executor):
-        # how many processors there are elsewhere, only the executor knows
-        yield _Pool(executor, lambda: workers)
-    elif executor is not None:
-        raise unusable("executor", "a concurrent.futures.Executor", executor)
-    else:
-        own = ThreadPoolExecutor(workers)
-        try:
-            yield _Pool(own, lambda: workers, workers)
-        finally:
-            # an interrupted run does not wait for the frames under way
-            own.shutdown(wait=False, cancel_futures=True)
-
-
-class _Pool(NamedTuple):
-    """An executor, how many frames may be under way there, and the threads that they share."""
-
-    executor: Executor
-    room: Callable[[], int]
-    threads: int = 1
-
-
-def in_order(
-    pool: _Pool, jobs: Iterator[_FrameJob | None], skips: bool = False
+def _in_order(
+    jobs: Iterator[_Job | None], executor: Executor, settings: Settings, own: Executor
 ) -> Iterator[_Computed]:
     """
     The results of jobs, in the order of the jobs.
 
-    Parameters
-    ----------
-    pool : _Pool
-        Does the jobs.
-    jobs : iterator
-        None where the next job is not there yet: a result that is ready then comes meanwhile. If
-        the jobs end in an error, the results of those under way come before it.
-    skips : bool, optional
-        A frame that cannot be computed is told, in place of an error.
+    A job is None where the next one is not there yet: a result that is ready then comes meanwhile.
+    If the jobs end in an error, the results of those under way come before it. Of the ``own``
+    executor few frames have more threads each.
     """
-    waiting: deque[tuple[_FrameJob, Future[_Computed]]] = deque()
-    ready: list[_Computed] = []
+    waiting: deque[tuple[_Job, Future[_Computed]]] = deque()
     over: Exception | None = None
     try:
-        while waiting or ready or over is None:
-            fresh: list[_FrameJob] = []
-            room = pool.room() - len(waiting)
+        while waiting or over is None:
+            # how many processors there are elsewhere, only Dask tells
+            room = executor.room() if isinstance(executor, DaskExecutor) else settings.workers
+            fresh, computed = list[_Job](), None
+            if waiting and (over or len(waiting) >= room):
+                wait([waiting[0][1]], PAUSE)
+            if waiting and waiting[0][1].done():
+                computed = _result(executor, *waiting.popleft(), settings.on_error == "skip")
             try:
-                while not over and len(fresh) < room and (job := next(jobs)) is not None:
+                while not over and len(waiting) + len(fresh) < room and (job := next(jobs)):
                     fresh.append(job)
             except Exception as error:
                 over = error
-            threads = max(pool.threads // max(len(waiting) + len(fresh), 1), 1)
-            waiting.extend((job, pool.executor.submit(job, threads)) for job in fresh)
-            # the next jobs are begun before this, as whoever takes a result may be slow
-            yield from ready
-            ready.clear()
-            if waiting and (waiting[0][1].done() or over or len(waiting) >= pool.room()):
-                ready.append(_result(*waiting.popleft(), skips))
+            under_way = max(len(waiting) + len(fresh), 1)
+            threads = max(settings.workers // under_way, 1) if executor is own else 1
+            waiting.extend((job, executor.submit(job, threads)) for job in fresh)
+            # the next frames are begun by now, as whoever takes this one may be slow
+            if computed is not None:
+                yield computed
         if not isinstance(over, StopIteration):
             raise over
     finally:
@@ -361,12 +330,12 @@ def in_order(
             future.cancel()
 
 
-def _result(job: _FrameJob, future: Future[_Computed], skips: bool) -> _Computed:
+def _result(executor: Executor, job: _Job, future: Future[_Computed], skips: bool) -> _Computed:
     """What has become of a frame; one that cannot be computed is skipped, or ends the run."""
     try:
         return future.result()
-    except (PackingError, ReadError, DeadWorkersError) as error:
-        if not skips:
-            raise
-        text = str(error).removeprefix(f"frame {job.number}: ")
-        return _Computed(job.number, notes=(Note(SKIPPED, text),))
+    except Exception as found:
+        error = executor.explained(found, job) if isinstance(executor, DaskExecutor) else found
+        if not skips or not isinstance(error, PackingError | ReadError | DeadWorkersError):
+            raise error from None
+        return _Computed(job.number, [], (Note(SKIPPED, str(error).removeprefix(f"{job}: ")),))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -16,6 +15,7 @@ from scanfab.io.series import other_space
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample
+from scanfab.pipeline.frames import packing_of
 from scanfab.pipeline.maps.rows import map_rows
 from scanfab.pipeline.measurement import Measurement, measure
 from scanfab.pipeline.plan import Plan
@@ -85,58 +85,44 @@ def compute_frame(
     ScanfabError
         If the frame cannot be read or measured.
     """
-    sample = as_sample(frame, plan)
-    with naming_frame(number):
-        return _computed(sample, plan, number, source)
-
-
-@contextmanager
-def naming_frame(number: int) -> Iterator[None]:
-    """In the block errors of a packing begin with the frame."""
+    sample = frame if isinstance(frame, Sample) else plan.samples.sample(packing_of(frame))
     try:
-        yield
+        return _computed(sample, plan, number, source)
     except PackingError as error:
         raise PackingError(f"frame {number}: {error}") from None
 
 
 def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResult:
-    check_space(frame, plan)
-    known = frame_values(frame, plan, number, source)
-    if not frame.grains.any():
+    has_grains = frame.grains.any()
+    if has_grains and frame.packing.space != plan.space:
+        raise PackingError(f"{other_space(frame.packing.space, plan.space)} (`dim`)")
+    known = _frame_values(frame, plan, number, source)
+    if not has_grains:
         return FrameResult(source, number, frame, (), list(_empty_rows(known, plan)))
     if plan.map_settings is not None:
-        rows, told, blocks = map_rows(frame, plan.in_frame(frame), known, f"frame {number}")
-        told = (*frame.doubts_of_escaped(), *told)
-        return FrameResult(source, number, frame, (), rows, told, blocks)
+        mapped, told, blocks = map_rows(frame, plan.in_frame(frame), known, f"frame {number}")
+        notes = (*frame.doubts_of_escaped(), *told)
+        return FrameResult(source, number, frame, (), mapped, notes, blocks)
     if "forces" in plan.groups or "state" in plan.groups:
         refuse_forces(frame, plan.groups)
     measurements = measure(frame, plan.in_frame(frame), f"frame {number}")
-    columns = [
-        VariantColumns(measurement, VARIANTS[variant], place)
-        for variant in plan.variants
-        for measurement, _ in zip(measurements, plan.rvs_of(variant), strict=False)
-        for place in range(len(plan.cutoffs))
-    ]
-    rows = [
-        complete_row({**known, "variant": one.variant.name, **one.columns()}, plan.more_columns)
-        for one in columns
-    ]
-    notes = [
+    rows: list[Row] = []
+    doubts: list[Note] = []
+    for variant in plan.variants:
+        for measurement, _ in zip(measurements, plan.rvs_of(variant), strict=False):
+            for place in range(len(plan.cutoffs)):
+                # one at a time, as each holds the contacts of its variant
+                one = VariantColumns(measurement, VARIANTS[variant], place)
+                values = {**known, "variant": variant, **one.columns()}
+                rows.append(complete_row(values, plan.more_columns))
+                doubts += one.notes()
+    notes = (
         *frame.doubts_of_escaped(),
         *(note for one in measurements for note in one.notes),
-        *joined(note for one in columns for note in one.notes()),
+        *joined(doubts),
         *_large_errors(rows, plan),
-    ]
-    return FrameResult(source, number, frame, measurements, rows, tuple(notes))
-
-
-def check_space(sample: Sample, plan: Plan) -> None:
-    """PackingError if the frame lies in another space than the series."""
-    packing = sample.packing
-    if not sample.grains.any():
-        return
-    if packing.space != plan.space:
-        raise PackingError(f"{other_space(packing.space, plan.space)} (`dim`)")
+    )
+    return FrameResult(source, number, frame, measurements, rows, notes)
 
 
 def _empty_rows(known: Mapping[str, Any], plan: Plan) -> Iterator[Row]:
@@ -149,18 +135,11 @@ def _empty_rows(known: Mapping[str, Any], plan: Plan) -> Iterator[Row]:
     for variant in plan.variants:
         for rv in plan.rvs_of(variant):
             own = {RV_COLUMN.name: rv.fraction} if RV_COLUMN.name in plan.more_columns else {}
-            for _ in plan.cutoffs:
-                yield complete_row({**empty, "variant": variant, **own}, plan.more_columns)
+            row = complete_row({**empty, "variant": variant, **own}, plan.more_columns)
+            yield from [row] * len(plan.cutoffs)
 
 
-def as_sample(frame: Packing | Sample | Frame, plan: Plan) -> Sample:
-    """A frame, read if it is not yet, and told apart."""
-    if isinstance(frame, Sample):
-        return frame
-    return plan.samples.sample(frame if isinstance(frame, Packing) else frame.read())
-
-
-def frame_values(sample: Sample, plan: Plan, number: int, source: str) -> dict[str, Any]:
+def _frame_values(sample: Sample, plan: Plan, number: int, source: str) -> dict[str, Any]:
     """The columns that are the same in all rows of a frame."""
     strains = plan.strains.at(number, sample)
     if VOLUMETRIC_STRAIN.name not in plan.more_columns:
@@ -177,17 +156,11 @@ def frame_values(sample: Sample, plan: Plan, number: int, source: str) -> dict[s
 
 def _large_errors(rows: list[Row], plan: Plan) -> Iterator[Note]:
     """Other cut-offs, RVs and the second moment are measured along lines chosen for one."""
-    if not (plan.auto and (plan.lists_gaps or len(plan.rvs) > 1)):
-        return
     worst = max(rows, key=lambda row: row.alpha_vs_axial_se or 0.0)
-    error = worst.alpha_vs_axial_se or 0.0
-    if error > plan.tolerance:
+    error, rv = worst.alpha_vs_axial_se or 0.0, worst.get(RV_COLUMN.name)
+    if plan.auto and (plan.lists_gaps or len(plan.rvs) > 1) and error > plan.tolerance:
         reached, tolerance = spelt_apart(error, plan.tolerance)
-        rv = worst.get(RV_COLUMN.name)
-        text = (
-            f"at the cut-off {worst.cutoff:g}{f' in the RV {rv:g}' if rv else ''} "
-            f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}, which holds for "
-            f"the mean length at the cut-off {plan.cutoff:g}"
-            f"{f' in the RV {plan.rvs[0].fraction:g}' if rv else ''}: choose a smaller `tolerance`"
-        )
-        yield Note(OTHER_CUTOFFS, text, (worst.variant,))
+        where = f"at the cut-off {worst.cutoff:g}{f' in the RV {rv:g}' if rv else ''}"
+        met = f"which holds at {plan.cutoff:g}{f' in {plan.rvs[0].fraction:g}' if rv else ''}"
+        text = f"{where} alpha_vs_axial_se is {reached}, above the tolerance {tolerance}, {met}"
+        yield Note(OTHER_CUTOFFS, f"{text}: choose a smaller `tolerance`", (worst.variant,))

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cached_property
+from itertools import count, islice
 from typing import Any
 
 from scanfab.base.errors import SKIPPED, Note, PackingError, ReadError, SettingsError, tell
 from scanfab.io.follow import FollowedSeries
 from scanfab.io.frame import Frame
 from scanfab.io.series import ENDLESS, Series
-from scanfab.packing.boundary import enclosing_class, existing_values
+from scanfab.packing.boundary import BoundaryRule, enclosing_class, existing_values
 from scanfab.packing.doubts import cell_doubt, doubts_of
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample, SampleRule
@@ -37,42 +38,38 @@ class _Stream:
     def __init__(self, packings: Iterable[Packing]) -> None:
         self._coming = iter(packings)
         self._kept: deque[Packing] = deque()
-        self._number_taken = 0
+        self._taken = 0
 
     def __iter__(self) -> Iterator[Packing]:
-        """Those that are not taken yet; what has come is kept until it is taken."""
-        number = 0
-        while number < len(self._kept) or self._kept_another():
+        """Those that are not taken yet; a packing that has come is kept until it is taken."""
+        for number in count():
+            if number == len(self._kept):
+                for packing in islice(self._coming, 1):
+                    if not isinstance(packing, Packing):
+                        raise SettingsError(f"expected packings, found {packing!r} among them")
+                    self._kept.append(packing)
+            # whoever goes through them may have started another round meanwhile
+            if number == len(self._kept):
+                return
             yield self._kept[number]
-            number += 1
 
-    def taken(self) -> Iterator[Packing]:
+    def __len__(self) -> int:
+        return self._taken + sum(1 for _ in self)
+
+    def as_they_come(self) -> Iterator[Packing]:
         """Each for the last time, so that no more of them are in memory than need be."""
-        while self._kept or self._kept_another():
-            self._number_taken += 1
+        while self._kept or next(iter(self), None) is not None:
+            self._taken += 1
             yield self._kept.popleft()
-
-    def count(self) -> int:
-        """How many there are in all."""
-        return sum(1 for _ in self) + self._number_taken
-
-    def _kept_another(self) -> bool:
-        """Whether there was one more, which is kept now."""
-        for packing in self._coming:
-            if not isinstance(packing, Packing):
-                raise SettingsError(f"expected packings, found {packing!r} among them")
-            self._kept.append(packing)
-            return True
-        return False
 
 
 class Frames:
     """
     One source, frame by frame, for all that look at samples; a packing is a series of one.
 
-    Of damaged frames there is one rule: with ``on_error="stop"`` they are errors, with ``"skip"``
-    they are told and passed over, whether they were chosen or lie before the first that has grains.
-    No frame is read twice: what the search for that one has read is handed on.
+    With ``on_error="stop"`` a damaged frame is an error; with ``"skip"`` a warning names it and it
+    is left out, whether it was chosen or lies before the first frame that has grains. No frame is
+    read twice: the samples that the search for that first frame has read are used again.
 
     Parameters
     ----------
@@ -89,34 +86,21 @@ class Frames:
     """
 
     def __init__(self, source: Source, settings: Settings) -> None:
-        if isinstance(source, Packing):
-            source = [source]
+        source = [source] if isinstance(source, Packing) else source
         if isinstance(source, str) or not isinstance(source, Iterable):
-            raise SettingsError(
-                f"expected a Packing, a Series or an iterable of packings, found {source!r}"
-            )
+            expected = "a Packing, a Series or an iterable of packings"
+            raise SettingsError(f"expected {expected}, found {source!r}")
         self.source: Series | _Stream
         if isinstance(source, Series):
             self.source, self.settings = of_whole(source, settings)
         else:
             self.source, self.settings = _Stream(source), settings
-        if isinstance(self.source, FollowedSeries):
-            bounds = (self.settings.frames.start, self.settings.frames.stop)
-            if any((bound or 0) < 0 for bound in (*bounds, self.settings.frames.step)):
-                raise SettingsError(
-                    f"frames: {as_written(self.settings.frames)} counts from the end of the "
-                    f"series, which nobody knows while it is followed: count from its start, as in "
-                    f"10: or ::5"
-                )
+        if isinstance(self.source, FollowedSeries) and _counts_from_end(self.settings.frames):
+            what = f"{as_written(self.settings.frames)} counts from the end of the series"
+            raise SettingsError(f"frames: {what}, which nobody knows while it is followed")
         self.name = self.source.name
-        self.particles = 0
-        """Of the frames that were read on the way to the first that has grains."""
         self.ready: dict[int, Sample | None] = {}
-        """Chosen frames that were read on that way; None for damaged ones."""
-
-    def __repr__(self) -> str:
-        source, chosen = self.source, as_written(self.settings.frames)
-        return f"Frames {chosen} of {source!r}"
+        """Chosen frames that :meth:`first` has read; None for damaged ones."""
 
     def __iter__(self) -> Iterator[tuple[int, Unread]]:
         """All frames with their numbers, not read."""
@@ -128,24 +112,24 @@ class Frames:
         return chosen_frames(self.source, self.settings.frames)
 
     def due(self) -> Iterator[tuple[int, Unread]]:
+        """The same as :meth:`as_they_come`, which waits for the frames of a series."""
+        return (one for one in self.as_they_come() if one is not None)
+
+    def as_they_come(self) -> Iterator[tuple[int, Unread] | None]:
         """
         The chosen frames with their numbers, not read; the last time that frames are gone through.
+
+        Where the next frame of a series that is followed is not there yet, None comes in its place.
 
         Raises
         ------
         SettingsError
             At the end, if there is none.
         """
-        return (one for one in self.as_they_come() if one is not None)
-
-    def as_they_come(self) -> Iterator[tuple[int, Unread] | None]:
-        """The same of a series that is followed, with None where the next is not there yet."""
         every: Iterable[Unread | None] = self.source
-        if isinstance(self.source, _Stream):
-            every = self.source.taken()
-        elif isinstance(self.source, FollowedSeries):
+        if isinstance(self.source, _Stream | FollowedSeries):
             every = self.source.as_they_come()
-        # where they are counted from the end, that comes first
+        # if frames are counted from the end, all packings of a stream come here, and are kept
         chosen, found, number = self.chosen, False, 0
         for frame in every:
             if frame is None:
@@ -162,10 +146,10 @@ class Frames:
 
     def one(self) -> tuple[int, Unread]:
         """The first chosen frame; SettingsError if there is none."""
-        for number, frame in self:
-            if number in self.chosen:
-                return number, frame
-        raise self.no_such_frames()
+        found = next((one for one in self if one[0] in self.chosen), None)
+        if found is None:
+            raise self.no_such_frames()
+        return found
 
     def first(self) -> tuple[int, Unread, Sample] | None:
         """
@@ -174,22 +158,25 @@ class Frames:
         Raises
         ------
         SettingsError
-            If the boundary is that of no frame.
+            If the boundary is that of no frame, or all particles are boundary.
         """
+        particles = 0
         for number, frame in self:
             sample = self.sample(number, frame)
             if number in self.chosen:
                 self.ready[number] = sample
-            if sample is None:
-                continue
-            self.particles += len(sample.packing)
-            if sample.grains.any():
+            if sample is not None and sample.grains.any():
                 tell(self.check_boundary(sample))
                 return number, frame, sample
+            particles += 0 if sample is None else len(sample.packing)
+        if particles:
+            named = " or ".join(rule.text for rule in self.settings.boundary)
+            what = f"{named} selects all particles of every frame"
+            raise SettingsError(f"boundary: {what}: no grain is left")
         return None
 
     def sample(self, number: int, frame: Unread) -> Sample | None:
-        """A frame told apart; None if it is damaged and such frames are passed over."""
+        """A frame told apart; None if it is damaged and damaged frames are skipped."""
         if number in self.ready:
             return self.ready.pop(number)
         try:
@@ -202,89 +189,70 @@ class Frames:
 
     def notes(self, frame: Unread, sample: Sample) -> list[Note]:
         """What looks wrong in a frame before anything is measured."""
-        if isinstance(frame, Packing):
-            # whoever makes a packing of arrays knows its cell
-            notes, no_cell = doubts_of(sample), cell_doubt(sample, "cell")
-        else:
-            notes, no_cell = doubts_of(sample, **frame.named), cell_doubt(sample, frame.carries)
-        if no_cell:
+        file = frame if isinstance(frame, Frame) else None
+        notes = doubts_of(sample, **(file.named if file else {}))
+        # whoever makes a packing of arrays knows its cell
+        if no_cell := cell_doubt(sample, file.carries if file else "cell"):
             notes.append(Note("no_cell", no_cell))
-        if not self.settings.boundary:
-            notes += boundary_hints(sample, self.settings)
-        return notes
-
-    def without_grains(self) -> Note:
-        """What to tell where no frame has any; SettingsError if the boundary takes them all."""
-        if self.particles:
-            named = " or ".join(rule.text for rule in self.settings.boundary)
-            raise SettingsError(
-                f"boundary: {named} selects all particles of every frame: no grain is left"
-            )
-        return Note("no_grains", "no frame has any grains")
+        return notes if self.settings.boundary else notes + boundary_hints(sample, self.settings)
 
     def read(self, frame: Unread) -> Sample:
         """A frame told apart, by its contacts and the boundary; raises if it is damaged."""
-        packing = frame if isinstance(frame, Packing) else frame.read()
-        return sample_rule(self.settings).sample(packing)
+        return sample_rule(self.settings).sample(packing_of(frame))
 
     def check_boundary(self, first: Sample) -> list[Note]:
         """
-        SettingsError if no frame has any of the boundary's particles.
+        SettingsError if no frame has any of the boundary's particles; a note if one rule fits none.
 
-        A note if one rule fits none. Particles may come in later frames, so those are looked
-        through if the ``first`` has none.
+        Particles may come in later frames, so those are looked through if the ``first`` has none.
         """
         rules = self.settings.boundary
         missing = [rule for rule in rules if not rule.select(first.packing).any()]
-        for _, frame in self if missing else ():
+        others = iter(self)
+        while missing and (following := next(others, None)) is not None:
             with suppress(PackingError, ReadError, SettingsError):
-                packing = frame if isinstance(frame, Packing) else frame.read()
+                packing = packing_of(following[1])
                 missing = [rule for rule in missing if not rule.select(packing).any()]
-            if not missing:
-                break
         if not missing:
             return []
-        named = " or ".join(rule.text for rule in missing)
-        values = existing_values(first.packing, missing)
-        message = f"no particle of any frame has {named}: {values}"
+        message = f"no particle of any frame has {_values_there(first, missing)}"
         if len(missing) == len(rules):
             raise SettingsError(f"boundary: {message}")
         return [Note("no_such_boundary", f"`boundary`: {message}")]
 
     def no_such_frames(self) -> SettingsError:
         """The error for a choice that meets no frame."""
-        count = self.source.count() if isinstance(self.source, _Stream) else len(list(self.source))
+        count = len(self.source)
         if count == 0 and isinstance(self.source, FollowedSeries):
             return NoChosenFrameError(self.source.lack)
         if count == 0:
             return SettingsError(f"expected frames, found none in {self.name or 'the source'}")
-        name, frames = self.name or "the packing", self.settings.frames
+        name, frames = self.name or "the packing", as_written(self.settings.frames)
         has = "1 frame, 0" if count == 1 else f"{count} frames, 0 to {count - 1}"
-        return NoChosenFrameError(
-            f"frames: the series has no frame in {as_written(frames)}: {name} has {has}"
-        )
+        return NoChosenFrameError(f"frames: the series has no frame in {frames}: {name} has {has}")
+
+
+def packing_of(frame: Unread) -> Packing:
+    """The packing of a frame, which is read if it lies in a file."""
+    return frame if isinstance(frame, Packing) else frame.read()
 
 
 def sample_rule(settings: Settings) -> SampleRule:
     """What settings say of how particles are told apart."""
-    return SampleRule(
-        settings.boundary,
-        settings.min_contacts,
-        settings.rattlers,
-        settings.min_force,
-        settings.contact_tolerance,
-    )
+    return SampleRule(**{one.name: getattr(settings, one.name) for one in fields(SampleRule)})
 
 
-def chosen_frames(source: Iterable[Any], frames: slice) -> range:
-    """The frames to compute, in the order of the source."""
+def _counts_from_end(frames: slice) -> bool:
+    return any((bound or 0) < 0 for bound in (frames.start, frames.stop, frames.step))
+
+
+def chosen_frames(source: Series | _Stream, frames: slice) -> range:
+    """The numbers of the frames to compute, in the order of the source."""
     if isinstance(source, Series):
         chosen = source.numbers_of(frames)
-    elif any((bound or 0) < 0 for bound in (frames.start, frames.stop, frames.step)):
-        chosen = range(sum(1 for _ in source))[frames]
     else:
-        # without counting the frames first: they may still come
-        chosen = range(ENDLESS)[frames]
+        # packings are counted only where they must be, as some may still come
+        chosen = range(len(source) if _counts_from_end(frames) else ENDLESS)[frames]
     return chosen if chosen.step > 0 else chosen[::-1]
 
 
@@ -305,11 +273,10 @@ def of_whole(series: Series, settings: Settings) -> tuple[Series, Settings]:
 def boundary_hints(sample: Sample, settings: Settings) -> list[Note]:
     """What to tell of boundary particles that are not named, or of a name that fits none."""
     if settings.boundary:
-        named = " or ".join(rule.text for rule in settings.boundary)
         if sample.boundary.any():
             return []
-        values = existing_values(sample.packing, settings.boundary)
-        return [Note("no_such_boundary", f"`boundary`: no particle has {named}: {values}")]
+        text = f"`boundary`: no particle has {_values_there(sample, settings.boundary)}"
+        return [Note("no_such_boundary", text)]
     expression = enclosing_class(sample.packing)
     if expression is None:
         return []
@@ -318,6 +285,12 @@ def boundary_hints(sample: Sample, settings: Settings) -> list[Note]:
         f'name them: `boundary="{expression}"`'
     )
     return [Note("unnamed_boundary", text)]
+
+
+def _values_there(sample: Sample, rules: Sequence[BoundaryRule]) -> str:
+    """Rules of a boundary that fit no particle, and the values that there are."""
+    named = " or ".join(rule.text for rule in rules)
+    return f"{named}: {existing_values(sample.packing, rules)}"
 
 
 def samples(source: Source, **options: Any) -> Iterator[tuple[int, Sample]]:

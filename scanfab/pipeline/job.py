@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from dataclasses import replace
-from functools import partial
-from itertools import pairwise
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ReadError, SettingsError, note
 from scanfab.base.files import check_folder
 from scanfab.io.follow import FollowedSeries
-from scanfab.io.options import parse_frames
 from scanfab.io.series import Series
 from scanfab.pipeline.compute import Observer, compute_frames
 from scanfab.pipeline.frames import NoChosenFrameError, chosen_frames
-from scanfab.pipeline.part import PartFile
 from scanfab.pipeline.record import (
     FREE,
-    Finished,
     FrameRows,
-    asked_for,
-    check_inputs,
+    PartFile,
+    Record,
     differing_settings,
+    hash_of,
     input_entry,
-    manifest,
     named_files,
-    read_finished,
-    rows_by_frame,
+    read_table,
+    versions_used,
     write_manifest,
 )
 from scanfab.pipeline.settings import Settings
@@ -40,7 +36,10 @@ from scanfab.table.formats import read_rows
 from scanfab.table.row import Row
 from scanfab.table.writing import ALL, Excerpt, check_output, manifest_of, write_rows
 
+Advance = Callable[[], object]
 
+
+@dataclass(eq=False)
 class Job:
     """
     One table of some series, computed frame by frame; an interrupted one can be gone on with.
@@ -48,98 +47,73 @@ class Job:
     Each frame that FILE.part or a complete FILE holds is taken over; all others are computed. In
     the end FILE is written with all rows in the order of series and frames.
 
-    Parameters
-    ----------
-    series : sequence of Series
-        With names of their own.
-    settings : Settings
-        Of all of them.
-    output : Path, optional
-        The file of the rows; without it they are to be taken from :meth:`rows`.
-    excerpt : Excerpt, optional
-        Which columns of them are written, and with how many digits.
-    sources, reading
-        What the series were opened by, for the manifest: as of :func:`asked_for`.
-    resume : bool, optional
-        Go on with what earlier runs have left.
-    manifest_path : Path, optional
-        A manifest there too.
-    more : mapping, optional
-        Further entries of the manifest.
-    observers : sequence of callable, optional
-        For each series what is called with the result of each frame that is computed now.
-    told : Told, optional
-        What is told meanwhile, for the manifest.
-    executor : concurrent.futures.Executor, optional
-        As for :func:`scanfab.compute`.
-
     Raises
     ------
     SettingsError
         If two series have one name, or a file cannot be written where it is asked for.
     """
 
-    def __init__(
-        self,
-        series: Sequence[Series],
-        settings: Settings,
-        output: Path | None = None,
-        excerpt: Excerpt = ALL,
-        *,
-        sources: Sequence[str],
-        reading: Mapping[str, Any],
-        resume: bool = False,
-        manifest_path: Path | None = None,
-        more: Mapping[str, Any] | None = None,
-        observers: Sequence[Observer] = (),
-        told: Told | None = None,
-        executor: Executor | None = None,
-    ) -> None:
-        names = [one.name for one in series]
-        for name in names:
-            if names.count(name) > 1:
-                raise SettingsError(
-                    f"{name}: named twice among the series: the rows of a table are told apart by "
-                    f"their source and frame"
-                )
-        if manifest_path is not None:
-            check_folder(manifest_path)
-        if output is not None:
-            check_output(output)
-        self.series, self.settings, self.output, self.resume = series, settings, output, resume
-        self.taken_over = 0
-        """How many frames earlier runs have finished."""
-        self.is_over = False
-        """Whether all rows have come: the table is being made of them."""
-        self.found_void_fabric = False
-        """Whether any row has one."""
-        self._part = None if output is None else PartFile(output)
-        self._asked = asked_for(sources, reading, settings, excerpt)
-        self._excerpt = excerpt
-        self._finished: FrameRows = {}
-        self._before: Mapping[str, Any] = {}
-        """The manifest of the complete FILE whose rows are taken over."""
-        self._manifest_path, self._more = manifest_path, more or {}
-        self._told, self._executor = told or Told(), executor
-        self._observers: Sequence[Observer | None] = observers or [None] * len(series)
+    series: Sequence[Series]
+    """With names of their own."""
+    settings: Settings
+    """Of all of them."""
+    asked: dict[str, Any]
+    """What decides the bytes of the table: from :func:`asked_for`."""
+    output: Path | None = None
+    """The file of the rows; without it they are to be taken from :meth:`rows`."""
+    excerpt: Excerpt = ALL
+    """Which columns of the rows are written, and with how many digits."""
+    resume: bool = False
+    """Whether to go on with what earlier runs have left."""
+    manifest_path: Path | None = None
+    """A manifest there too."""
+    more: Mapping[str, Any] = field(default_factory=dict)
+    """Further entries of the manifest."""
+    observers: Sequence[Observer] = ()
+    """For each series what is called with the result of each frame that is computed now."""
+    told: Told = field(default_factory=Told)
+    """What is told meanwhile, for the manifest."""
+    executor: Executor | None = None
+    """As for :func:`scanfab.compute`."""
+
+    finished: FrameRows = field(default_factory=dict, init=False)
+    """The rows of the finished frames, those of earlier runs among them."""
+    taken_over: int = field(default=0, init=False)
+    """How many frames earlier runs have finished."""
+    is_over: bool = field(default=False, init=False)
+    """Whether all rows have come: the table is being made of them."""
+    found_void_fabric: bool = field(default=False, init=False)
+    """Whether any row has one."""
+    warned_before: Sequence[str] | None = field(default=None, init=False)
+    """The warnings of the complete FILE that is gone on with, if there is one."""
+
+    def __post_init__(self) -> None:
+        names = [one.name for one in self.series]
+        if twice := {name for name in names if names.count(name) > 1}:
+            raise SettingsError(f"{min(twice)}: named twice among the series of one table")
+        if self.manifest_path is not None:
+            check_folder(self.manifest_path)
+        if self.output is not None:
+            check_output(self.output)
+            self._part = PartFile(self.output)
 
     @property
     def is_good(self) -> bool:
         """Whether no frame was skipped, and one has a void fabric."""
         # a table without frames, of a job that none was left for, lacks nothing
-        return not self._told.skipped and (self.found_void_fabric or not self.done)
+        return not self.told.skipped and (self.found_void_fabric or not self.finished)
 
     @property
     def done(self) -> int:
         """How many frames are finished, those of earlier runs among them."""
-        return len(self._finished)
+        return len(self.finished)
 
     @property
     def every_row(self) -> list[Row]:
         """The rows of all finished frames, in the order of the series and of their frames."""
         place = {one.name: number for number, one in enumerate(self.series)}
-        frames = sorted(self._finished, key=lambda key: (place[key[0]], key[1]))
-        return [row for key in frames for row in self._finished[key]]
+        frames = sorted(self.finished, key=lambda key: (place[key[0]], key[1]))
+        return [row for key in frames for row in self.finished[key]]
 
     def frames(self) -> int:
         """About how many frames there are to be finished, those of earlier runs among them."""
@@ -164,20 +138,21 @@ class Job:
         SettingsError
             If the rows there were made with other settings or of other inputs.
         """
-        if self._part is None:
+        if self.output is None:
             yield
             return
         with self._part.alone():
             if self.resume:
-                self._take_over(self._part, needed)
+                self._take_over(self.output, needed)
+                self.taken_over = self.done
             yield
 
-    def rows(self, advance: Callable[[], object] = lambda: None) -> Iterator[Row]:
+    def rows(self, advance: Advance = lambda: None) -> Iterator[Row]:
         """The rows that are computed now; a frame is finished once its rows are taken."""
-        for rows in self._computed(advance):
+        for _, rows in self._computed(advance):
             yield from rows
 
-    def write(self, advance: Callable[[], object] = lambda: None) -> None:
+    def write(self, advance: Advance = lambda: None) -> None:
         """
         Write the rows to the file as they come, in a block of :meth:`begun`.
 
@@ -188,48 +163,57 @@ class Job:
         OSError
             If the file cannot be written to.
         """
-        output, part, known = self.output, self._part, set[Path]()
-        assert output is not None
-        assert part is not None
-        if not (self.resume and part.frames):
-            part.begin(self._asked)
-        replaces = not self.resume and output.is_file() and manifest_of(output).is_file()
-        for rows in self._computed(advance):
-            if replaces:
-                note(
-                    f"{output}: the table that is there will be replaced at the end of this run; "
-                    f"`resume` would go on with it"
-                )
-                replaces = False
-            part.add(self._new_inputs(rows[0], known), rows)
-        if replaces and read_rows(output):
+        assert self.output is not None
+        is_table = self.output.is_file() and manifest_of(self.output).is_file()
+        if is_table and not self.resume:
+            what = "the table that is there will be replaced at the end of this run"
+            note(f"{self.output}: {what}; `resume` would go on with it")
+        if not (self.resume and self._part.frames):
+            self._part.begin(self.asked)
+        known = set[Path]()
+        for one, rows in self._computed(advance):
+            files = [*named_files(self.asked), *one.files(rows[0].frame, known)]
+            new = [file for file in dict.fromkeys(files) if file not in known]
+            self._part.add([input_entry(file) for file in new], rows)
+            known.update(new)
+        if is_table and not self.finished and read_rows(self.output):
             raise SettingsError(
-                f"{output}: this run has no rows, and the table that is there stays as it is: "
-                f"choose frames that there are (`frames`), or another file"
+                f"{self.output}: this run has no rows, so the table that is there stays as it is: "
+                f"choose other `frames`, or another `output=FILE`"
             )
-        rows = self.every_row
-        write_rows(output, rows, self.settings.columns, self._excerpt, self.save_manifests)
-        part.remove()
+        columns = self.settings.columns
+        write_rows(self.output, self.every_row, columns, self.excerpt, self.save_manifests)
+        self._part.remove()
 
     def save_manifests(self) -> None:
         """Write the manifest where it was asked for, and beside the file."""
-        texts = dict.fromkeys([*map(str, self._before.get("warnings", [])), *self._told.warnings])
-        found = manifest(self._asked, self.series, list(texts), self._told.notes)
-        if self._manifest_path is not None:
-            write_manifest(self._manifest_path, {**found, **self._more})
+        files = {*named_files(self.asked), *(path for one in self.series for path in one.files())}
+        found = {
+            "settings": self.asked,
+            "seed": self.asked["seed"],
+            "versions": versions_used(),
+            "inputs": [input_entry(path) for path in sorted(files)],
+            "warnings": list(dict.fromkeys([*(self.warned_before or ()), *self.told.warnings])),
+            "notes": self.told.notes,
+            # of the whole series, so that a merge of parts knows which frames are missing
+            "frames": {one.name: len(one) for one in self.series},
+            **self.more,
+        }
+        if self.manifest_path is not None:
+            write_manifest(self.manifest_path, found)
         if self.output is not None:
-            outdated = None if self._before else self.output
-            write_manifest(manifest_of(self.output), {**found, **self._more}, outdated)
+            outdated = self.output if self.warned_before is None else None
+            write_manifest(manifest_of(self.output), found, outdated)
 
-    def _computed(self, advance: Callable[[], object]) -> Iterator[list[Row]]:
-        """The rows of each frame that is computed now."""
-        for one, observe in zip(self.series, self._observers, strict=True):
-            done = {frame for source, frame in self._finished if source == one.name}
+    def _computed(self, advance: Advance) -> Iterator[tuple[Series, list[Row]]]:
+        """The rows of each frame that is computed now, with its series."""
+        for place, one in enumerate(self.series):
+            done = {frame for source, frame in self.finished if source == one.name}
+            observe = self.observers[place] if self.observers else None
+            words: Any = {"done": done, "observe": observe, "executor": self.executor}
             try:
-                for rows in compute_frames(
-                    one, self.settings, done=done, observe=observe, executor=self._executor
-                ):
-                    yield rows
+                for rows in compute_frames(one, self.settings, **words):
+                    yield one, rows
                     self._finish({(one.name, rows[0].frame): rows})
                     advance()
             except NoChosenFrameError as none:
@@ -240,113 +224,148 @@ class Job:
             if isinstance(one, FollowedSeries):
                 one.end()
 
-    def _finish(self, frames: FrameRows, tells: bool = True) -> None:
-        """Add finished frames; without a column that ``tells``, they count as having a fabric."""
-        self._finished |= frames
-        every = [row for rows in frames.values() for row in rows]
-        has_fabric = any((row.alpha_vs, row.alpha_vs_axial) != (None, None) for row in every)
-        self.found_void_fabric |= has_fabric or (bool(every) and not tells)
+    def _finish(self, frames: FrameRows) -> None:
+        self.finished |= frames
+        every = (row for rows in frames.values() for row in rows)
+        self.found_void_fabric |= any(
+            (row.alpha_vs, row.alpha_vs_axial) != (None, None) for row in every
+        )
 
-    def _new_inputs(self, row: Row, known: set[Path]) -> list[dict[str, Any]]:
-        """Size and hash of the files up to the frame of a row that are not ``known`` yet."""
-        strains, surfaces = named_files(self._asked)
-        found = [*strains, *surfaces]
-        for one in self.series:
-            if one.name == row.source:
-                found += one.files(row.frame, known)
-                break
-            found += one.files()
-        new = [file for file in dict.fromkeys(found) if file not in known]
-        known.update(new)
-        return [input_entry(file) for file in new]
-
-    def _take_over(self, part: PartFile, needed: Iterable[str]) -> None:
+    def _take_over(self, output: Path, needed: Iterable[str]) -> None:
         """Take over the frames of a complete FILE, and of FILE.part."""
         # the series as they are now, also those that are followed
         series = [one.as_it_is if isinstance(one, FollowedSeries) else one for one in self.series]
-        if part.output.is_file():
+        if output.is_file():
             try:
-                self._take_table(part.output, series, needed)
+                self._take_table(read_table(output), series, needed)
             except (SettingsError, ReadError):
                 # the run that was interrupted last has left FILE.part, whatever made FILE
-                if not part.frames:
+                if not self._part.frames:
                     raise
-        if part.frames:
-            frames = self._checked(part.path, part.read(), series)
+        if self._part.frames:
+            frames = self._checked(self._part.read(), series)
             chosen = {one.name: chosen_frames(one, self.settings.frames) for one in series}
-            for source, frame in sorted(frames):
-                if frame not in chosen[source]:
-                    reason = f"it holds frame {frame}, which is not chosen now"
-                    raise _refusal(part.path, reason)
-            self._finish(frames)
-        self.taken_over = self.done
+            self._finish({key: rows for key, rows in frames.items() if key[1] in chosen[key[0]]})
 
-    def _take_table(self, path: Path, series: Sequence[Series], needed: Iterable[str]) -> None:
-        found = read_finished(path, partial(_refusal, path))
-        frames = self._checked(path, found, series, FREE)
-        columns = set(found.rows[0]) if found.rows else set()
-        if frames and (lacking := [name for name in needed if name not in columns]):
-            raise SettingsError(
-                f"{path}: its rows lack {', '.join(lacking)} (`fields`), which the figure needs: "
-                f"leave out `plot`, or `resume` to compute all frames again"
-            )
-        joined = self._joined_frames(path, {frame for _, frame in frames}, found.asked, series)
+    def _take_table(self, record: Record, series: Sequence[Series], needed: Iterable[str]) -> None:
+        frames = self._checked(record, series, FREE)
+        lacking = [name for name in needed if name not in record.columns]
+        if frames and lacking:
+            lack = f"its rows lack {', '.join(lacking)} (`fields`), which the figure needs"
+            raise SettingsError(f"{record.path}: {lack}: leave out `plot`, or `resume`")
+        joined = _joined_frames(record, self.settings.frames, [len(one) for one in series])
         self.settings = replace(self.settings, frames=joined)
-        self._asked = {**self._asked, "frames": as_written(joined)}
-        self._before = found.manifest
-        self._finish(frames, tells=bool({"alpha_vs", "alpha_vs_axial"} & columns))
+        self.asked = {**self.asked, "frames": as_written(joined)}
+        self.warned_before = [str(text) for text in record.manifest["warnings"]]
+        self._finish(frames)
+        # a choice of columns may say nothing of the void fabric
+        if not {"alpha_vs", "alpha_vs_axial"} & record.columns:
+            self.found_void_fabric |= bool(frames)
 
     def _checked(
-        self, path: Path, found: Finished, series: Sequence[Series], free: Sequence[str] = ()
+        self, record: Record, series: Sequence[Series], free: Collection[str] = ()
     ) -> FrameRows:
-        """The rows of finished frames, if they are those that this run would compute."""
-        if differing := differing_settings(found.asked, self._asked, free):
-            raise _refusal(path, f"it was made with other settings ({differing})")
-        frames = rows_by_frame(found.rows, self.settings.columns)
-        frames = {
-            k: rows for k, rows in frames.items() if len(rows) == self.settings.rows_per_frame
-        }
-        others = {source for source, _ in frames} - {one.name for one in series}
-        if others:
-            raise _refusal(path, f"its source {min(others)} is not named now")
-        if found.rows:
-            refuse = partial(_refusal, path)
-            check_inputs(found.inputs, found.asked, series, frames, refuse)
-        return frames
-
-    def _joined_frames(
-        self, path: Path, known: set[int], before: Mapping[str, Any], series: Sequence[Series]
-    ) -> slice:
-        """
-        The frames of a complete FILE and those that are chosen now, as one slice.
-
-        Raises
-        ------
-        SettingsError
-            If together they make none: no frame of FILE may be lost.
-        """
-        chosen, last = self.settings.frames, max(known, default=0)
-        now = {frame for one in series for frame in range(len(one))[chosen]}
-        if known <= now:
-            return chosen
-        # frames that were skipped leave no hole
-        then = parse_frames(before.get("frames"))
-        skipped = {frame for one in series for frame in range(len(one))[then] if frame < last}
-        every = sorted(known | now | skipped)
-        steps = {right - left for left, right in pairwise(every)} or {1}
-        if len(steps) > 1:
-            raise SettingsError(
-                f"frames: {path} holds frames {min(known)} to {last}, which with those chosen now "
-                f"make no slice A:B:C: choose `frames` so that they do, or another `output=FILE`"
-            )
-        (step,) = steps
-        stop = None if chosen.stop is None else every[-1] + 1
-        return slice(every[0], stop, None if step == 1 else step)
+        """The complete frames of a record; SettingsError if this run would compute others."""
+        for reason in _objections(record, self.asked, series, free):
+            advice = "name another `output=FILE`, or leave out `resume` to compute all again"
+            raise SettingsError(f"{record.path}: `resume` cannot go on with it: {reason}: {advice}")
+        count = record.settings.rows_per_frame
+        return {key: rows for key, rows in record.rows.items() if len(rows) == count}
 
 
-def _refusal(path: Path, reason: str) -> SettingsError:
-    """The error for rows that a run cannot go on with."""
-    return SettingsError(
-        f"{path}: `resume` cannot go on with it: {reason}: name another `output=FILE`, or leave "
-        f"out `resume` to compute all frames again"
-    )
+def _objections(
+    record: Record, asked: Mapping[str, Any], series: Sequence[Series], free: Collection[str]
+) -> Iterator[str]:
+    """
+    Why the rows of a record are not those that a run would compute now; nothing if they are.
+
+    New frames may have come behind the last one, as files or at the end of the last file. A file
+    whose frame was skipped may have been mended, and a file of cells or strains may have new lines.
+
+    Parameters
+    ----------
+    record : Record
+        Of an earlier run.
+    asked : mapping
+        The settings of this run.
+    series : sequence of Series
+        What is read now.
+    free : collection of str
+        Settings that may differ.
+    """
+    if differing := differing_settings(record.manifest["settings"], asked, free):
+        yield f"it was made with other settings ({differing})"
+    if not record.rows:
+        return
+    for source in sorted({source for source, _ in record.rows} - {one.name for one in series}):
+        yield f"its source {source} is not named now"
+    before = {str(one.get("path")): one for one in record.manifest["inputs"]}
+    named, cells = named_files(asked), [one.cells.path for one in series if one.cells is not None]
+    read = {str(file) for file in (*named, *(file for one in series for file in one.files()))}
+    for gone in sorted(before.keys() - read):
+        yield f"{gone} is not among the files that are read now"
+    for one in series:
+        yield from _changed_frames(one, before, record.rows)
+    # new lines may name the strain of a frame that had none
+    lacks_strain = any(row.strain is None for rows in record.rows.values() for row in rows)
+    for file in (*named, *cells):
+        may_grow = file in cells or (str(file) == asked["strain"] and not lacks_strain)
+        if not _is_same(file, before, may_grow, by_lines=True):
+            yield f"{file} has changed since, in more than new lines at its end"
+
+
+def _changed_frames(series: Series, before: Mapping[str, Any], rows: FrameRows) -> Iterator[str]:
+    """What has changed of the files of a series, and of those read with them."""
+    steps = [step for step, file in series.grains.files.items() if str(file) in before]
+    last = max((step for step in steps if step is not None), default=None)
+    files = [(s, f) for one in (series.grains, *series.contacts) for s, f in one.files.items()]
+    for step, file in files:
+        if str(file) not in before:
+            if steps and (step is None or last is None or step <= last):
+                yield f"{file} is new, and not behind the last frame"
+            continue
+        beside = series.beside(file) if series.grains.files.get(step) == file else []
+        changed = [one for one in beside if not _is_same(one, before)]
+        if not _is_same(file, before, may_grow=step is None or step == last):
+            changed.append(file)
+        # a broken file counts as one frame: if it has more now, later frames have other numbers
+        numbers = [frame.number for frame in series if changed and frame.name_step == step]
+        if changed and (len(numbers) != 1 or (series.name, numbers[0]) in rows):
+            yield f"{changed[0]} has changed since, or is new beside the grains"
+
+
+def _is_same(
+    file: Path, before: Mapping[str, Any], may_grow: bool = False, by_lines: bool = False
+) -> bool:
+    """Whether a file is what it was, or begins as it was: with whole lines if ``by_lines``."""
+    known, found = before.get(str(file), {}), file.stat()
+    size = known.get("size", math.inf)
+    if found.st_size < size or (found.st_size > size and not may_grow):
+        return False
+    digest, ends_line = hash_of(file, size, found.st_mtime_ns)
+    # a number at the end may have got more digits
+    return digest == known.get("sha256") and (ends_line or not by_lines)
+
+
+def _joined_frames(record: Record, chosen: slice, counts: Sequence[int]) -> slice:
+    """
+    The frames of a complete FILE and those chosen now, of series of so many frames, as one slice.
+
+    Raises
+    ------
+    SettingsError
+        If together they make none: no frame of FILE may be lost.
+    """
+    known = {frame for _, frame in record.rows}
+    now = {frame for count in counts for frame in range(count)[chosen]}
+    if known <= now:
+        return chosen
+    # frames that were skipped leave no hole
+    then = {frame for count in counts for frame in range(count)[record.settings.frames]}
+    every = sorted(known | now | {frame for frame in then if frame < max(known)})
+    step = every[1] - every[0] if len(every) > 1 else 1
+    if every != list(range(every[0], every[-1] + 1, step)):
+        has = f"{record.path} holds frames {min(known)} to {max(known)}"
+        raise SettingsError(f"frames: {has}, which with those chosen now make no slice A:B:C")
+    stop = None if chosen.stop is None else every[-1] + 1
+    return slice(every[0], stop, None if step == 1 else step)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
+from scanfab.base.arrays import compressed
 from scanfab.base.convex import Convex
 from scanfab.base.errors import Note
 from scanfab.base.shapes import sphere
@@ -58,7 +59,7 @@ class Measurement:
     blocks: tuple[Blocks, Blocks]
     """Octants of the whole sample and of the window, of places in the dump's coordinates."""
     notes: tuple[Note, ...] = ()
-    """What the scan did not reach."""
+    """On tolerances that the scan did not reach."""
 
     def kept(self, variant: str, place: int = 0) -> tuple[FloatArray, FloatArray | IntArray]:
         """As :meth:`GapSums.kept`, at one of the plan's cut-offs, with the moment of the table."""
@@ -85,7 +86,7 @@ class Measurement:
         return position[solid], radius[solid], window
 
     def at_cutoffs(self, cutoffs: Iterable[float]) -> Measurement:
-        """The same lines evaluated with other cut-offs, in the dump's unit."""
+        """The measurement of the same lines at other cut-offs, in the dump's unit."""
         plan = replace(self.plan, cutoffs=tuple(sorted(cutoffs)), lists_gaps=True)
         return _with_gaps(self.sample, self.solids, self.sums, plan, self.notes)
 
@@ -110,19 +111,9 @@ def _measure(sample: Sample, plan: Plan, where: str) -> Measurement:
 def _with_gaps(
     sample: Sample, solids: Solids, sums: ScanSums, plan: Plan, notes: tuple[Note, ...]
 ) -> Measurement:
-    """A scan with all gaps of its lines, if need be, and the gaps of fewer lines by block."""
-    blocks = _blocks(sample, plan)
-    scan = partial(
-        scan_gaps,
-        solids,
-        cutoffs=plan.cutoffs,
-        blocks=(blocks[0].moved(solids.origin), blocks[1].moved(solids.origin)),
-        variants=plan.variants,
-        seed=plan.seed,
-        workers=plan.workers,
-        # the scan before tells how long these take: they need no limit
-        most_steps=math.inf,
-    )
+    """Add the gaps of all lines, if the plan needs them, and those of fewer lines by octant."""
+    blocks = _octants(sample, plan)
+    scan = gap_scan(solids, plan, blocks, plan.cutoffs)
     gaps = None
     if plan.lists_gaps:
         gaps = scan(plan.rule, spacing=plan.spacing, replicates=range(sums.replicates))
@@ -137,10 +128,26 @@ def _with_gaps(
     return Measurement(sample, plan, solids, sums, gaps, blocked, rule, blocks, notes)
 
 
-def _blocks(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
+def gap_scan(
+    solids: Solids, plan: Plan, blocks: tuple[Blocks, Blocks], cutoffs: Sequence[float]
+) -> Callable[..., GapSums]:
+    """
+    A scan of all gaps by blocks of the dump's coordinates, with the variants and seed of a plan.
+
+    What is left to name is the rule, spacing and replicates. Its steps are not limited: the scan
+    before it tells how long it takes.
+    """
+    return partial(
+        scan_gaps, solids,
+        cutoffs=cutoffs, blocks=(blocks[0].moved(solids.origin), blocks[1].moved(solids.origin)),
+        variants=plan.variants, seed=plan.seed, workers=plan.workers, most_steps=math.inf,
+    )  # fmt: skip
+
+
+def _octants(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
     """Octants about the middle of the sample (of the cell), and about the centre of the RV."""
     packing, cell = sample.packing, sample.packing.cell
-    position = packing.position[sample.gathered]
+    position = compressed(sample.gathered, packing.position)
     low, high = position.min(axis=0), position.max(axis=0)
     radius = float(packing.radius.max())
     reach = float(np.linalg.norm(high - low)) + radius
@@ -224,7 +231,7 @@ def solids_of(
     if window is not None:
         window.check_fits(packing)
     whole = "a" in variants or "b" in variants
-    position, radius = packing.position[grains], packing.radius[grains]
+    position, radius = compressed(grains, packing.position), packing.radius[grains]
     removed = sample.rattlers[grains]
     origin = position.mean(axis=0) if window is None else window.center.copy()
     if space.across is not None:

@@ -3,49 +3,28 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from scanfab.base.column import Column
 from scanfab.base.errors import ReadError, SettingsError, warn
-from scanfab.base.spelling import counted
 from scanfab.io.families import PathLike
 from scanfab.io.options import parse_frames
-from scanfab.pipeline.part import is_unfinished, part_of
 from scanfab.pipeline.record import (
     FREE,
-    FrameRows,
+    Record,
     differing_settings,
-    read_finished,
-    rows_by_frame,
+    is_unfinished,
+    part_of,
+    read_table,
     write_manifest,
 )
-from scanfab.pipeline.repeat import restored_settings
-from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import as_written
 from scanfab.table.row import Row
 from scanfab.table.table import Table
 from scanfab.table.writing import Excerpt, check_output, manifest_of, write_rows
-
-
-class _Part(NamedTuple):
-    """The table of one job, and its manifest."""
-
-    path: Path
-    asked: Mapping[str, Any]
-    manifest: Mapping[str, Any]
-    settings: Settings
-    rows: FrameRows
-    columns: frozenset[str] | None
-    """Those that were written; None without a row."""
-    counts: dict[str, int]
-    """How many frames each series has."""
-
-    def frames(self, source: str) -> Iterable[int]:
-        """The frames of a series that this job was to compute."""
-        return range(self.counts.get(source, 0))[self.settings.frames]
 
 
 class Merged(NamedTuple):
@@ -134,118 +113,83 @@ def merged(paths: Sequence[Path], frames: slice) -> Merged:
     if not paths:
         raise SettingsError("expected the parts of a table, found none")
     parts = [_read(path) for path in dict.fromkeys(paths)]
-    first = parts[0]
-    for part in parts[1:]:
-        if differing := differing_settings(first.asked, part.asked, FREE):
-            raise ReadError(
-                f"{part.path}: was made with other settings ({differing}) than {first.path}"
-            )
-    inputs = _joined_inputs(parts)
-    series: dict[str, int] = {}
+    first, asked = parts[0], parts[0].manifest["settings"]
+    inputs: dict[str, tuple[Mapping[str, Any], Path]] = {}
+    counts: dict[str, int] = {}
     for part in parts:
-        series |= {name: max(count, series.get(name, 0)) for name, count in part.counts.items()}
+        if differing := differing_settings(asked, part.manifest["settings"], FREE):
+            raise ReadError(f"{part.path}: has other settings ({differing}) than {first.path}")
+        for one in part.manifest["inputs"]:
+            before, other = inputs.setdefault(str(one.get("path")), (one, part.path))
+            if before.get("sha256") != one.get("sha256"):
+                name = f"{one.get('path')} has changed between the jobs"
+                raise ReadError(f"{part.path}: {name} of it and of {other}: run them again")
+        for source, count in part.manifest["frames"].items():
+            counts[source] = max(count, counts.get(source, 0))
     rows = [
         row
-        for source, count in series.items()
-        for row in _rows(source, range(count)[frames], parts)
+        for source, count in counts.items()
+        for frame in sorted(range(count)[frames])
+        for row in _rows_of(source, frame, parts)
     ]
-    sources = _each_once(part.asked["sources"] for part in parts)
-    asked = {**first.asked, "frames": as_written(frames), "sources": sources}
+    sources = _each_once(part.manifest["settings"]["sources"] for part in parts)
     manifest = {
         **first.manifest,
-        "settings": asked,
-        "inputs": inputs,
+        "settings": {**asked, "frames": as_written(frames), "sources": sources},
+        "inputs": [inputs[path][0] for path in sorted(inputs)],
         "warnings": _each_once(part.manifest["warnings"] for part in parts),
         "notes": _each_once(part.manifest["notes"] for part in parts),
-        "frames": series,
+        "frames": counts,
     }
-    fields = asked.get("fields") or [one.name for one in first.settings.columns]
-    has = [part.columns for part in parts if part.columns is not None]
-    fields = [name for name in fields if all(name in columns for columns in has)]
+    columns, lists = first.settings.columns, [part.columns for part in parts if part.rows]
+    fields = asked.get("fields") or [one.name for one in columns]
+    fields = [name for name in fields if all(name in names for names in lists)]
     excerpt = Excerpt(tuple(fields), asked.get("digits", Excerpt.digits))
-    return Merged(rows, excerpt.columns(first.settings.columns), excerpt, manifest)
+    return Merged(rows, excerpt.columns(columns), excerpt, manifest)
 
 
 def _each_once(lists: Iterable[Iterable[Any]]) -> list[str]:
     return list(dict.fromkeys(str(one) for some in lists for one in some))
 
 
-def _read(path: Path) -> _Part:
+def _read(path: Path) -> Record:
+    """The record of a part; ReadError if it is not finished."""
     if is_unfinished(path):
         raise ReadError(
-            f"{path}: is not finished: {part_of(path).name} is there, which holds the rows of a "
-            f"run under way, or of one that was interrupted: the same command with `resume` goes "
-            f"on with it"
+            f"{path}: is not finished, as {part_of(path).name} is there: the same command with "
+            f"`resume` goes on with it"
         )
     if not path.exists():
-        raise ReadError(f"{path}: there is no such part: its job has not been run, or has failed")
-    done = read_finished(path, lambda reason: ReadError(f"{path}: {reason}: run its job again"))
+        raise ReadError(f"{path}: there is no such part: run its job")
     try:
-        settings = restored_settings(done.asked)
+        part = read_table(path)
     except SettingsError as error:
-        raise ReadError(f"{path}: {error}") from None
-    found = rows_by_frame(done.rows, settings.columns)
-    counts: dict[str, int] = {}
-    for (source, frame), rows in found.items():
-        if len(rows) != settings.rows_per_frame:
-            raise ReadError(
-                f"{path}: expected {settings.rows_per_frame} rows of frame {frame} of {source}, "
-                f"found {len(rows)}: run its job again"
-            )
-        counts[source] = max(counts.get(source, 0), frame + 1)
-    counts |= done.manifest.get("frames", {})
-    columns = frozenset(done.rows[0]) if done.rows else None
-    return _Part(path, done.asked, done.manifest, settings, found, columns, counts)
+        raise ReadError(str(error)) from None
+    count = part.settings.rows_per_frame
+    for (source, frame), rows in part.rows.items():
+        if len(rows) != count:
+            found = f"expected {count} rows of frame {frame} of {source}, found {len(rows)}"
+            raise ReadError(f"{path}: {found}: run its job again")
+    return part
 
 
-def _joined_inputs(parts: Sequence[_Part]) -> list[Mapping[str, Any]]:
-    """The inputs of all parts; ReadError if a file has changed between two jobs."""
-    known: dict[str, tuple[Mapping[str, Any], Path]] = {}
+def _rows_of(source: str, frame: int, parts: Sequence[Record]) -> list[Row]:
+    """The rows of a frame; none if its job has skipped it, and ReadError if they are missing."""
+    what, key = f"frame {frame} of {source}", (source, frame)
+    having = [part for part in parts if key in part.rows]
+    for part in having[1:]:
+        for before, now in zip(having[0].rows[key], part.rows[key], strict=True):
+            if differing := [name for name in before if before[name] != now[name]]:
+                name, first = differing[0], having[0].path
+                values = f"{name} is {now[name]} here and {before[name]} there"
+                raise ReadError(f"{part.path}: {what} has other values than in {first}: {values}")
+    if having:
+        return having[0].rows[key]
     for part in parts:
-        for one in part.manifest["inputs"]:
-            before, other = known.setdefault(str(one.get("path")), (one, part.path))
-            if before.get("sha256") != one.get("sha256"):
-                raise ReadError(
-                    f"{part.path}: was made of another {one.get('path')} than {other}: it has "
-                    f"changed between the two: run these jobs again"
-                )
-    return [known[path][0] for path in sorted(known)]
-
-
-def _rows(source: str, chosen: range, parts: Sequence[_Part]) -> Iterator[Row]:
-    """The rows of one series in the order of its frames, each once."""
-    own = [part for part in parts if source in part.counts]
-    for frame in chosen if chosen.step > 0 else chosen[::-1]:
-        having = [part for part in own if (source, frame) in part.rows]
-        for part in having[1:]:
-            _check_same(having[0], part, source, frame)
-        if having:
-            yield from having[0].rows[source, frame]
-        else:
-            _check_skipped(source, frame, own)
-
-
-def _check_same(first: _Part, part: _Part, source: str, frame: int) -> None:
-    """ReadError if a frame has other values in two parts."""
-    for before, now in zip(first.rows[source, frame], part.rows[source, frame], strict=True):
-        for name in [name for name in before if before[name] != now[name]]:
-            raise ReadError(
-                f"{part.path}: frame {frame} of {source} is in {first.path} too, with other "
-                f"values: {name} is {now[name]} here and {before[name]} there"
-            )
-
-
-def _check_skipped(source: str, frame: int, parts: Sequence[_Part]) -> None:
-    """ReadError for a frame without rows, unless a job was to compute it and has skipped it."""
-    asked = next((part for part in parts if frame in part.frames(source)), None)
-    if asked is None:
-        named = ", ".join(str(part.path) for part in parts[:3])
-        named += ", ..." if len(parts) > 3 else ""
-        raise ReadError(
-            f"frame {frame} of {source} is missing: it is in none of the "
-            f"{counted(len(parts), 'part')} ({named}): name all parts, or with `frames` the frames "
-            f"that the table is to have"
-        )
-    if asked.settings.on_error != "skip":
-        raise ReadError(f"{asked.path}: lacks frame {frame} of {source}: run its job again")
-    warn(f"{asked.path}: frame {frame} of {source} was skipped, see its manifest")
+        count = part.manifest["frames"].get(source, 0)
+        if frame in range(count)[part.settings.frames]:
+            if part.settings.on_error != "skip":
+                raise ReadError(f"{part.path}: lacks {what}: run its job again")
+            warn(f"{part.path}: {what} was skipped, see its manifest")
+            return []
+    raise ReadError(f"{what} is in none of the parts: name all of them, or choose `frames`")

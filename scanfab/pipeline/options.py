@@ -24,15 +24,13 @@ def _figures() -> list[str]:
     return [*figures_of("table"), *figures_of("frames")]
 
 
-def _columns() -> set[str]:
-    """Those of all tables."""
-    from scanfab.base.column import columns_of_fields
-    from scanfab.pipeline.calibration import StepRow
-    from scanfab.table.columns import MORE_COLUMNS, map_columns, table_columns
+def _columns() -> list[str]:
+    """The columns of compute and compare."""
+    from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
     from scanfab.table.compare import FRAMES, SUMMARY
 
-    tables = (table_columns(), MORE_COLUMNS, map_columns((), shells=True), FRAMES, SUMMARY)
-    return {one.name for table in (*tables, columns_of_fields(StepRow)) for one in table}
+    every = (*OWN_COLUMNS, *MORE_COLUMNS, *FRAMES, *SUMMARY)
+    return list(dict.fromkeys(one.name for one in every))
 
 
 @dataclass
@@ -41,43 +39,43 @@ class Output:
 
     output: Path | None = running(spelling="-o", first=True)
     """
-    Result file: .csv .tsv .json .jsonl .parquet; - is CSV on standard output (default: the same, or
-    a readable table on a terminal).
+    File for the results: .csv .tsv .json .jsonl .parquet; - is CSV on standard output (default:
+    standard output, on a terminal as a readable table).
     """
     fields: str | None = option(metavar="NAME,NAME,...", choices=_columns)
     """Which columns to write, in this order (default: all)."""
     digits: int = option(default=DEFAULT_DIGITS)
-    """Significant digits of written numbers; 17: as short as reads back the same."""
+    """Significant digits of numbers; 17 writes the shortest form that reads back the same."""
     follow: bool = running(default=False, group="reading")
     """
-    Wait for the frames of a running simulation, each computed once its files are whole; Ctrl-C or
-    SIGTERM ends it in order, a second one interrupts.
+    Wait for the frames of a running simulation, and compute each once its files are whole. Ctrl-C
+    or SIGTERM ends the run in order, a second one interrupts it.
     """
     follow_for: float | None = running(group="reading", metavar="SECONDS")
-    """The same until so long after the last new frame."""
+    """Same as `follow`, until so many seconds have passed without a new frame."""
     scheduler: str | None = running(group="scan", metavar="tcp://HOST:PORT")
     """
-    Send the frames to the workers of a Dask cluster in place of `workers`; they see the same files
-    by the same paths.
+    Send the frames to the workers of a Dask cluster, in place of `workers`. They must see the same
+    files by the same paths.
     """
     scheduler_file: Path | None = running(group="scan")
-    """The same by the file that dask scheduler, dask-mpi and dask-jobqueue write."""
+    """Same as `scheduler`, by the file that dask scheduler, dask-mpi or dask-jobqueue writes."""
     resume: bool = running(default=False)
-    """Go on with FILE.part of an interrupted run, or add what is missing to a complete FILE."""
+    """Go on with the FILE.part of an interrupted run, or add missing frames to a complete FILE."""
     manifest: Path | None = running()
     """
-    Settings, seed, versions, inputs with size and hash, as JSON (with `output=FILE` also
-    FILE.manifest.json without asking).
+    Write settings, seed, versions, and the size and hash of each input as JSON. With `output=FILE`
+    they are always written to FILE.manifest.json.
     """
     vtk: Path | None = running(metavar="DIR")
-    """Write files for ParaView of each frame that is computed now."""
+    """Write files for ParaView of each frame that this run computes."""
     plot: Path | None = running()
-    """Draw to a file: .png .svg .pdf."""
+    """Draw a figure: .png .svg .pdf."""
     figure: str | None = running(metavar="NAME", choices=_figures)
     """
-    Which figure: of the table evolution, normalised, correlation or columns:NAME,NAME (default: all
-    on one page); of the first and last frame rose (or rose:30,60,90 for these polar angles),
-    projection, histogram or cutoffs.
+    Which figure to draw. Of the table: evolution, normalised, correlation or columns:NAME,NAME
+    (default: all on one page). Of the first and last frame: rose (rose:30,60,90 for these polar
+    angles), projection, histogram or cutoffs.
     """
 
 
@@ -92,16 +90,16 @@ class Other:
     """Options of commands that compute no table."""
 
     frame: int = reading(default=0, decides=False, metavar="K")
-    """Which frame; negative: from the end."""
+    """Which frame; a negative number counts from the end."""
     to: str | None = running(metavar="NAME", choices=_writer_names, first=True)
     """Format to write (default: by the suffix of OUT); scanfab formats lists them."""
 
     strain_max: float | None = running(group="fabric")
     """Leave frames beyond this strain out of the fits."""
     labels: str | None = running(spelling="--label", several=True, metavar="NAME")
-    """Name of a table in place of its source, once a table, in their order."""
+    """Name of a table in place of its source; once for each table, in their order."""
     screenshot: Path | None = running(metavar="FILE.png")
-    """Write a picture instead of opening a window; needs no screen."""
+    """Write a picture instead of opening a window; this needs no screen."""
 
 
 OPTIONS = {one.name: one for one in (*READING_OPTIONS, *options_of(Settings), *options_of(Output))}
@@ -136,22 +134,18 @@ def as_options(told: str | Exception) -> str:
     text = without_temporary(str(told))
     if isinstance(told, SettingsError):
         text = re.sub(rf"^({NAMES}): ", r"`\1`: ", text)
-    return re.sub(rf"`({NAMES})(?:=([^`]*))?`", _as_option, text)
+    return re.sub(rf"`({NAMES})(=[^`]*)?`", _as_words, text)
 
 
-def _as_option(found: re.Match[str]) -> str:
-    name, value = found.groups()
-    return DECLARED[name].flag + ("" if value is None else f" {_as_word(value)}")
-
-
-def _as_word(value: str) -> str:
-    """A value in Python as words of a command line: (1, 2) is 1 2, and {"x": "px"} is x=px."""
+def _as_words(found: re.Match[str]) -> str:
+    """An option with its value in Python: `cell=(1, 2)` is --cell 1 2, `x={"a": "b"}` is -x a=b."""
+    flag, value = DECLARED[found[1]].flag, (found[2] or "")[1:]
     if value.startswith("("):
-        return value.strip("()").replace(",", "")
-    if value.startswith("{"):
-        return value.strip("{}").replace('"', "").replace(": ", "=").replace(", ", ",")
+        value = value.strip("()").replace(",", "")
+    elif value.startswith("{"):
+        value = value.strip("{}").replace('"', "").replace(": ", "=").replace(", ", ",")
     # what a shell takes as it is needs no quotes
-    return re.sub(r'^"([\w.:/+-]*)"$', r"\1", value)
+    return " ".join([flag, re.sub(r'^"([\w.:/+-]*)"$', r"\1", value)]).strip()
 
 
 MEANINGS = {name: as_options(one.help) for name, one in OPTIONS.items() if one.decides}

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from scanfab.base.convex import Convex
 from scanfab.base.errors import Note, SettingsError
-from scanfab.base.shapes import circle
+from scanfab.base.shapes import sphere
 from scanfab.base.space import SPACE, Space
 from scanfab.packing.doubts import refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample, SampleRule
@@ -24,7 +24,7 @@ from scanfab.pipeline.values import Vector
 from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.directions import DirectionRule, usual_rule
 
-# what a plan takes from the settings as it is
+# settings that a plan takes over unchanged
 AS_ASKED = (
     "variants", "axis", "moment", "seed", "workers", "tolerance", "max_chords", "more_columns",
     "edge", "lists_gaps",
@@ -33,7 +33,7 @@ AS_ASKED = (
 REPLICATES = 16
 # replicates at most of a scan that adds directions until its error, as they tell it, is small
 MOST_REPLICATES = 64
-# lines of one axis below which a replicate's mean lengths are too uncertain to be of use
+# with fewer lines along an axis, the mean lengths of a replicate are too uncertain to be of use
 FEWEST_LINES = 30
 # the closest spacing, over the reach of what is scanned: nobody could wait for closer lines
 CLOSEST = 1e-9
@@ -79,17 +79,20 @@ class Plan:
     max_chords: float
     """An auto scan stops before it cuts more."""
     rvs: tuple[RV, ...]
-    """Of the first frame that has grains, if :meth:`in_frame` has not put others in their place, in
-    ascending order; the first is scanned until its tolerance holds, the others along its lines."""
+    """
+    The RVs in ascending order: as they lie in the first frame that has grains, or, after
+    :meth:`in_frame`, in another one. The first is scanned until its tolerance holds, the others
+    along the same lines.
+    """
     more_columns: tuple[str, ...]
-    """Of the table, behind those that it always has."""
+    """Further columns of the table, behind those that every table has."""
     groups: tuple[str, ...]
     """Of further columns, see :data:`scanfab.fabric.registry.GROUPS`."""
     cutoffs: tuple[float, ...]
-    """Of the table's rows, in ascending order."""
+    """Cut-offs of the table's rows, in ascending order."""
     rule: DirectionRule
     rule_is_asked_for: bool
-    """Then an auto scan keeps it."""
+    """Whether the user chose the rule; then an auto scan keeps it."""
     edge: str
     """What counts at the window's surface, see :mod:`scanfab.scan.edges`."""
     lists_gaps: bool
@@ -98,9 +101,9 @@ class Plan:
     """Of a map; else None."""
     space: Space
     """The plane in which all grains of the series lie, if they are discs."""
-    # what follows is not known of a series without grains
+    # the fields below are unknown for a series without grains
     cutoff: float = math.nan
-    """Of the scan that is to meet the tolerance."""
+    """Cut-off of the scan that is to meet the tolerance."""
     spacing: float = math.nan
     """Between the lines of one axis and replicate."""
     replicates: int = 0
@@ -125,21 +128,19 @@ class Plan:
         return [one.window for one in self.rvs if one.window is not None]
 
     def rvs_of(self, variant: str) -> tuple[RV, ...]:
-        """Those that a variant has rows for; of the whole one that is none."""
+        """The RVs that a variant has rows for; the whole has one entry without a window."""
         return self.rvs if VARIANTS[variant].in_window else (RV(),)
 
     def in_frame(self, sample: Sample) -> Plan:
         """The plan with the windows as they lie in a frame."""
         if self.deformation is None:
             return self
-        return self._with(self.deformation.windows_in(sample, self.windows))
-
-    def _with(self, windows: Sequence[Window]) -> Plan:
+        windows = self.deformation.windows_in(sample, self.windows)
         rvs = zip(self.rvs, windows, strict=True)
-        return replace(self, rvs=tuple(rv._replace(window=window) for rv, window in rvs))
+        return replace(self, rvs=tuple(RV(rv.fraction, window) for rv, window in rvs))
 
     def along(self, replicates: int) -> Iterator[Plan]:
-        """The plans of the other RVs, for the lines that the first was scanned along."""
+        """A plan for each of the other RVs, with the lines that the first was scanned along."""
         variants = "".join(one for one in self.variants if VARIANTS[one].in_window)
         for rv in self.rvs[1:]:
             yield replace(self, rvs=(rv,), variants=variants, replicates=replicates, auto="")
@@ -147,9 +148,9 @@ class Plan:
 
 def plan_without_grains(settings: Settings, space: Space = SPACE) -> Plan:
     """
-    What settings say by themselves.
+    The plan as far as settings alone decide it.
 
-    That is the plan of a series without any grain: its frames have rows, but nothing is scanned.
+    A series without any grain keeps this plan: its frames have rows, but nothing is scanned.
     """
     return Plan(
         samples=sample_rule(settings),
@@ -172,7 +173,7 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     Parameters
     ----------
     settings : Settings
-        Nothing behind the plan sees them.
+        Later steps see only the plan.
     sample : Sample
         The first frame that has grains.
 
@@ -184,18 +185,18 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
         If the packing cannot be measured.
     """
     refuse_impossible(sample)
-    settings = settings_in(settings, sample.packing.space)
-    plan = plan_without_grains(settings, sample.packing.space)
-    radii = sample.packing.radius[sample.grains]
-    r_min, r_mean, r_max = float(radii.min()), float(radii.mean()), float(radii.max())
-    lengths = {"rmin": r_min, "rmean": r_mean, "rmax": r_max}
-    box = SurfaceBox.of(sample.packing, sample.gathered)
+    packing, space = sample.packing, sample.packing.space
+    settings = settings_in(settings, space)
+    plan = plan_without_grains(settings, space)
+    radii = packing.radius[sample.grains]
+    lengths = {"rmin": float(radii.min()), "rmean": float(radii.mean()), "rmax": float(radii.max())}
+    box = SurfaceBox.of(packing, sample.gathered)
     windows = windows_of(sample, settings) if settings.needs_window else []
-    notes = [one for window in windows for one in doubts_of_rv(window, sample, box, r_max)]
+    notes = [note for one in windows for note in doubts_of_rv(one, sample, box, lengths["rmax"])]
     blocks: MapBlocks | None = None
     if isinstance(settings, MapSettings):
         blocks = MapBlocks.of(settings, sample)
-        notes += blocks.doubts(sample, next(iter(windows), None), r_mean)
+        notes += blocks.doubts(sample, windows[0] if windows else None, lengths["rmean"])
     if plan.rule.bias > 0.1 * settings.tolerance:
         name, bias = plan.rule.name, plan.rule.bias
         text = f"directions {name}: an isotropic sample would get alpha = {bias:.2g}"
@@ -204,38 +205,43 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     if settings.rv_follows != "none" and settings.needs_window:
         deformation = Deformation.since(sample, settings.strain, settings.axis)
     cutoff = settings.cutoff.resolve(lengths)
-    # as many as were asked for, also if two are equal: every frame has the same number of rows
-    cutoffs = tuple(sorted(one.resolve(lengths) for one in settings.cutoffs)) or (cutoff,)
+    # of several RVs the first gets the share of all chords that its scan cuts at least
+    share = 1.0
+    if len(windows) > 1:
+        volumes = [one.shape.volume for one in windows]
+        share = volumes[0] / sum(volumes)
+        if any(not VARIANTS[one].in_window for one in settings.variants):
+            # its scan is that of the whole, too
+            share = 1.0 / len(windows)
     return replace(
-        plan._with(windows),
+        plan,
+        rvs=tuple(RV(rv.fraction, one) for rv, one in zip(plan.rvs, windows, strict=True)),
         strains=plan.strains.since(sample),
         deformation=deformation,
-        max_chords=plan.max_chords * _share_of_first(windows, settings),
+        max_chords=plan.max_chords * share,
         cutoff=cutoff,
-        cutoffs=cutoffs,
+        # as many as were asked for, also if two are equal: all frames have the same number of rows
+        cutoffs=tuple(sorted(one.resolve(lengths) for one in settings.cutoffs)) or (cutoff,),
         map_blocks=blocks,
         notes=tuple(notes),
         **_lines(settings, len(plan.rule), box, windows[0].shape if windows else None, lengths),
     )
 
 
-def _share_of_first(windows: Sequence[Window], settings: Settings) -> float:
-    """Of several RVs: the share of all chords that the scan of the first one cuts at least."""
-    if len(windows) < 2:
-        return 1.0
-    if any(not VARIANTS[one].in_window for one in settings.variants):
-        # the first scan is that of the whole, too
-        return 1.0 / len(windows)
-    volumes = [one.shape.volume for one in windows]
-    return volumes[0] / sum(volumes)
-
-
 def _lines(
     settings: Settings, axes: int, box: SurfaceBox, shape: Convex | None, lengths: dict[str, float]
 ) -> dict[str, Any]:
-    """How close the lines are, in how many replicates, and what an auto scan may add."""
+    """How close the lines are, how many replicates there are, and what an auto scan may add."""
     space = box.space
-    reach, area, depth = _scanned(box, shape)
+    # How large is what lines scan, the window, or of the whole half the smallest extent: its reach;
+    # the area that lines of one direction pierce, in the mean of all (in a plane a length); and
+    # three quarters of the mean length of the lines in it, of a sphere the radius.
+    reach = 0.5 * box.smallest_extent if shape is None else shape.reach
+    area, depth = math.pi * reach**2, reach
+    if space.is_plane or (shape is not None and not shape.is_sphere):
+        shape = shape or sphere(reach, space)
+        area = shape.mean_shadow
+        depth = 0.75 * shape.volume / area
     if settings.spacing is None:
         spacing = _auto_spacing(settings, axes, area, depth, lengths["rmean"], space)
         return {"spacing": spacing, "replicates": REPLICATES, "auto": "replicates"}
@@ -252,35 +258,20 @@ def _lines(
     return {"spacing": asked * space.apart(replicates), "replicates": replicates, "auto": auto}
 
 
-def _scanned(box: SurfaceBox, shape: Convex | None) -> tuple[float, float, float]:
-    """
-    How large is what lines scan: the window, or of the whole half the smallest extent.
-
-    That is its reach; the area that lines of one direction pierce, in the mean of all (in a plane
-    a length); and three quarters of the mean length of the lines in it, of a sphere the radius.
-    """
-    reach = 0.5 * box.smallest_extent if shape is None else shape.reach
-    if box.space.is_plane:
-        shape = shape or circle(reach, box.space)
-    elif shape is None or shape.is_sphere:
-        return reach, math.pi * reach**2, reach
-    area = shape.mean_shadow
-    return reach, area, 0.75 * shape.volume / area
-
-
 def _auto_spacing(
     settings: Settings, axes: int, area: float, depth: float, radius: float, space: Space
 ) -> float:
     """
     Spacing of one replicate's lines at which the first round is likely to meet the tolerance.
 
-    Never so wide that lines get too few, nor closer than is of use: more directions are added then.
+    The spacing is never so wide that a replicate has too few lines, nor so close that more
+    directions would tell more.
     """
     noise = NOISE[space.dimension]
     segments_per_line = max(depth / (3.0 * radius), 1.0)
     # lines * segments_per_line = segments, and lines are so many axes' area / spacing²
     lines = noise.segments / settings.tolerance**2 / (REPLICATES * axes * segments_per_line)
-    # of which each block gets its share
+    # each block of a map gets its share of the lines
     lines *= settings.blocks
     apart = area / lines / radius ** (space.dimension - 1)
     spacing = radius * max(

@@ -1,8 +1,16 @@
 """
-What a table was made of: settings, versions, and the inputs with size and hash.
+Which rows of a table are there, and what made them: settings, versions, inputs with size and hash.
 
-FILE.manifest.json says it of FILE, and FILE.part of its own rows. By it a run that goes on with
-finished rows, or a merge of several tables, tells whether they are what it would compute now.
+FILE.manifest.json says it of a complete FILE, and FILE.part of its own rows: both are read as a
+:class:`Record`. By it a run that goes on with finished rows, and a merge of several tables, tell
+whether the rows are those that they would compute now.
+
+FILE.part is a text that grows with each finished frame. Its first line holds the settings of the
+run. Each further line holds one frame: its rows, with all columns and digits, and size and hash of
+the input files that no earlier frame was made of. A last line that was not written to its end is of
+a frame that is not finished. At the end of the run the manifest is written, then FILE appears in
+one step, and FILE.part is removed last: a run is finished once FILE is there and not older than
+FILE.part.
 """
 
 from __future__ import annotations
@@ -11,21 +19,26 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+import shutil
+import sys
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import version
+from itertools import count
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
-from scanfab.base.column import Column
-from scanfab.base.errors import ReadError, ScanfabError
-from scanfab.base.files import whole_file
+from scanfab.base.ending import undone_at_end
+from scanfab.base.errors import ReadError, SettingsError, note
+from scanfab.base.files import locked, named_errors, whole_file
 from scanfab.base.option import options_of
-from scanfab.io.series import Series
+from scanfab.base.spelling import counted
+from scanfab.pipeline.maps.settings import MapSettings, is_map
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import SHAPES, STRAIN_MODES, as_written
 from scanfab.table.columns import row_of
-from scanfab.table.formats import read_rows
+from scanfab.table.formats import json_line, read_rows
 from scanfab.table.row import Row
 from scanfab.table.writing import ALL, Excerpt, manifest_of
 
@@ -36,32 +49,43 @@ PACKAGES = (
 # Settings that may differ where rows are taken over from a complete table or merged: such rows are
 # of other frames, or of other series, and their inputs are compared by content.
 FREE = ("frames", "sources")
+# entries of a manifest that are lists, and may be missing in one of an older version
+LISTS = ("inputs", "warnings", "notes")
 # bytes of a file that are read at a time
 PIECE = 1 << 20
 
 FrameRows = dict[tuple[str, int], list[Row]]
 """The rows of each frame, by its source and number."""
-Refuse = Callable[[str], ScanfabError]
-"""The error for rows that cannot be used, made from the reason."""
 
 
-class Finished(NamedTuple):
-    """Rows that are there, and what they were made of."""
+class Record(NamedTuple):
+    """Finished rows by source and frame, and what made them."""
 
-    asked: dict[str, Any]
-    """The settings."""
-    inputs: list[dict[str, Any]]
-    """Path, size and hash of files."""
-    rows: list[dict[str, Any]]
+    path: Path
+    """Of the table, or of its FILE.part."""
+    settings: Settings
     manifest: dict[str, Any]
-    """Empty where there is none yet."""
+    """Of FILE.part only ``settings``, ``inputs`` and ``frames``."""
+    rows: FrameRows
+    """The rows of a frame may be fewer than it has."""
+    columns: frozenset[str]
+    """Those that were written; none without a row."""
+
+    @classmethod
+    def of(cls, path: Path, manifest: dict[str, Any], rows: Sequence[Mapping[str, Any]]) -> Record:
+        """A record of rows as they were read; SettingsError for settings that cannot be used."""
+        settings, found = restored_settings(manifest["settings"]), FrameRows()
+        for row in rows:
+            complete = row_of(settings.columns, row)
+            found.setdefault((row["source"], row["frame"]), []).append(complete)
+        # a manifest of an older version does not say how many frames each series has
+        counts = manifest.get("frames") or {source: frame + 1 for source, frame in found}
+        columns = frozenset(rows[0] if rows else ())
+        return cls(path, settings, {**manifest, "frames": counts}, found, columns)
 
 
 def asked_for(
-    sources: Sequence[str],
-    reading: Mapping[str, Any],
-    settings: Settings,
-    excerpt: Excerpt = ALL,
+    sources: Sequence[str], reading: Mapping[str, Any], settings: Settings, excerpt: Excerpt = ALL
 ) -> dict[str, Any]:
     """
     The settings that decide the bytes of a result, as users write them, in the types of JSON.
@@ -90,31 +114,43 @@ def differing_settings(
     before: Mapping[str, Any], asked: Mapping[str, Any], but: Collection[str] = ()
 ) -> str:
     """The names of the settings that differ, ``but`` for some, in alphabetical order."""
-    names = {name for name in (*before, *asked) if before.get(name) != asked.get(name)}
-    names.difference_update(but)
+    names = {one for one in (*before, *asked) if before.get(one) != asked.get(one)} - {*but}
     return ", ".join(sorted("version of scanfab" if n == "scanfab" else n for n in names))
 
 
-def named_files(asked: Mapping[str, Any]) -> tuple[list[Path], list[Path]]:
-    """The files that the settings name: of strains (``strain``), and of surfaces (``rv_shape``)."""
+def restored_settings(asked: Mapping[str, Any]) -> Settings:
+    """
+    The settings of a manifest.
+
+    Raises
+    ------
+    SettingsError
+        If one of them cannot be used any more.
+    """
+    kind = MapSettings if is_map(asked) else Settings
+    try:
+        return kind(**{name: asked[name] for name in kind.__dataclass_fields__ if name in asked})
+    except (AttributeError, TypeError, ValueError) as error:
+        raise SettingsError(f"the settings of the manifest cannot be used: {error}") from None
+
+
+def named_files(asked: Mapping[str, Any]) -> list[Path]:
+    """The files that the settings name: of strains (``strain``), of a surface (``rv_shape``)."""
     strain, shape = asked.get("strain", "auto"), asked.get("rv_shape", "sphere")
-    strains = [] if strain in STRAIN_MODES else [Path(strain)]
-    return strains, [] if shape in SHAPES else [Path(shape)]
+    named = ((strain, STRAIN_MODES), (shape, SHAPES))
+    return [Path(name) for name, words in named if name not in words]
 
 
 def input_entry(path: Path) -> dict[str, Any]:
     """Size and hash of a file, as a manifest lists it; it is read again only if it has changed."""
     found = path.stat()
-    return dict(_entry(path, found.st_size, found.st_mtime_ns))
+    # a simulation may write more meanwhile
+    digest, _ = hash_of(path, found.st_size, found.st_mtime_ns)
+    return {"path": str(path), "size": found.st_size, "sha256": digest}
 
 
 @cache
-def _entry(path: Path, size: int, _changed: int) -> dict[str, Any]:
-    # a simulation may write more meanwhile
-    return {"path": str(path), "size": size, "sha256": _hash(path, size)[0]}
-
-
-def _hash(path: Path, size: int) -> tuple[str, bool]:
+def hash_of(path: Path, size: int, _changed: int) -> tuple[str, bool]:
     """The SHA-256 of the first bytes of a file, and whether a line ends with them."""
     digest, piece = hashlib.sha256(), b"\n"
     with open(path, "rb") as stream:
@@ -125,38 +161,9 @@ def _hash(path: Path, size: int) -> tuple[str, bool]:
     return digest.hexdigest(), ends
 
 
-def manifest(
-    asked: Mapping[str, Any],
-    series: Iterable[Series],
-    warnings: Sequence[str] = (),
-    notes: Sequence[str] = (),
-) -> dict[str, Any]:
-    """
-    The manifest of a finished result.
-
-    Parameters
-    ----------
-    asked : mapping
-        From :func:`asked_for`.
-    series : iterable of Series
-        What was read.
-    warnings, notes : sequence of str, optional
-        What the user was told.
-    """
-    series = list(series)
-    strains, surfaces = named_files(asked)
-    files = {*strains, *surfaces, *(path for one in series for path in one.files())}
-    versions = {name: version(name) for name in PACKAGES}
-    return {
-        "settings": asked,
-        "seed": asked["seed"],
-        "versions": {"python": platform.python_version(), **versions},
-        "inputs": [input_entry(path) for path in sorted(files)],
-        "warnings": list(warnings),
-        "notes": list(notes),
-        # of the whole series, so that a merge of parts knows which frames are missing
-        "frames": {one.name: len(one) for one in series},
-    }
+def versions_used() -> dict[str, str]:
+    """Of Python and of the packages, as a manifest lists them."""
+    return {"python": platform.python_version(), **{name: version(name) for name in PACKAGES}}
 
 
 def write_manifest(path: Path, found: Mapping[str, Any], outdated: Path | None = None) -> None:
@@ -188,118 +195,129 @@ def read_manifest(table: Path) -> dict[str, Any] | None:
         return None
     try:
         found = json.loads(path.read_text("utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise ReadError(f"{path}: cannot be read as JSON: {error}") from None
-    # the settings are checked where they are used
-    kinds = {"settings": dict, "inputs": list, "versions": dict, "warnings": list}
-    if (
-        not isinstance(found, dict)
-        or not all(isinstance(found.get(name, kind()), kind) for name, kind in kinds.items())
-        or not isinstance(found.get("settings", {}).get("sources"), list)
-        or not all(isinstance(one, dict) for one in found.get("inputs", []))
-    ):
-        raise ReadError(f"{path}: expected a manifest of scanfab compute, found something else")
-    return found
+        lists = [found["settings"]["sources"], *(found.get(name, []) for name in LISTS)]
+        if not all(isinstance(one, list) for one in lists):
+            raise TypeError
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        expected = "a manifest of scanfab compute"
+        raise ReadError(f"{path}: expected {expected}, found something else") from None
+    return {**{name: [] for name in LISTS}, **found}
 
 
-def read_finished(table: Path, refuse: Refuse) -> Finished:
-    """A finished table, with its manifest."""
+def read_table(table: Path) -> Record:
+    """The record of a finished table, whose manifest is beside it; SettingsError without one."""
     found = read_manifest(table)
     if found is None:
-        raise refuse(f"there is no {table.name}.manifest.json, which says what made it")
+        what = f"there is no {table.name}.manifest.json, which says what made it"
+        raise SettingsError(f"{table}: {what}: run its command again")
     rows = read_rows(table, whole=True)
     if rows and not {"source", "frame"} <= set(rows[0]):
-        raise refuse("it lacks the columns source and frame, which tell its rows apart")
-    found = {"inputs": [], "warnings": [], "notes": [], **found}
-    return Finished(found["settings"], found["inputs"], rows, found)
+        what = "it lacks the columns source and frame, which tell its rows apart"
+        raise SettingsError(f"{table}: {what}: compute it with them")
+    return Record.of(table, found, rows)
 
 
-def rows_by_frame(rows: Iterable[Mapping[str, Any]], columns: Sequence[Column]) -> FrameRows:
-    """The rows of each frame, by its source and number; they may be fewer than a frame has."""
-    found: FrameRows = {}
-    for row in rows:
-        found.setdefault((row["source"], row["frame"]), []).append(row_of(columns, row))
-    return found
+def part_of(path: Path) -> Path:
+    """Where a table grows until it is complete."""
+    return path.with_name(f"{path.name}.part")
 
 
-def check_inputs(
-    inputs: Iterable[Mapping[str, Any]],
-    asked: Mapping[str, Any],
-    series: Sequence[Series],
-    rows: FrameRows,
-    refuse: Refuse,
-) -> None:
+def is_unfinished(path: Path) -> bool:
+    """Whether a table has a FILE.part with rows that it lacks: rows come before their table."""
+    part = part_of(path)
+    if not part.exists():
+        return False
+    return not path.exists() or path.stat().st_mtime_ns < part.stat().st_mtime_ns
+
+
+class PartFile:
     """
-    Refuse rows whose inputs are not what they were.
-
-    New frames may have come behind the last one, as files or at the end of the last file. A file
-    whose frame was skipped may have been mended.
+    FILE.part of a table.
 
     Parameters
     ----------
-    inputs : iterable of mapping
-        Path, size and hash of each file that was read for the rows.
-    asked : mapping
-        The settings of the rows.
-    series : sequence of Series
-        What is read now.
-    rows : mapping
-        The rows by source and frame.
-    refuse : callable
-        Makes the error.
+    output : Path
+        The table.
     """
-    before = {str(one.get("path")): one for one in inputs}
-    strains, surfaces = named_files(asked)
-    cells = [one.cells.path for one in series if one.cells is not None]
-    read = {*strains, *surfaces, *(file for one in series for file in one.files())}
-    for gone in before.keys() - {str(file) for file in read}:
-        raise refuse(f"{gone} is not among the files that are read now")
-    for one in series:
-        _check_frames(one, before, rows, refuse)
-    # new lines may name the strain of a frame that had none
-    lacks_strain = any(row.strain is None for some in rows.values() for row in some)
-    for file in (*surfaces, *strains, *cells):
-        may_grow = file in cells or (file in strains and not lacks_strain)
-        if not _is_same(file, before, may_grow, by_lines=True):
-            raise refuse(f"{file} has changed since, in more than new lines at its end")
 
+    _stream: IO[bytes]
 
-def _check_frames(
-    series: Series, before: Mapping[str, Any], rows: FrameRows, refuse: Refuse
-) -> None:
-    """Refuse what has changed of the files of a series, and of those read with them."""
-    grains = series.grains.files
-    steps = [step for step, file in grains.items() if str(file) in before]
-    last = max((step for step in steps if step is not None), default=None)
-    for step, file in (f for one in (series.grains, *series.contacts) for f in one.files.items()):
-        if str(file) not in before:
-            if steps and (step is None or last is None or step <= last):
-                raise refuse(f"{file} is new, and not behind the last frame")
-            continue
-        beside = series.beside(file) if grains.get(step) == file else []
-        changed = [one for one in beside if not _is_same(one, before)]
-        if not _is_same(file, before, may_grow=step is None or step == last):
-            changed.append(file)
-        if changed and not _was_skipped(series, step, rows):
-            what = "has changed since" if str(changed[0]) in before else "is new, beside the grains"
-            raise refuse(f"{changed[0]} {what}")
+    def __init__(self, output: Path) -> None:
+        self.output, self.path = output, part_of(output)
+        self.frames = 0
+        """How many finished frames it holds, in a block of :meth:`alone`."""
+        self._lines: list[bytes] = []
 
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Keep other runs away in the block; a ScanfabError if one writes to it."""
+        with locked(self.path) as self._stream, undone_at_end(self._remove_if_empty):
+            lines = self.path.read_bytes().splitlines(keepends=True)
+            self._lines = [line for line in lines if line.endswith(b"\n")]
+            self.frames = max(len(self._lines) - 1, 0)
+            try:
+                yield
+            finally:
+                self._remove_if_empty()
 
-def _is_same(
-    file: Path, before: Mapping[str, Any], may_grow: bool = False, by_lines: bool = False
-) -> bool:
-    """Whether a file is what it was, or begins as it was: with whole lines if ``by_lines``."""
-    known = before.get(str(file), {})
-    size, length = known.get("size"), file.stat().st_size
-    if not isinstance(size, int) or length < size or (length > size and not may_grow):
-        return False
-    digest, ends_line = _hash(file, size)
-    # a number at the end may have got more digits
-    return digest == known.get("sha256") and (ends_line or not by_lines)
+    def read(self) -> Record:
+        """
+        The finished frames, in a block of :meth:`alone`; what is not finished is cut off.
 
+        Raises
+        ------
+        ReadError
+            If it is damaged.
+        """
+        try:
+            first, *frames = map(json.loads, self._lines)
+            found = {**first, "inputs": [one for frame in frames for one in frame["inputs"]]}
+            record = Record.of(self.path, found, [row for frame in frames for row in frame["rows"]])
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            what = "expected what an interrupted run has kept there, found something else"
+            raise ReadError(f"{self.path}: {what}: leave out `resume` to start afresh") from None
+        if (size := sum(map(len, self._lines))) < self.path.stat().st_size:
+            self._stream.truncate(size)
+        return record
 
-def _was_skipped(series: Series, step: int | None, rows: FrameRows) -> bool:
-    """Whether the files of a step have given no row."""
-    frames = [number for number, frame in enumerate(series) if frame.name_step == step]
-    # a broken file counts as one frame: if it has more now, later frames have other numbers
-    return len(frames) == 1 and (series.name, frames[0]) not in rows
+    def begin(self, asked: Mapping[str, Any]) -> None:
+        """Start afresh with these settings; finished frames are kept under another name."""
+        if self.frames:
+            names = (f"{self.output.stem}.{n}{self.output.suffix}" for n in count(1))
+            others = map(self.output.with_name, names)
+            other = next(one for one in others if not (one.exists() or part_of(one).exists()))
+            # not moved: other runs find this very file locked
+            shutil.copyfile(self.path, part_of(other))
+            kept = f"{counted(self.frames, 'finished frame')} of an earlier run are kept"
+            how = f"what made it goes on with it by `output={other}` `resume`"
+            note(f"{self.path}: {kept} as {part_of(other)}; {how}")
+        with named_errors(self.path):
+            self._stream.truncate(0)
+            self._write({"settings": asked})
+        self.frames = 0
+
+    def add(self, inputs: Iterable[Mapping[str, Any]], rows: Iterable[Row]) -> None:
+        """Keep a finished frame, with the files that no earlier frame was made of."""
+        with named_errors(self.path):
+            self._write({"inputs": list(inputs), "rows": [ALL.of(row) for row in rows]})
+        self.frames += 1
+
+    def remove(self) -> None:
+        """Remove it, in a block of :meth:`alone`; from then on the next run may have one."""
+        if sys.platform == "win32":
+            self._stream.close()  # Windows removes no file that is open
+        self.path.unlink(missing_ok=True)
+        self._stream.close()
+
+    def _write(self, line: Mapping[str, Any]) -> None:
+        # not by way of a buffer, which would be written once more at the end where the disk is full
+        data = f"{json_line(line)}\n".encode("utf-8", "surrogatepass")
+        while data:
+            data = data[os.write(self._stream.fileno(), data) :]
+
+    def _remove_if_empty(self) -> None:
+        """Without a frame there is nothing to go on with."""
+        is_there = not self._stream.closed and self.path.exists()
+        # counted in the file, as a signal may come just before a frame is counted
+        if is_there and self.path.read_bytes().count(b"\n") < 2:
+            self.remove()

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Collection, Mapping
-from pathlib import Path
 from typing import Any
 
-from scanfab.base.errors import ReadError, SettingsError
+from scanfab.base.errors import ReadError
 from scanfab.base.option import flag_of
 from scanfab.base.spelling import shortest
 from scanfab.io.options import READING_OPTIONS
@@ -83,27 +82,8 @@ def reopen(asked: Mapping[str, Any]) -> Series:
     sources = [str(source) for source in asked["sources"]]
     if "-" in sources:
         raise ReadError("the frames came by standard input, which cannot be read again")
-    missing = [source for source in sources if not Path(source).exists()]
-    if missing:
-        raise ReadError(f"the source {missing[0]} is not there any more")
     given = given_settings(asked)
     return open_sources(sources, **{name: given[name] for name in READING if name in given})[0]
-
-
-def restored_settings(asked: Mapping[str, Any]) -> Settings:
-    """
-    The settings of a manifest.
-
-    Raises
-    ------
-    SettingsError
-        If one of them cannot be used any more.
-    """
-    kind = MapSettings if is_map(asked) else Settings
-    try:
-        return kind(**{name: asked[name] for name in kind.__dataclass_fields__ if name in asked})
-    except (AttributeError, TypeError, ValueError) as error:
-        raise SettingsError(f"the settings of the manifest cannot be used: {error}") from None
 
 
 def _words(flag: str, name: str, value: Any) -> list[str]:

@@ -15,14 +15,14 @@ from scanfab.base.errors import Note, SettingsError
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.io.surface import read_surface
-from scanfab.packing.plane import spelt_plane
+from scanfab.packing.packing import spelt_plane
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import RV_MEANING, SurfaceBox, Window
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import cell_of, centers_of, strain_mode
 from scanfab.pipeline.values import Vector
 
-# in radii of the smallest grain: nobody means an RV as small as this
+# in radii of the smallest grain: a smaller RV is a mistake
 SMALLEST = 1e-9
 
 
@@ -36,7 +36,7 @@ class RV(NamedTuple):
 
 
 def sizes_of(settings: Settings) -> tuple[RV, ...]:
-    """The RVs of a series as far as the settings alone tell; none if no variant needs one."""
+    """The RVs of a series, without their windows; none if no variant needs one."""
     if not settings.needs_window:
         return ()
     return tuple(RV(one if len(settings.rvs) > 1 else None) for one in settings.rvs)
@@ -49,54 +49,51 @@ def windows_of(sample: Sample, settings: Settings) -> list[Window]:
     Raises
     ------
     SettingsError
-        If it is far smaller than any grain, or its surface is that of no convex body.
+        If one is far smaller than any grain or lies beside the plane of the discs, or if its
+        surface is that of no convex body.
     ReadError
         If the file of its surface cannot be read.
     """
-    surfaces = SurfaceBox.of(sample.packing, sample.gathered)
-    half = 0.5 * surfaces.extents
-    return [_window(sample, settings, one * half, surfaces.center) for one in settings.rvs]
-
-
-def _window(sample: Sample, settings: Settings, part: FloatArray, middle: FloatArray) -> Window:
-    """The RV whose sizes, where none are given, are those of a part of the sample's box."""
     packing, space = sample.packing, sample.packing.space
-    shape, center = _shape(settings, part, space)
-    if settings.rv_center is not None:
-        center = np.array(settings.rv_center, dtype=float)
-    elif center is None:
-        center = np.array(middle, dtype=float)
-    if space.across is not None:
-        # an RV that lies beside the plane by rounding is one in the plane
-        if abs(center[space.across] - packing.place_across) > packing.radius.max():
-            raise SettingsError(
-                f"rv_center: lies outside {space} of the discs: expected "
-                f"{spelt_plane(packing.position, space)}, found {center[space.across]:g}"
-            )
-        center[space.across] = packing.place_across
+    surfaces = SurfaceBox.of(packing, sample.gathered)
     smallest = float(packing.radius[sample.grains].min())
-    half = 0.5 * float((shape.high - shape.low)[list(space.along)].min())
-    if half < SMALLEST * smallest:
-        raise SettingsError(
-            f"rv: the {shape} is nothing beside the smallest grain (radius {smallest:g}): choose a "
-            f"larger `rv`, `rv_radius` or `rv_size`"
-        )
-    return Window(center, shape)
+    found = []
+    for fraction in settings.rvs:
+        shape, center = _shape(settings, fraction * (0.5 * surfaces.extents), space)
+        if settings.rv_center is not None:
+            center = np.array(settings.rv_center, dtype=float)
+        elif center is None:
+            center = surfaces.center.copy()
+        if space.across is not None:
+            # rounding may put the centre beside the plane
+            if abs(center[space.across] - packing.place_across) > packing.radius.max():
+                raise SettingsError(
+                    f"rv_center: lies outside {space} of the discs: expected "
+                    f"{spelt_plane(packing.position, space)}, found {center[space.across]:g}"
+                )
+            center[space.across] = packing.place_across
+        if 0.5 * (shape.high - shape.low)[list(space.along)].min() < SMALLEST * smallest:
+            raise SettingsError(
+                f"rv: the {shape} is nothing beside the smallest grain (radius {smallest:g}): "
+                f"choose a larger `rv`, `rv_radius` or `rv_size`"
+            )
+        found.append(Window(center, shape))
+    return found
 
 
 def _shape(settings: Settings, part: FloatArray, space: Space) -> tuple[Convex, FloatArray | None]:
     """The shape, in a plane a flat one, and its centre if a file says where it is."""
-    kind, sizes, is_plane = settings.rv_shape, settings.rv_size, space.is_plane
+    kind, sizes = settings.rv_shape, settings.rv_size
     part = part[sorted(space.along)]
     if kind == "sphere":
         radius = settings.rv_radius or float(part.min())
-        return shapes.circle(radius, space) if is_plane else shapes.sphere(radius), None
+        return shapes.sphere(radius, space), None
     if kind == "box":
         edges = sizes or 2.0 * part
-        return shapes.rectangle(edges, space) if is_plane else shapes.box(edges), None
+        return shapes.box(edges, None, space), None
     if kind == "ellipsoid":
         axes = sizes or part
-        return shapes.ellipse(axes, space) if is_plane else shapes.ellipsoid(axes), None
+        return shapes.ellipsoid(axes, None, space), None
     if kind == "cylinder":
         axis = settings.rv_axis or settings.axis
         radius, height = sizes or _cylinder_within(part, axis)
@@ -104,17 +101,16 @@ def _shape(settings: Settings, part: FloatArray, space: Space) -> tuple[Convex, 
     try:
         return shapes.polyhedron(*read_surface(Path(kind)))
     except SettingsError as error:
-        raise SettingsError(
-            f"rv_shape: {kind}: {error}: expected a closed convex surface"
-        ) from None
+        text = f"rv_shape: {kind}: {error}: expected a closed convex surface"
+        raise SettingsError(text) from None
 
 
 def _cylinder_within(half: FloatArray, axis: Vector) -> tuple[float, float]:
     """
     Radius and height of the cylinder that fills a box of these half edges.
 
-    Half as high, and as wide, as lines through the box's middle along the axis and across it are
-    long; if the axis is oblique, smaller by what its rims would stick out.
+    Its half height and its radius are the half lengths of lines through the middle of the box,
+    along the axis and across it. If the axis is oblique, the cylinder shrinks until its rims fit.
     """
     along = np.abs(np.array(axis))
     across = np.sqrt(np.maximum(1.0 - along**2, 0.0))
@@ -126,7 +122,7 @@ def _cylinder_within(half: FloatArray, axis: Vector) -> tuple[float, float]:
 
 def doubts_of_rv(window: Window, sample: Sample, box: SurfaceBox, largest: float) -> list[Note]:
     """
-    What to tell of an RV at the sample's surface.
+    Check the place of an RV, and note if it comes near the sample's surface.
 
     Raises
     ------
@@ -136,7 +132,8 @@ def doubts_of_rv(window: Window, sample: Sample, box: SurfaceBox, largest: float
     packing, grains = sample.packing, sample.grains
     window.check_fits(packing)
     room = box.room_around(window)
-    if not window.may_meet(packing.position[grains], packing.radius[grains], packing).any():
+    meets = window.may_meet(packing.position, packing.radius, packing)
+    if not np.any(meets & grains):
         raise SettingsError(
             f"the {window} holds no grain: choose another `rv_center` or a larger one "
             f"(`rv_radius`, `rv_size`)"
@@ -210,7 +207,7 @@ class Deformation:
 
 
 def _edges(sample: Sample, mode: str) -> tuple[FloatArray, FloatArray]:
-    """Origin and edges, as columns, of what is followed; nothing changes across a plane."""
+    """Origin and edges, as columns, of what an RV follows; across a plane nothing changes."""
     space = sample.packing.space
     if mode == "cell":
         cell = cell_of(sample)

@@ -2,29 +2,17 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from scanfab.base.option import (
-    fabric,
-    number,
-    numbers,
-    optional,
-    options_of,
-    reading,
-    refuse_unknown,
-    sample,
-    scan,
-    whole,
-    window,
-)
+from scanfab.base.errors import DimensionError, SettingsError
+from scanfab.base.option import fabric, options_of, reading, refuse_unknown, sample, scan, window
 from scanfab.io.options import parse_frames
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.pipeline import values
-from scanfab.pipeline.values import AXES, SHAPES, Axis, Length, Vector, as_written, parse_axis
-from scanfab.pipeline.window_settings import check_together
-from scanfab.scan.edges import CLIP, EDGE_COLUMNS, EDGES
+from scanfab.pipeline.values import AXES, SHAPES, STRAIN_MODES, Axis, Length, Vector, as_written
+from scanfab.scan.edges import CLIP, EDGE_COLUMNS, EDGES, ENDS
 
 if TYPE_CHECKING:
     from scanfab.base.column import Column
@@ -32,30 +20,15 @@ if TYPE_CHECKING:
     from scanfab.scan.directions import DirectionRule
 
 
-# of an auto scan of one frame: one to two minutes of one processor, some hundred times what dense
-# packings need for the default tolerance
+# one to two minutes of one processor, some hundred times what a frame of a dense packing needs for
+# the default tolerance
 MAX_CHORDS = 1e10
-RULE_NAMES = (
-    "lebedev", "design", "icosahedral", "product", "fibonacci", "equal-angle", "equal-angle-full",
-)  # fmt: skip
-
-AXIS_FORM = "x|y|z|X,Y,Z"
-length_above_0 = number("a length above 0", lambda value: 0 < value < math.inf)
-at_least_0 = number("0 or more", lambda value: 0 <= value < math.inf)
-at_least_1 = number("a number of at least 1", lambda value: value >= 1)
-count = whole("0 or more", lambda value: value >= 0)
-three_numbers = numbers("three finite numbers", lambda vector: len(vector) == 3)
-parse_moment = whole("1 or 2", lambda moment: moment in (1, 2))
-parse_tolerance = number(
-    "a number above 0, from 1e-15 to 1e15", lambda value: 1e-15 <= value <= 1e15
-)
-
-
-def parse_sizes(name: str, value: Any) -> tuple[float, ...]:
-    """Two or three lengths; none if not given."""
-    expected = "two or three lengths above 0, such as 2,3,4"
-    parse = numbers(expected, lambda sizes: len(sizes) in (2, 3) and min(sizes) > 0)
-    return () if value is None or value in ((), []) else tuple(parse(name, value))
+# options that mean something only if another option has this value
+NEEDS = {
+    "rv_radius": ("rv_shape", "sphere"),
+    "rv_axis": ("rv_shape", "cylinder"),
+    "min_force": ("rattlers", "force"),
+}
 
 
 @dataclass(frozen=True, init=False)
@@ -89,126 +62,126 @@ class Settings:
         values.parse_fractions, default=0.7, metavar="FRACTION[,FRACTION...]", first=True
     )
     """
-    Size of the RV: radius of the sphere as a fraction of half the smallest extent of the grains;
-    sizes of other shapes, of half the extents. Several: a row for each, from the same lines.
+    Size of the representative volume (RV), relative to the sample: the radius of a sphere as a
+    fraction of half the smallest extent of the grains, the sizes of other shapes as fractions of
+    half the extents. Several fractions give a row each, all from the same lines.
     """
-    rv_radius: float | None = window(optional(length_above_0), metavar="L")
-    """Radius of the sphere RV in the dump's units, instead of `rv`."""
-    rv_center: Vector | None = window(optional(three_numbers), metavar="X Y Z")
+    rv_radius: float | None = window(values.parse_radius, metavar="L")
+    """Radius of the spherical RV in the dump's units, instead of `rv`."""
+    rv_center: Vector | None = window(values.parse_point, metavar="X Y Z")
     """Centre of the RV in the dump's units (default: middle of the sample)."""
-    rv_shape: str = window(
-        values.parse_shape,
-        default="sphere",
-        metavar="sphere|box|cylinder|ellipsoid|FILE",
-        choices=tuple(SHAPES),
-        files=True,
-    )
-    """Shape of the RV; FILE is a closed convex surface in dump units (.stl .vtp .ply .obj)."""
-    rv_size: tuple[float, ...] = window(parse_sizes, metavar="A,B,C")
+    rv_shape: str = window(values.parse_shape, default="sphere", choices=tuple(SHAPES), also="FILE")
     """
-    In the dump's units, instead of `rv`: edges of the box, radius and height of the cylinder,
-    semi-axes of the ellipsoid; of discs two.
+    Shape of the RV; FILE is a closed convex surface in the dump's units (.stl .vtp .ply .obj).
     """
-    rv_axis: Axis | None = window(optional(parse_axis), metavar=AXIS_FORM, choices=tuple(AXES))
+    rv_size: tuple[float, ...] = window(values.parse_sizes, metavar="A,B,C")
+    """
+    Size of the RV in the dump's units, instead of `rv`: edges of the box, radius and height of the
+    cylinder, semi-axes of the ellipsoid. Discs take two numbers.
+    """
+    rv_axis: Axis | None = window(values.parse_rv_axis, choices=tuple(AXES), also="X,Y,Z")
     """Axis of the cylinder (default: `axis`)."""
     rv_follows: str = window(default="none", choices=("none", "strain"))
     """
-    none: the RV keeps its shape; strain: it deforms with what `strain` is measured by, that is with
-    the cell, or with the extents of boundary or grains along x, y, z.
+    none: the RV keeps its shape. strain: it deforms with the sample, by what `strain` is measured
+    from: with the cell, or with the extents of boundary or grains along x, y, z.
     """
     edge: str = window(default=CLIP, choices=EDGES)
     """
-    What counts at the surface of the RV: clip cuts the void segments there; start takes their full
-    length if they begin or end inside, ends their ends inside.
+    How void segments count that the surface of the RV cuts. clip: by their part inside; start: by
+    their full length, one half for each end inside; ends: by their part inside and the number of
+    their ends inside, which corrects for the cut.
     """
-    variants: str = sample(
-        values.parse_variants,
-        default="abcd",
-        metavar="LETTERS",
-        choices=("abcd", "ab", "cd", "ac", *"abcd"),
-        first=True,
-    )
+    variants: str = sample(values.parse_variants, default="abcd", metavar="LETTERS", first=True)
     """
-    Which variants to compute, letters out of abcd: a whole sample, b whole without rattlers, c RV,
-    d RV without rattlers.
+    Which variants to compute, as letters: a whole sample, b whole sample without rattlers, c RV, d
+    RV without rattlers.
     """
     boundary: tuple[BoundaryRule, ...] = sample(
         values.parse_boundary, default=(), metavar="EXPR", several=True, first=True
     )
-    """Which particles are boundary: "type=2", "mask=3,4", "id>=13723"; several: or."""
+    """
+    Which particles are boundary: "type=2", "mask=3,4", "id>=13723". Repeat the option to combine
+    conditions (or); in Python, give a list.
+    """
     cutoff: Length = scan(values.parse_length, default="1rmin", metavar="L")
-    """Shortest void segment kept: in the dump's units, or with rmin, rmean, rmax."""
+    """
+    Shortest void segment that counts: a length in the dump's units, or relative to the radii of the
+    grains, such as 1rmin, 0.5rmean, 2rmax.
+    """
     cutoffs: tuple[Length, ...] = scan(values.parse_lengths, metavar="FROM:TO:STEP|L,L,...")
     """
-    Several cut-offs, a row for each, from one pass over the void segments; `cutoff` is then the one
-    at which the scan meets the tolerance.
+    Several cut-offs, with a row for each, from one pass over the void segments; `cutoff` is then
+    the one at which the scan meets the tolerance.
     """
-    moment: int = fabric(parse_moment, default=1, metavar="1|2", choices=("1", "2"))
-    """Mean length of the void segments (1), or mean of the squares over the mean (2)."""
+    moment: int = fabric(values.parse_moment, default=1, choices=("1", "2"))
+    """
+    1: mean length of the void segments; 2: mean of their squared lengths divided by their mean
+    length.
+    """
     spacing: Length | None = scan(
         values.parse_spacing, default="auto", metavar="L", choices=("auto",)
     )
-    """Distance between neighbouring lines, as `cutoff`; auto meets `tolerance`."""
+    """Distance between neighbouring scan lines, written as `cutoff` is; auto meets `tolerance`."""
     directions: DirectionRule | None = scan(
-        values.parse_directions,
-        default="auto",
-        metavar="N|RULE",
-        choices=("auto", *(f"{rule}:" for rule in RULE_NAMES)),
+        values.parse_directions, default="auto", metavar="N|RULE", choices=values.direction_rules
     )
     """
-    N axes, rounded up to the next exact rule, or lebedev:DEGREE, design:DEGREE, icosahedral:DEGREE,
-    product:DEGREE, fibonacci:N, equal-angle:STEP, equal-angle-full:STEP; auto meets `tolerance`.
+    Directions of the scan: N axes, rounded up to the next exact rule, or lebedev:DEGREE,
+    design:DEGREE, icosahedral:DEGREE, product:DEGREE, fibonacci:N, equal-angle:STEP,
+    equal-angle-full:STEP; auto meets `tolerance`.
     """
-    tolerance: float = scan(parse_tolerance, default=1e-4, first=True)
-    """Target standard error of alpha_vs_axial, for every variant, when something is auto."""
-    max_chords: float = scan(at_least_1, default=MAX_CHORDS, metavar="N")
+    tolerance: float = scan(values.parse_tolerance, default=1e-4, first=True)
     """
-    An auto scan stops before it cuts more chords from grains than this, in each frame: by default
-    after one or two minutes of one processor (lines count like chords).
+    Standard error of alpha_vs_axial that the scan aims at in every variant, if spacing or
+    directions are auto.
     """
-    min_contacts: int = sample(count, default=2)
+    max_chords: float = scan(values.parse_work, default=MAX_CHORDS, metavar="N")
+    """
+    Limit for the work of an auto scan: in each frame it stops before it cuts more chords from
+    grains than this (a line counts like a chord). The default takes one or two minutes of one
+    processor.
+    """
+    min_contacts: int = sample(values.parse_count, default=2)
     """A grain with fewer contacts (a clump: with fewer neighbours) is a rattler."""
     rattlers: str = sample(
         values.parse_rattlers, default="count", metavar="RULE", choices=values.rattler_rules
     )
     """
-    Rule for rattlers: count is one pass over all contacts; recursive repeats it without those of
-    rattlers, until none is new; force is one pass over those above `min_force`.
+    Rule that finds rattlers. count: one pass over all contacts; recursive: further passes without
+    the contacts of rattlers, until no new ones are found; force: one pass over the contacts whose
+    force exceeds `min_force`.
     """
-    min_force: float = sample(at_least_0, default=0.0)
-    """By the rule force contacts count whose normal force is above this, over the mean."""
-    contact_tolerance: float = sample(at_least_0, default=0.0)
-    """Of contacts by geometry, relative: contact if distance < (r1 + r2)(1 + X)."""
-    axis: Axis = fabric(parse_axis, metavar=AXIS_FORM, choices=tuple(AXES))
+    min_force: float = sample(values.parse_share, default=0.0)
+    """With `rattlers="force"`: only contacts whose normal force exceeds X times the mean count."""
+    contact_tolerance: float = sample(values.parse_share, default=0.0)
     """
-    Loading axis, along which the anisotropies are signed (default: z; of discs the second axis of
+    For contacts found by geometry: two grains touch if their distance is below (r1 + r2)(1 + X).
+    """
+    axis: Axis = fabric(values.parse_axis, choices=tuple(AXES), also="X,Y,Z")
+    """
+    Loading axis, along which the anisotropies are signed (default: z; for discs the second axis of
     their plane).
     """
     with_: tuple[str, ...] = fabric(
         values.parse_groups, metavar="GROUP,...", choices=values.GROUP_NAMES
     )
     """
-    More columns: forces (with branches, strong and weak contacts), state (void ratio, stress,
-    fabric against stress), invariants, harmonics; several: forces,state.
+    Groups of further columns: forces (branches, strong and weak contacts), state (void ratio,
+    stress, fabric against stress), invariants, harmonics. Several: forces,state.
     """
-    strain: str = sample(
-        values.parse_strain,
-        default="auto",
-        metavar="auto|cell|boundary|grains|FILE.csv",
-        choices=values.STRAIN_MODES,
-        files=True,
-    )
-    """Where the axial strain comes from: auto is the cell if periodic, else the boundary."""
+    strain: str = sample(values.parse_strain, default="auto", choices=STRAIN_MODES, also="FILE.csv")
+    """Where the axial strain comes from; auto: the cell if it is periodic, else the boundary."""
     frames: slice = reading(
         lambda name, value: parse_frames(value, name), metavar="A:B:C", first=True
     )
     """Which frames, as a Python slice (default: all)."""
-    seed: int = scan(count, default=0)
+    seed: int = scan(values.parse_count, default=0)
     """Seed of the random numbers."""
     workers: int = scan(values.parse_workers, first=True, decides=False)
-    """Parallel workers (default: all cores)."""
+    """Number of parallel workers (default: all cores)."""
     on_error: str = reading(default="stop", choices=("stop", "skip"))
-    """What a frame that cannot be read does."""
+    """What to do when a frame cannot be read."""
 
     def __init__(self, **options: Any) -> None:
         """Check what users write, and keep what it means."""
@@ -217,7 +190,11 @@ class Settings:
         for one in declared:
             value = one.parse(one.name, options.get(one.name, one.default))
             object.__setattr__(self, one.name, value)
-        check_together(self)
+        for problem in self._clashes():
+            raise SettingsError(problem)
+        # whether the grains are discs is not known before a frame is read
+        if self.rv_shape == "cylinder":
+            self.check_sizes(3)
 
     def __repr__(self) -> str:
         chosen = [
@@ -226,6 +203,45 @@ class Settings:
             if as_written(getattr(self, one.name)) != as_written(one.parse(one.name, one.default))
         ]
         return f"{type(self).__name__}({', '.join(chosen)})"
+
+    def _clashes(self) -> Iterator[str]:
+        """What does not go together, each with what to do."""
+        shape, takes = self.rv_shape, SHAPES.get(self.rv_shape)
+        sizes = {"rv_radius": self.rv_radius, "rv_size": self.rv_size, "rv_shape": takes is None}
+        for name in (name for name, given in sizes.items() if given and len(self.rvs) > 1):
+            several = f"`rv` asks for {len(self.rvs)}"
+            yield f"{name}: gives the RV one size, but {several}: leave out one of the two"
+        if self.rv_size and not takes:
+            instead = "choose `rv_radius`" if takes == "" else "its file says how large it is"
+            yield f"rv_size: the shape {shape} takes none: {instead}"
+        for name, (other, needed) in NEEDS.items():
+            found = getattr(self, other)
+            if getattr(self, name) and found != needed:
+                choose = f'leave out `{name}`, or choose `{other}="{needed}"`'
+                yield f"{name}: has no meaning if `{other}` is {found}: {choose}"
+        if self.rv_follows == "strain" and self.strain not in STRAIN_MODES:
+            yield (
+                f"rv_follows: a file of strains ({self.strain}) does not say how the sample "
+                f"deforms along all axes: choose another `strain`, or leave out `rv_follows`"
+            )
+        if self.edge == ENDS and self.moment != 1:
+            yield (
+                "moment: `edge=ends` counts only what lies inside the window, which does not give "
+                "the second moment of the full lengths: choose `edge=start`, or `moment=1`"
+            )
+
+    def check_sizes(self, dimension: int) -> None:
+        """DimensionError if the RV has too many sizes for so many dimensions, or too few."""
+        shape, takes = self.rv_shape, SHAPES.get(self.rv_shape)
+        if not self.rv_size or not takes:
+            return
+        if len(self.rv_size) != (2 if shape == "cylinder" else dimension):
+            found = ",".join(f"{size:g}" for size in self.rv_size)
+            if dimension == 2:
+                takes = f"two, {takes.replace(',C', '')}, in the plane of the discs"
+            raise DimensionError(
+                f"rv_size: expected {takes} (`rv_shape` is {shape}), found {found}"
+            )
 
     @property
     def rvs(self) -> tuple[float, ...]:

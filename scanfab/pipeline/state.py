@@ -14,21 +14,21 @@ from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.fabric.measured import ContactForces, SampleState
 from scanfab.fabric.state import love_weber
-from scanfab.packing.clump_volumes import lens_volumes, own_shares
+from scanfab.packing.bodies import lens_volumes, own_shares
 from scanfab.packing.contacts import branches
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample, Variant
 from scanfab.packing.window import Window
 from scanfab.scan.directions import direction_rule, plane_rule
 
-# points that stand for a grain where the surface of an RV that is no sphere cuts it
+# points that stand for a grain that is cut by the surface of an RV, unless that is a sphere
 POINTS = 2048
-# grains at a time, times their points: some tens of megabytes
+# grains whose points are handled at a time: some tens of megabytes
 CHUNK = 256
 
 
 def refuse_forces(sample: Sample, groups: Collection[str]) -> None:
-    """PackingError if forces are asked for that the dump does not have, or not all as numbers."""
+    """PackingError if forces are asked for but missing, or if one is no finite number."""
     contacts = sample.contacts
     if contacts.force_n is not None and not np.isfinite(contacts.force_n).all():
         one, two = sample.packing.id[contacts.pairs[np.argmin(np.isfinite(contacts.force_n))]]
@@ -45,21 +45,22 @@ def refuse_forces(sample: Sample, groups: Collection[str]) -> None:
 
 
 def contact_forces(sample: Sample, chosen: BoolArray) -> ContactForces | None:
-    """What some contacts bear and span; None if that is not known."""
+    """Forces and branches of the chosen contacts; None if the dump has no forces."""
     contacts = sample.contacts
     if contacts.force_n is None:
         return None
-    branch = np.einsum("ci,ci->c", _branches(sample.packing)[chosen], contacts.normal[chosen])
+    _, branch = _places_and_branches(sample.packing)
+    branch = np.einsum("ci,ci->c", branch[chosen], contacts.normal[chosen])
     force = None if contacts.force is None else contacts.force[chosen]
     return ContactForces(branch, contacts.force_n[chosen], force)
 
 
 def sample_state(sample: Sample, variant: Variant, window: Window | None) -> SampleState:
     """
-    The state of the RV; without a window, of the whole.
+    The state of the RV, or without a window of the whole sample.
 
-    Rattlers are solid, and all contacts bear stress, in all variants; the coordination is of the
-    variant's grains.
+    Void ratio and stress are the same with and without rattlers: rattlers are solid, and all
+    contacts bear stress. The coordination is that of the variant's grains.
     """
     counted = sample.once(sample.counted(variant, window) & ~sample.removed(variant))
     numbers = sample.numbers_of(variant)[counted]
@@ -73,7 +74,7 @@ def sample_state(sample: Sample, variant: Variant, window: Window | None) -> Sam
 
 
 def doubts_of_state(sample: Sample, window: Window | None) -> dict[str, str]:
-    """Why there is no stress, or what it leaves out, by the code of a note."""
+    """Notes, by code, on why there is no stress, or on forces that it leaves out."""
     contacts, packing = sample.contacts, sample.packing
     if len(contacts) and contacts.force is None:
         known = "no forces" if contacts.force_n is None else "the normal part of forces only"
@@ -104,28 +105,28 @@ def _volume(packing: Packing, window: Window | None) -> float | None:
     return None if cell is None or not cell.is_endless else cell.volume
 
 
-def _places(packing: Packing) -> FloatArray:
-    """The place of each sphere, of a clump that of its image next to the sphere, shape (N, 3)."""
-    bodies, position = packing.bodies, packing.position
-    return position if bodies is None else position + bodies.to_place(position, packing.cell)
+def _places_and_branches(packing: Packing) -> tuple[FloatArray, FloatArray]:
+    """
+    The place of each sphere, (N, 3), and from the first grain's place to the second's, (M, 3).
 
-
-def _branches(packing: Packing) -> FloatArray:
-    """From the first grain's place to the second's, shape (M, 3)."""
-    contacts = packing.contacts
+    Of a clump the place of its image next to the sphere.
+    """
+    places, bodies, contacts = packing.position, packing.bodies, packing.contacts
     assert contacts is not None
-    return branches(_places(packing), contacts.pairs, contacts.image, packing.cell)
+    if bodies is not None:
+        places = places + bodies.to_place(places, packing.cell)
+    return places, branches(places, contacts.pairs, contacts.image, packing.cell)
 
 
 def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
-    """Of all contacts that a grain has part in; None without forces or a volume."""
+    """The stress of all contacts of grains; None without forces or a volume."""
     packing, contacts = sample.packing, sample.contacts
     volume = _volume(packing, window)
     if contacts.force is None or volume is None:
         return None
     one, two = contacts.pairs.T
-    places = _places(packing)
-    start, end = places[one], places[one] + _branches(packing)
+    places, branch = _places_and_branches(packing)
+    start, end = places[one], places[one] + branch
     # boundary is a wall: the branch of such a contact ends where the grain does
     start = np.where(sample.boundary[one][:, None], contacts.point, start)
     end = np.where(sample.boundary[two][:, None], contacts.point, end)
@@ -155,14 +156,14 @@ def _void_ratio(sample: Sample, window: Window | None) -> float | None:
     if volume is None:
         return None
     position, radius = packing.position[sample.grains], packing.radius[sample.grains]
-    # in a clump what several spheres share is there once
+    # what several spheres of a clump share counts once
     share = np.ones_like(radius)
     if packing.bodies is not None:
         share = own_shares(packing, partial(_rays, space=space))[sample.grains]
     if window is None:
         solid = float(np.sum(space.volume(radius) * share))
     else:
-        # through periodic faces too
+        # a window may reach through periodic faces
         solid = 0.0
         origin, shifts = window.images(position, packing, float(radius.max(initial=0.0)))
         for shift in shifts:
@@ -183,7 +184,13 @@ def cut_volumes(
     if shape.is_sphere:
         return lens_volumes(np.linalg.norm(places, axis=1), radius, shape.reach, space)
     points = _points_in_ball(space)
-    found = surely_inside(shape, places, radius).astype(np.float64)
+    # A convex region that holds the ball of radius ρ about the origin and the place x / (1 - r/ρ)
+    # also holds the sphere of radius r about x.
+    curved = float(np.linalg.eigvalsh(shape.quadric.form)[-1])
+    ball = math.sqrt(shape.quadric.level / curved) if curved > 0.0 else math.inf
+    room = 1.0 - radius / min([ball, *shape.planes[:, 3]])
+    scaled = places / np.where(room > 0.0, room, 1.0)[:, None]
+    found = ((room > 0.0) & shape.contains(scaled)).astype(np.float64)
     cut = np.flatnonzero(found == 0.0)
     for first in range(0, len(cut), CHUNK):
         rows = cut[first : first + CHUNK]
@@ -191,18 +198,6 @@ def cut_volumes(
         inside = shape.contains(spread.reshape(-1, 3)).reshape(-1, len(points))
         found[rows] = inside.mean(axis=1)
     return space.volume(radius, found)
-
-
-def surely_inside(shape: Convex, points: FloatArray, radius: FloatArray) -> BoolArray:
-    """Whether spheres lie wholly in a region; a few in an ellipsoid or cylinder are not found."""
-    form = shape.quadric.form
-    # √(x·form·x) is a norm: that of a sphere's places is at most that of both parts
-    most = math.sqrt(max(float(np.linalg.eigvalsh(form)[-1]), 0.0))
-    middle = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", points, form, points), 0.0))
-    inside = middle + most * radius < math.sqrt(shape.quadric.level)
-    for plane in shape.planes:
-        inside &= points @ plane[:3] + radius < plane[3]
-    return np.asarray(inside)
 
 
 def _rays(count: int, space: Space = SPACE) -> FloatArray:

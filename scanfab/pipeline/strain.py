@@ -15,7 +15,7 @@ from scanfab.packing.sample import Sample
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import STRAIN_MODES, Vector
 
-# programs that flip their cells do so when it leans by half a length or a little later
+# programs flip a cell when it leans by half a length, or a little later
 MOST_TILT = 0.61
 
 
@@ -47,26 +47,26 @@ def axial_length(sample: Sample, mode: str, axis: Vector) -> float | None:
     mode = strain_mode(sample, mode, axis)
     if mode != "cell":
         return float(np.ptp(centers_of(sample, mode) @ np.array(axis))) if mode else None
-    along, is_along = _nearest(axis)
-    if not is_along:
+    along = _coordinate_of(axis)
+    if along is None:
         raise SettingsError("strain: cell was asked for, but the axis is not x, y or z")
     return float(cell_of(sample).vectors[along, along])
 
 
 def strain_mode(sample: Sample, mode: str, axis: Vector) -> str:
-    """What ``auto`` stands for in a frame, empty where it finds nothing; else the mode itself."""
+    """The mode, with ``auto`` replaced by what it finds in a frame; empty if it finds nothing."""
     if mode != "auto":
         return mode
-    cell, (along, is_along) = sample.packing.cell, _nearest(axis)
-    if cell is not None and is_along and cell.periodic[along]:
+    cell, along = sample.packing.cell, _coordinate_of(axis)
+    if cell is not None and along is not None and cell.periodic[along]:
         return "cell"
     return "boundary" if sample.boundary.any() else ""
 
 
-def _nearest(axis: Vector) -> tuple[int, bool]:
-    """Which of x, y, z is nearest to the axis, and whether that is the axis itself."""
+def _coordinate_of(axis: Vector) -> int | None:
+    """Which of x, y, z the axis is; None for an oblique one."""
     along = int(np.argmax(np.abs(axis)))
-    return along, abs(axis[along]) > 1 - 1e-12
+    return along if abs(axis[along]) > 1 - 1e-12 else None
 
 
 def cell_of(sample: Sample) -> Cell:
@@ -149,7 +149,7 @@ def volumetric_strain(cell: Cell | None, first: Cell | None) -> float | None:
     if cell is None or first is None or not (cell.is_endless and first.is_endless):
         return None
     now, before = (np.linalg.det(one.own_vectors) for one in (cell, first))
-    # no -0.0 of a cell that is as it was
+    # written so that an unchanged cell gives 0.0, not -0.0
     return float(np.log(abs(before / now)))
 
 
@@ -157,8 +157,8 @@ def is_flipped(cell: Cell | None, before: Cell | None) -> bool:
     """
     Whether a cell seems to be described by other vectors of its lattice than in the frame before.
 
-    Then whole vectors were added to some, which also brings them nearer to those before, and
-    neither cell leans further than where programs flip them.
+    It is if whole vectors, added to its own, bring these nearer to the vectors before, and if
+    neither cell leans further than to the point where programs flip them.
     """
     if cell is None or before is None or not (cell.is_endless and before.is_endless):
         return False
@@ -175,10 +175,10 @@ def is_flipped(cell: Cell | None, before: Cell | None) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Strains:
-    """Strains of the frames of a series, since its first frame that has grains."""
+    """What the strains of a series are measured by, since its first frame that has grains."""
 
     mode: str
-    """As for :func:`axial_length`; of no meaning if there is a file."""
+    """As for :func:`axial_length`; unused if there is a file."""
     axis: Vector
     file: FrameFile | None = None
     length: float | None = None
@@ -222,23 +222,21 @@ class Strains:
 
 
 class Flips:
-    """The cells of a series, each held against those of the frames before and behind it."""
+    """Whether the cell of a series is flipped from one of its chosen frames to the next."""
 
     def __init__(self, step: int | None) -> None:
         """Frames are chosen with a step, as in a slice."""
         self.step = abs(step or 1)
-        self.cells: dict[int, Cell | None] = {}
+        self.before: tuple[int, Cell | None] = -self.step, None
 
     def notes(self, number: int, cell: Cell | None) -> list[Note]:
-        """What to tell once the cell of one more frame is known."""
-        self.cells[number] = cell
-        return [
-            Note(
-                "flipped_cell",
-                f"the cell seems to be flipped between the frames {early} and {late}: from there "
-                f"on its vectors are others than in the first frame, and shear_strain is not the "
-                f"strain since then (LAMMPS: fix deform ... flip no)",
-            )
-            for early, late in ((number - self.step, number), (number, number + self.step))
-            if is_flipped(self.cells.get(late), self.cells.get(early))
-        ]
+        """What to tell of the cell of one more frame; frames come in their order."""
+        (early, before), self.before = self.before, (number, cell)
+        if early != number - self.step or not is_flipped(cell, before):
+            return []
+        text = (
+            f"the cell seems to be flipped between the frames {early} and {number}: from there on "
+            f"its vectors are others than in the first frame, and shear_strain is not the strain "
+            f"since then (LAMMPS: fix deform ... flip no)"
+        )
+        return [Note("flipped_cell", text)]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,8 +9,6 @@ from typing import Any
 
 from scanfab.base.errors import ScanfabNote, ScanfabWarning, SkippedFrameWarning
 from scanfab.pipeline.options import as_options
-
-_ears = threading.local()
 
 
 class Told:
@@ -40,61 +36,24 @@ def recorded() -> Iterator[Told]:
     """
     Keep what is told in the block, also what the caller's filters of warnings hide.
 
-    Each text is passed on once, to be shown, hidden or raised as those filters say.
+    At the end each text is warned of once, at the line that calls the function of the block, to be
+    shown, hidden or raised as those filters say. Warnings of others are passed on as they come.
     """
-    told = Told()
-    with warnings.catch_warnings():
-        filters, show = list(warnings.filters), warnings.showwarning
-
-        def hear(message: Any, category: type[Warning], file: str, line: int, *rest: Any) -> None:
-            is_ours = issubclass(category, ScanfabWarning | ScanfabNote)
-            is_known = is_ours and not told.add(category, str(message))
-            action = _action(filters, str(message), category, file, line) if is_ours else ""
-            if action == "error":
-                raise message
-            if action != "ignore" and not is_known:
-                show(message, category, file, line, *rest)
-
-        for kind in (ScanfabWarning, ScanfabNote):
-            warnings.simplefilter("always", kind)
-        warnings.showwarning = hear  # type: ignore[assignment]
-        yield told
-
-
-def _action(
-    filters: list[Any], text: str, category: type[Warning], filename: str, lineno: int
-) -> str:
-    """What filters of warnings say, by the rules of the standard library."""
-    files = {getattr(one, "__file__", None): name for name, one in list(sys.modules.items())}
-    module = files.get(filename, filename)
-    for action, message, kind, of_module, line in filters:
-        if (
-            issubclass(category, kind)
-            and (message is None or message.match(text))
-            and (of_module is None or of_module.match(module))
-            and line in (0, lineno)
-        ):
-            return str(action)
-    return "default"
-
-
-@contextmanager
-def heard_by_thread() -> Iterator[list[Warning]]:
-    """
-    The warnings of a thread, in a process where nobody else hears any.
-
-    Other threads may listen to theirs: what the standard library has for it is for one at a time.
-    """
-    if warnings.showwarning is not _hear:
-        warnings.showwarning = _hear
-        warnings.simplefilter("always")
-    _ears.heard = []
+    told, messages = Told(), list[Warning]()
     try:
-        yield _ears.heard
+        with warnings.catch_warnings():
+            show = warnings.showwarning
+
+            def hear(message: Any, category: type[Warning], *place: Any) -> None:
+                if told.add(category, str(message)):
+                    messages.append(message)
+                elif not issubclass(category, ScanfabWarning | ScanfabNote):
+                    show(message, category, *place)
+
+            for kind in (ScanfabWarning, ScanfabNote):
+                warnings.simplefilter("always", kind)
+            warnings.showwarning = hear  # type: ignore[assignment]
+            yield told
     finally:
-        del _ears.heard
-
-
-def _hear(message: Warning | str, *rest: Any, **more: Any) -> None:
-    if isinstance(message, Warning) and hasattr(_ears, "heard"):
-        _ears.heard.append(message)
+        for message in messages:
+            warnings.warn(message, stacklevel=4)

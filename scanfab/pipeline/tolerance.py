@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -67,9 +67,9 @@ class Errors(NamedTuple):
 
 class Goal:
     """
-    What is scanned, and what is to meet the tolerance: here the error of each variant.
+    What a scan adds up, and which error is to meet the tolerance: here that of each variant.
 
-    A subclass (a map's) scans to ScanSums with more beside, and tells their errors.
+    The goal of a map is a subclass whose sums also have the fabric of each block.
     """
 
     def scan(
@@ -82,7 +82,7 @@ class Goal:
         )  # fmt: skip
 
     def errors(self, sums: Any, plan: Plan, variant: str) -> Errors:
-        """By the replicates, and about a polynomial."""
+        """The standard error by the scatter of the replicates and by the fit of a polynomial."""
         length, segments = sums.kept(variant)
         empty = float(np.mean(segments == 0))
         fabric = void_fabric(sums.axes, plan.rule.weights, length, segments, plan.space)
@@ -95,10 +95,9 @@ class Goal:
 
 def missing_work(errors: Iterable[Errors], plan: Plan, replicates: int) -> float:
     """
-    By what factor the lines must grow for these variants to meet the tolerance; <= 1: done.
+    By what factor the number of lines must grow until these errors meet the tolerance; 1: done.
 
-    The one rule for all scans that are chosen by their error: ``auto`` ones, and those that a
-    calibration recommends.
+    ``auto`` scans and the settings that a calibration recommends follow the same rule.
     """
     margin = MARGIN
     if plan.auto != "replicates" and replicates > 1:
@@ -145,7 +144,7 @@ def scan_to_tolerance(
 
 @dataclass
 class _AutoScan:
-    """A scan that goes on round by round."""
+    """A scan that adds replicates, round by round, until its tolerance is met."""
 
     solids: Solids
     plan: Plan
@@ -159,7 +158,7 @@ class _AutoScan:
     """How many more replicates the budget allows."""
 
     def run(self, where: str) -> list[Note]:
-        """Scan until the tolerance holds or nothing can be added; tell what was not reached."""
+        """Scan until the tolerance holds or nothing can be added; the notes say what was missed."""
         planned, begun = self.plan.spacing, time.perf_counter()
         start, stop, missed = 0, self.plan.replicates, []
         while True:
@@ -189,19 +188,18 @@ class _AutoScan:
         return [*missed, *self._dropped(counted)]
 
     def _scan(self, start: int, stop: int) -> None:
-        """Add some replicates; the first of all start afresh."""
+        """Scan some replicates and add them to those before; the first round starts afresh."""
         if start == 0:
             batch = self.sums = self._first_round()
         else:
             batch = self.goal.scan(self.solids, self.plan, range(start, stop))
             self.sums = concatenated([self.sums, batch])
-        lines = most_lines(self.solids, self.plan.spacing) * len(self.plan.rule)
+        plan = self.plan
+        lines = most_lines(self.solids, plan.spacing) * len(plan.rule)
         self.spent += float(batch.work.sum()) + lines * batch.replicates
         each = float(self.sums.work.mean()) + lines
-        self.left = (self.plan.max_chords - self.spent) / max(each, 1.0)
-        self.errors = {
-            name: self.goal.errors(self.sums, self.plan, name) for name in self.plan.variants
-        }
+        self.left = (plan.max_chords - self.spent) / max(each, 1.0)
+        self.errors = {one: self.goal.errors(self.sums, plan, one) for one in plan.variants}
 
     def _first_round(self) -> Any:
         """
@@ -253,17 +251,26 @@ class _AutoScan:
     def _better_plan(self, missing: float, counted: str) -> Plan | None:
         """A plan to start afresh with after the first round, if it is worth it and affordable."""
         plan = better = self.plan
-        radius = self.solids.grain_radius
+        space, radius = plan.space, self.solids.grain_radius
         is_patchy = any(self.errors[name].is_patchy for name in counted)
         if plan.auto == "directions":
             if missing > 1.0 and len(plan.rule) < MAX_DIRECTIONS:
                 axes = math.ceil(min(missing, GROWTH) * len(plan.rule))
-                better = replace(plan, rule=rule_of(axes, plan.space))
+                better = replace(plan, rule=rule_of(axes, space))
         elif is_patchy and 0.5 * plan.spacing > CLOSEST * radius.min(initial=np.inf):
             better = replace(plan, spacing=0.5 * plan.spacing)
         elif missing >= AFRESH_FROM and len(radius):
-            better = _with_closer_lines(plan, missing, float(radius.mean()))
-        growth = plan.space.lines(len(better.rule) / len(plan.rule), better.spacing / plan.spacing)
+            noise = NOISE[space.dimension]
+            power = space.dimension - 1.0 + noise.growth
+            closest = min(noise.close * float(radius.mean()), plan.spacing)
+            spacing = max(plan.spacing / missing ** (1.0 / power), closest)
+            better = replace(plan, spacing=spacing)
+            # if closer lines do not suffice, more directions are added, too
+            missing /= (plan.spacing / spacing) ** power
+            if missing > 1.0 and not plan.rule_is_asked_for:
+                axes = math.ceil(min(missing, FINER_UP_TO) * len(plan.rule))
+                better = replace(better, rule=design_of(axes, space))
+        growth = space.lines(len(better.rule) / len(plan.rule), better.spacing / plan.spacing)
         affordable = growth * plan.replicates <= self.left
         affordable = affordable and is_affordable(self.solids, better.spacing)
         return better if growth > 1.0 and affordable else None
@@ -283,35 +290,17 @@ class _AutoScan:
             )
         return Note(TOLERANCE_MISSED, text)
 
-    def _dropped(self, counted: str) -> list[Note]:
+    def _dropped(self, counted: str) -> Iterator[Note]:
         """Notes on the variants that did not count, with the error that they reached."""
-        notes = []
         for name, errors in self.errors.items():
             if name in counted or errors.reported <= self.plan.tolerance:
                 continue
-            reached, tolerance = spelt_apart(errors.reported, self.plan.tolerance)
-            above = f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}"
-            said = above if math.isfinite(errors.reported) else "there is no void fabric yet"
-            text = (
-                f"{said}: it keeps few grains, or would need far more lines than the others "
-                f'(`variants="{name}"` scans it alone)'
-            )
-            notes.append(Note("variant_dropped", text, (name,)))
-        return notes
-
-
-def _with_closer_lines(plan: Plan, missing: float, mean_radius: float) -> Plan:
-    """The plan with closer lines; if those do not suffice, with more directions, too."""
-    noise = NOISE[plan.space.dimension]
-    power = plan.space.dimension - 1.0 + noise.growth
-    closest = min(noise.close * mean_radius, plan.spacing)
-    spacing = max(plan.spacing / missing ** (1.0 / power), closest)
-    missing /= (plan.spacing / spacing) ** power
-    plan = replace(plan, spacing=spacing)
-    if plan.rule_is_asked_for or missing <= 1.0:
-        return plan
-    axes = math.ceil(min(missing, FINER_UP_TO) * len(plan.rule))
-    return replace(plan, rule=design_of(axes, plan.space))
+            said = "there is no void fabric yet"
+            if math.isfinite(errors.reported):
+                reached, tolerance = spelt_apart(errors.reported, self.plan.tolerance)
+                said = f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}"
+            said += ": it keeps few grains, or would need far more lines than the others "
+            yield Note("variant_dropped", f'{said}(`variants="{name}"` scans it alone)', (name,))
 
 
 def _within_budget(plan: Plan, solids: Solids) -> Plan:
@@ -331,10 +320,11 @@ def _within_budget(plan: Plan, solids: Solids) -> Plan:
 
 def _kept_grains(solids: Solids, variant: str) -> float:
     """The fraction of the grains in a variant's window that are solid in the variant."""
+    removed = solids.removed
     if variant in "ac":
         return 1.0
-    removed = solids.removed if solids.medium is None else solids.medium.removed
-    if variant == "d":
-        assert solids.window is not None
-        removed = solids.removed[solids.window.contains(solids.position)]
+    if variant == "d" and solids.window is not None:
+        removed = removed[solids.window.contains(solids.position)]
+    elif solids.medium is not None:
+        removed = solids.medium.removed
     return 1.0 - float(removed.mean()) if len(removed) else 1.0

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from scanfab.base.errors import SettingsError
-from scanfab.base.option import number, numbers, one_of, unusable, whole
+from scanfab.base.option import number, numbers, one_of, optional, unusable, whole
 from scanfab.base.spelling import shortest
 
 if TYPE_CHECKING:
@@ -34,18 +34,23 @@ SHAPES = {
 }
 
 
+parse_radius = optional(number("a length above 0", lambda value: 0 < value < math.inf))
+parse_share = number("0 or more", lambda value: 0 <= value < math.inf)
+parse_work = number("a number of at least 1", lambda value: value >= 1)
+parse_count = whole("0 or more", lambda value: value >= 0)
+parse_moment = whole("1 or 2", lambda moment: moment in (1, 2))
+parse_point = optional(numbers("three finite numbers", lambda vector: len(vector) == 3))
+parse_tolerance = number(
+    "a number above 0, from 1e-15 to 1e15", lambda value: 1e-15 <= value <= 1e15
+)
+
+
 class Axis(NamedTuple):
     """A unit vector; a vector of three numbers is made one by :func:`parse_axis`, once."""
 
     x: float
     y: float
     z: float
-
-    @property
-    def spelt(self) -> str:
-        """As users write it."""
-        named = as_written(self)
-        return named if isinstance(named, str) else ",".join(map(shortest, self))
 
 
 class UsualAxis(Axis):
@@ -164,6 +169,10 @@ def parse_axis(name: str, text: str | Iterable[float] | None) -> Axis:
     return Axis(*(part / math.hypot(*vector) for part in vector))
 
 
+# of a cylinder, which has the loading axis if none is given
+parse_rv_axis = optional(parse_axis)
+
+
 def parse_fractions(name: str, value: Any) -> float | tuple[float, ...]:
     """
     Sizes of RVs: one as a number; several, each once, in ascending order.
@@ -182,6 +191,14 @@ def parse_fractions(name: str, value: Any) -> float | tuple[float, ...]:
     if len(set(found)) < len(found):
         raise unusable(name, "fractions that differ", value)
     return found[0] if len(found) == 1 else tuple(found)
+
+
+def parse_sizes(name: str, value: Any) -> tuple[float, ...]:
+    """Two or three lengths; none if not given."""
+    if value is None or value in ((), []):
+        return ()
+    expected = "two or three lengths above 0, such as 2,3,4"
+    return numbers(expected, lambda found: len(found) in (2, 3) and min(found) > 0)(name, value)
 
 
 def parse_shape(name: str, value: Any) -> str:
@@ -218,9 +235,7 @@ def parse_boundary(name: str, rules: Any) -> tuple[BoundaryRule, ...]:
     """Rules from one expression or several."""
     from scanfab.packing.boundary import BoundaryRule
 
-    several = [rules] if isinstance(rules, str | BoundaryRule) else rules
-    if not isinstance(several, tuple | list):
-        raise unusable(name, "rules such as type=2", rules)
+    several = rules if isinstance(rules, tuple | list) else [rules]
     return tuple(
         rule if isinstance(rule, BoundaryRule) else BoundaryRule.parse(str(rule))
         for rule in several
@@ -240,6 +255,13 @@ def parse_directions(name: str, value: Any) -> DirectionRule | None:
             f"say nothing: take more of them"
         )
     return rule
+
+
+def direction_rules() -> list[str]:
+    """How the rules for directions begin."""
+    from scanfab.scan.directions import RULES
+
+    return ["auto", *(f"{name}:" for name in RULES)]
 
 
 def rattler_rules() -> Iterable[str]:

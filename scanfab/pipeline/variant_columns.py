@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from scanfab.base.arrays import compressed, in_parts
 from scanfab.base.errors import Note
+from scanfab.fabric import predicted
 from scanfab.fabric.forces import doubts_of_forces
-from scanfab.fabric.jackknife import BlockedSums
-from scanfab.fabric.measured import Measured
+from scanfab.fabric.measured import BlockedSums, Measured
 from scanfab.fabric.registry import GROUPS, OWN_FABRICS, checked_values
-from scanfab.fabric.spectrum import LONGEST_GAP, PREDICTED_ALPHA, predicted_alpha
-from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
 from scanfab.packing.columns import RV_COLUMN, sample_values
 from scanfab.packing.sample import Variant
 from scanfab.packing.search import near_pairs
@@ -27,7 +26,7 @@ from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Solids
 from scanfab.table.columns import installed_fabrics, table_columns
 
-# of the segments: so many may leave the sample
+# share of the segments that may leave the sample before a user is told
 MOST_LEFT_OUT = 0.01
 NO_INNER_WINDOW = (
     "the sample is flat or too small: by the rule `edge=ends` the whole is measured in the "
@@ -51,7 +50,7 @@ class VariantColumns:
         self.left_out = left_out_of(self.sums, variant, self.edge, kept)
 
     def columns(self) -> dict[str, Any]:
-        """All that depend on the variant; the strain of the frame is not known here."""
+        """The values of all columns but those that are the same in all rows of a frame."""
         plan, measured = self.plan, self.measured
         found = sample_values(self.sample, self.variant, self.window, len(measured.normals))
         found |= {
@@ -60,7 +59,7 @@ class VariantColumns:
             "replicates": self.sums.replicates,
             "lines": int(self.sums.lines[:, self.which].sum()),
             "segments": measured.segment_count,
-            # of all replicates together, as a fixed scan is asked for
+            # of all replicates together, as users choose it for a fixed scan
             "spacing": plan.spacing / plan.space.apart(self.sums.replicates),
             "cutoff": self.cutoff,
         }
@@ -68,14 +67,18 @@ class VariantColumns:
             found |= fabric.values(measured)
         for name, fabric in installed_fabrics().items():
             found |= checked_values(name, fabric, measured)
-        asked = {RV_COLUMN.name: self.rv, "edge": self.edge, "left_out": self.left_out}
-        if WINDOW_ALPHA.name in plan.more_columns:
-            asked[WINDOW_ALPHA.name] = self.window_alpha
-        if PREDICTED_ALPHA.name in plan.more_columns:
-            asked[PREDICTED_ALPHA.name] = self.predicted_alpha
+        more: dict[str, Any] = {
+            RV_COLUMN.name: self.rv,
+            "edge": self.edge,
+            "left_out": self.left_out,
+        }
+        if predicted.WINDOW_ALPHA.name in plan.more_columns:
+            more[predicted.WINDOW_ALPHA.name] = self.window_alpha
+        if predicted.PREDICTED_ALPHA.name in plan.more_columns:
+            more[predicted.PREDICTED_ALPHA.name] = self.predicted_alpha
         for group in plan.groups:
-            asked |= GROUPS[group].values(measured)
-        return found | {name: asked[name] for name in plan.more_columns if name in asked}
+            more |= GROUPS[group].values(measured)
+        return found | {name: more[name] for name in plan.more_columns if name in more}
 
     @cached_property
     def measured(self) -> Measured:
@@ -87,8 +90,7 @@ class VariantColumns:
         if found.gaps is not None:
             count = found.gaps.in_blocks(name, self.place)[1].sum()
         chosen = sample.fabric_contacts(self.variant, self.window)
-        # np.compress is several times as fast as to index with a mask
-        points = np.compress(chosen, sample.contacts.point, axis=0)
+        points = compressed(chosen, sample.contacts.point)
         places = points
         if self.window is not None:
             # next to the centre of the RV
@@ -108,9 +110,9 @@ class VariantColumns:
                 found.blocked.kept(*words),
                 [found.blocked.kept(*words, without=one) for one in range(2**plan.space.dimension)],
             ),
-            normals=np.compress(chosen, sample.contacts.normal, axis=0),
+            normals=compressed(chosen, sample.contacts.normal),
             points=points,
-            blocks=found.blocks[self.variant.in_window].of(places),
+            blocks=in_parts(found.blocks[self.variant.in_window].of, places),
             space=plan.space,
             segment_count=int(count),
             forces=contact_forces(sample, chosen) if "forces" in groups else None,
@@ -129,19 +131,19 @@ class VariantColumns:
 
     @property
     def predicted_alpha(self) -> float | None:
-        """What contacts predict at a small cut-off, in a region whose porosity is known."""
+        """What contacts predict for a small cut-off, if the porosity of the region is known."""
         solid, packing = self.solid_fraction, self.sample.packing
-        longest = LONGEST_GAP * float(packing.radius[self.sample.grains].min())
+        longest = predicted.LONGEST_GAP * float(packing.radius[self.sample.grains].min())
         if solid is None or packing.bodies is not None or self.plan.moment != 1:
             return None
         if self.cutoff > longest or self.measured.void is None:
             return None
         pairs = near_pairs(self.sample, self.variant, self.window, self.cutoff)
-        return predicted_alpha(pairs, 1.0 - solid, self.cutoff, self.plan.axis)
+        return predicted.predicted_alpha(pairs, 1.0 - solid, self.cutoff, self.plan.axis)
 
     @property
     def window_alpha(self) -> float | None:
-        """What the window alone would give: nothing by the rules that do not cut segments."""
+        """The anisotropy that the window alone would make; 0 if its edge cuts no segments."""
         fabric = self.measured.void
         if self.window is None or fabric is None:
             return None
@@ -149,10 +151,11 @@ class VariantColumns:
             return 0.0
         if self.plan.moment != 1:
             return None
-        return window_alpha(self.window.shape, fabric, self.cutoff, self.measured.axis)
+        axis = self.measured.axis
+        return predicted.window_alpha(self.window.shape, fabric, self.cutoff, axis)
 
     def notes(self) -> Iterator[Note]:
-        """Whether there is no void fabric, or a doubtful one, or lines without a grain."""
+        """Why there is no void fabric, or a doubtful one, and which lines meet no grain."""
         texts = doubts_of_lines(self.sums, self.variant, self.left_out) | self._doubts_of_void()
         if "state" in self.plan.groups:
             texts |= doubts_of_state(self.sample, self.window)
@@ -162,14 +165,15 @@ class VariantColumns:
         return (Note(code, text, (about,)) for code, text in texts.items())
 
     def _doubts_of_void(self) -> dict[str, str]:
-        void = self.measured.void
+        void, window = self.measured.void, self.window
         if not self.measured.meets_solids:
             with_rattlers = replace(self.variant, without_rattlers=False)
-            rattlers = self.sample.number(self.sample.solids(with_rattlers, self.window))
+            rattlers = self.sample.number(self.sample.solids(with_rattlers, window))
+            if not rattlers:
+                return {"no_solid": f"no grain reaches into the {window}"}
             there = " that reach into the RV" if self.variant.in_window else ""
-            left = f"no grain is left, all {rattlers}{there} are rattlers"
-            return {"no_solid": left if rattlers else f"no grain reaches into the {self.window}"}
-        if self.edge == ENDS and self.window is None and self.measurement.solids.inner is None:
+            return {"no_solid": f"no grain is left, all {rattlers}{there} are rattlers"}
+        if self.edge == ENDS and window is None and self.measurement.solids.inner is None:
             return {"no_inner_window": NO_INNER_WINDOW}
         if self.measured.segment_count == 0:
             times = self.cutoff / float(self.sample.packing.radius[self.sample.grains].min())
@@ -181,13 +185,9 @@ class VariantColumns:
         if void is None:
             text = "in some direction no void segment is kept, so there is no void fabric"
             return {"empty_direction": text}
-        if void.filled <= 0.01:
-            return {}
-        text = (
-            f"{void.filled:.0%} of the directions keep no void segment in a replicate: choose a "
-            f"smaller spacing"
-        )
-        return {"filled_directions": text}
+        filled = f"{void.filled:.0%} of the directions keep no void segment in a replicate"
+        text = f"{filled}: choose a smaller spacing"
+        return {"filled_directions": text} if void.filled > 0.01 else {}
 
 
 def no_columns(more: Collection[str] = ()) -> dict[str, Any]:
@@ -197,7 +197,7 @@ def no_columns(more: Collection[str] = ()) -> dict[str, Any]:
 
 
 def edge_of(variant: Variant, plan: Plan, solids: Solids) -> str | None:
-    """The rule at the surface of a variant's window; a whole that repeats has no edge."""
+    """The rule that holds at the surface of a variant; None for a whole that repeats."""
     if variant.in_window:
         return plan.edge
     if solids.medium is not None:
@@ -206,7 +206,7 @@ def edge_of(variant: Variant, plan: Plan, solids: Solids) -> str | None:
 
 
 def left_out_of(sums: ScanSums, variant: Variant, edge: str | None, kept: float) -> float | None:
-    """Share of the segments that leave the sample, beside the kept; None by rules that cut them."""
+    """Share of the segments that are dropped as they leave the sample; None if they are cut."""
     if edge != START:
         return None
     left = float(sums.left_out[:, "abcd".index(variant.name)].sum())
@@ -214,7 +214,7 @@ def left_out_of(sums: ScanSums, variant: Variant, edge: str | None, kept: float)
 
 
 def doubts_of_lines(sums: ScanSums, variant: Variant, left_out: float | None) -> dict[str, str]:
-    """Lines that meet no grain, and too many segments that leave the sample, by notes' codes."""
+    """Notes, by code, on lines that meet no grain and on segments that leave the sample."""
     found, which = {}, "abcd".index(variant.name)
     channels, others = (int(one[:, which].sum()) for one in (sums.channels, sums.lines))
     if channels:

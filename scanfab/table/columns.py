@@ -7,10 +7,9 @@ from functools import cache
 from typing import Any
 
 from scanfab.base.column import LENGTH, Column
+from scanfab.fabric.predicted import PREDICTED_ALPHA, WINDOW_ALPHA
 from scanfab.fabric.registry import GROUPS, OWN_FABRICS, Fabric, load_fabrics
-from scanfab.fabric.spectrum import PREDICTED_ALPHA
 from scanfab.fabric.usual import Contact, Void
-from scanfab.fabric.window import WINDOW_ALPHA
 from scanfab.packing.columns import RV_COLUMN, SAMPLE_COLUMNS
 from scanfab.scan.edges import EDGE_COLUMNS, SCAN_COLUMNS
 from scanfab.table.row import Row
@@ -38,7 +37,7 @@ OWN_COLUMNS: tuple[Column, ...] = (
     *SCAN_COLUMNS,
     *(column for columns in OF_FABRICS.values() for column in columns),
 )
-"""Those of every fabric table."""
+"""The columns of every fabric table."""
 
 COLUMNS: tuple[str, ...] = tuple(one.name for one in OWN_COLUMNS)
 """Their names."""
@@ -50,7 +49,7 @@ MORE_COLUMNS = (
     PREDICTED_ALPHA,
     *(column for group in GROUPS.values() for column in group.columns),
 )
-"""Those of tables of which more is asked than the default."""
+"""Columns that a table has only if its options ask for them."""
 
 SHELL_COLUMNS = (
     Column("r_inner", float, LENGTH, "of a map: where the shell begins, from the centre"),
@@ -78,15 +77,15 @@ AT_SURFACE = Column("at_surface", int, "", f"of a map: {LOSES}")
 
 @cache
 def installed_fabrics() -> dict[str, Fabric]:
-    """The fabrics of other packages by name; none as a rule."""
+    """The fabrics of other packages by name; usually there are none."""
     return load_fabrics([*COLUMNS, *(one.name for one in MORE_COLUMNS)])
 
 
 def table_columns(more: Collection[str] = ()) -> tuple[Column, ...]:
     """
-    The columns of the tables that are computed here: behind the own, those of other fabrics.
+    The columns of computed tables: those of the package, then those of other packages' fabrics.
 
-    ``more`` are the names of further own ones.
+    ``more`` are names from ``MORE_COLUMNS``.
     """
     asked = (column for column in MORE_COLUMNS if column.name in more)
     others = (column for fabric in installed_fabrics().values() for column in fabric.columns)
@@ -94,7 +93,7 @@ def table_columns(more: Collection[str] = ()) -> tuple[Column, ...]:
 
 
 def map_columns(more: Collection[str] = (), *, shells: bool = False) -> tuple[Column, ...]:
-    """The columns of a map; ``more`` are the names of further ones that its options ask for."""
+    """The columns of a map; ``more`` are names of the columns that its edge rule adds."""
     asked = (one for one in EDGE_COLUMNS if one.name in more)
     return (*MAP_COLUMNS, *(SHELL_COLUMNS if shells else ()), AT_SURFACE, *asked)
 
@@ -106,13 +105,12 @@ def row_of(columns: Iterable[Column], values: Mapping[str, Any]) -> Row:
 
 def complete_row(values: Mapping[str, Any], more: Collection[str] = ()) -> Row:
     """
-    A row that has all columns, in their order, and of further ones those that are named.
+    A row with all columns of :func:`table_columns`, in their order.
 
     Raises
     ------
     TypeError
-        If a value is of no column, or a column has no value: the code that computes them has to
-        be mended.
+        If a value belongs to no column, or a column has no value: an error of the program.
 
     Examples
     --------

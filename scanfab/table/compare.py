@@ -15,8 +15,7 @@ from scanfab.base.column import Column
 from scanfab.base.errors import SettingsError, note, warn
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.errors import variance_without_noise
-from scanfab.fabric.jackknife import BLOCKS
+from scanfab.fabric.errors import BLOCKS, variance_without_noise
 from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
 from scanfab.table.curves import is_turned, strain_column, why_not_strain
 from scanfab.table.row import (
@@ -32,9 +31,9 @@ from scanfab.table.row import (
 from scanfab.table.selection import check_rows
 from scanfab.table.table import Table
 
-# a frame at 12 % may say 0.1200012, as boxes have rounded numbers
+# the strain of a frame at 12 % may be 0.1200012, as the numbers of boxes are rounded
 SAME_STRAIN = 1e-5
-# with fewer points a line says nothing
+# a line through fewer points says nothing
 FEWEST_FRAMES = 3
 BOTH = ("alpha_vs_axial", "alpha_c_axial")
 TURNED = (
@@ -49,7 +48,7 @@ RV = f"{KEPT}: only where that has several RVs"
 
 
 def _columns(**meanings: str) -> tuple[Column, ...]:
-    """Columns by name and meaning; those that no fabric table has are numbers as a rule."""
+    """Columns by name and meaning, of the kind that they have in fabric tables, else floats."""
     kinds = {**KINDS, "frames": int, "variants": str}
     return tuple(Column(name, kinds.get(name, float), "", text) for name, text in meanings.items())
 
@@ -220,7 +219,7 @@ def compare_tables(
 
 
 def _tell_of_strains(rows: Rows, column: str, strain_max: float | None) -> None:
-    """Say which strain stands for which, and what is odd about the largest one of a fit."""
+    """Notes on the strain that is used, and warnings on a ``strain_max`` that does not fit it."""
     if hint := why_not_strain(rows):
         note(hint)
     if strain_max is None:
@@ -252,12 +251,12 @@ def _tell_of_strains(rows: Rows, column: str, strain_max: float | None) -> None:
 
 
 def _within(strain: float | None, strain_max: float | None) -> bool:
-    """Whether a frame belongs to the fit; without a strain nobody can tell, so it does not."""
+    """Whether a frame belongs to the fit; a frame without a strain does not."""
     return strain_max is None or (strain is not None and strain <= strain_max + SAME_STRAIN)
 
 
 def _normalised(group: Rows) -> Iterator[dict[str, Any]]:
-    """The rows of one source and variant with their values over the largest of them."""
+    """The rows of one source and variant with their values divided by the largest of them."""
     largest = {name: max(map(abs, numbers_of(group, name)), default=0.0) for name in BOTH}
     for row in group:
         values = {**row, "alpha_vs_axial_total_se": total_error(row, "alpha_vs_axial")}
@@ -311,10 +310,10 @@ def _slope_error(fitted: Rows) -> float | None:
     """
     Standard error of the slope from the blocks of the sample.
 
-    Frames of one sample are not independent: their scatter about the line says nothing of it. The
-    values without each block come from two replicates of the scan, so there are two slopes for
-    each, and the noise of the scan is taken off. None if nothing is left, or if a frame lacks the
-    values without some block.
+    Frames of one sample are not independent, so their scatter about the line is no measure of it.
+    The values without each block come from two replicates of the scan, which give two slopes each;
+    from these the noise of the scan is known and taken off. None if nothing is left, or if a frame
+    lacks the values without some block.
     """
     # samples in a plane have no upper half, and so half as many blocks
     upper = [f"alpha_c_axial_without_{block}" for block in range(BLOCKS // 2 + 1, BLOCKS + 1)]

@@ -1,4 +1,4 @@
-"""Rows of fabric tables as curves: one for each source and variant, and what it is drawn over."""
+"""Curves of fabric tables, one for each source and variant, and their abscissa."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ STRAINS = {
     "strain": ("axial strain", r"$\varepsilon_a$"),
     "shear_strain": ("shear strain", r"$\varepsilon_q$"),
 }
-# strains that differ by less are one strain: a rounding error is no deformation
+# strains that differ by less are the same: rounding is no deformation
 SAME = 1e-9
 LONGEST_NAME = 32
-# matplotlib cannot draw larger values: in units of the axis they would be infinite
+# matplotlib cannot draw larger values, which would be infinite in units of the axis
 LARGEST = 1e100
-# contact fabric is anisotropic for certain if its intensity is so many standard errors (about one
-# without any anisotropy), and turned if less than this part of it shows along the loading axis
+# Contact fabric is certainly anisotropic if its intensity is CERTAIN standard errors (without
+# anisotropy it is about one), and turned if less than ALONG of it shows along the loading axis.
 CERTAIN, ALONG = 5.0, 0.5
 
 
@@ -37,21 +37,21 @@ class Curve:
     x: FloatArray
     """Strain in per cent, or the number of the frame, shape (F,)."""
     rows: Rows
-    """What it is made of."""
+    """The rows of the curve."""
 
     def values(self, name: str) -> FloatArray:
-        """A column of the table, shape (F,); NaN where there is no number, or none to draw."""
+        """A column of the table, shape (F,); NaN where there is no number that can be drawn."""
         return _drawable(column_of(self.rows, name))
 
     def errors(self, name: str) -> FloatArray:
-        """Standard errors in a column; tables come from anywhere: a negative number is none."""
+        """Standard errors in a column; NaN where another program wrote a negative number."""
         return np.where(self.values(name) < 0, np.nan, self.values(name))
 
     def total_errors(self, name: str) -> FloatArray:
         """
-        Of ``alpha_vs_axial``, by scan and sample; of ``alpha_c_axial`` the sample's.
+        Errors of scan and sample for ``alpha_vs_axial``, of the sample for ``alpha_c_axial``.
 
-        A curve without the latter has the error of contacts that are independent.
+        Where the sample's error is not known, contacts are taken as independent.
         """
         if name == "alpha_c_axial" and self.contact_alone:
             return self.errors("alpha_c_axial_se")
@@ -87,7 +87,7 @@ def _drawable(array: FloatArray) -> FloatArray:
 
 def strain_column(rows: Rows) -> str | None:
     """
-    The column that tells how far the frames of all sources have deformed.
+    The column with the strain of all frames of all sources.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def strain_column(rows: Rows) -> str | None:
 
 
 def why_not_strain(rows: Rows) -> str | None:
-    """A hint if the axial strain of some source is no abscissa; None if all have one, or none."""
+    """A hint that some sources lack an axial strain; None if all have one, or none has."""
     lacking = _lacking(rows, "strain")
     if not lacking or not numbers_of(rows, "strain"):
         return None
@@ -144,7 +144,7 @@ def _lacking(rows: Rows, column: str) -> list[str]:
 
 
 def frame_strain_column(row: Mapping[str, Any]) -> str | None:
-    """The strain column of a single frame: one that is not 0 there, if any is."""
+    """The strain column of a single frame, preferably one that is not 0 there."""
     known = [name for name in STRAINS if number_of(row, name) is not None]
     moved = [name for name in known if abs(row[name]) >= SAME]
     return next(iter([*moved, *known]), None)
@@ -177,23 +177,23 @@ def spelt_strain(row: Mapping[str, Any], column: str | None, *, symbol: bool = F
 
 
 def abscissa_label(rows: Rows) -> str:
-    """What the abscissa is."""
+    """The label of the abscissa."""
     column = strain_column(rows)
     return "frame" if column is None else f"{' '.join(STRAINS[column])} in %"
 
 
 def abscissa_words(rows: Rows) -> str:
-    """The same in a sentence."""
+    """The abscissa as words in a sentence."""
     column = strain_column(rows)
     return "the number of the frame" if column is None else f"the {STRAINS[column][0]}"
 
 
 def is_turned(rows: Rows) -> bool:
     """
-    Whether the axial anisotropies miss the fabric, as its axes are not the loading axis.
+    Whether the axes of the fabric are not the loading axis, as in simple shear.
 
-    So it is in simple shear. The frame whose contacts are most certainly anisotropic tells; where
-    no frame is certain, rows that are drawn over the shear strain count as turned.
+    The axial anisotropies then miss most of the fabric. The frame whose contacts are most certainly
+    anisotropic decides; if none is, curves over the shear strain count as turned.
     """
     names = ("alpha_c", "alpha_c_axial", "alpha_c_axial_se", "alpha_vs")
     known = [row for row in rows if None not in [number_of(row, name) for name in names]]
@@ -207,7 +207,7 @@ def is_turned(rows: Rows) -> bool:
 
 
 def short_names(sources: Iterable[str], longest: int = LONGEST_NAME) -> dict[str, str]:
-    """Sources by the last part of their path, and not too long, where that tells them apart."""
+    """Short names of sources: the last part of the path, where that tells them apart."""
     sources = list(dict.fromkeys(sources))
     for kept in ([PurePath(source).name or source for source in sources], sources):
         names = [middle_out(name, longest) for name in kept]
@@ -219,7 +219,7 @@ def short_names(sources: Iterable[str], longest: int = LONGEST_NAME) -> dict[str
 
 
 def middle_out(name: str, longest: int) -> str:
-    """Both ends of a long name, as either may be what matters."""
+    """A long name without its middle, as either end may be what matters."""
     if len(name) <= longest:
         return name
     half = (longest - 3) // 2

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Rows = Iterable[Mapping[str, Any]]
 Columns = Sequence[Column]
 
-# cells of these columns stay words, even if they look like numbers: a source may be called 2024
+# cells of these columns stay texts even if they look like numbers: a source may be called 2024
 TEXT_COLUMNS = {one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind is str}
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
@@ -59,7 +59,7 @@ class TableFormat(Protocol):
 
 
 class OwnFormat:
-    """What the formats of the package share: they are told by the first characters of a file."""
+    """Base of the formats of the package, which are recognised by the first characters."""
 
     is_text = holds_lists = True
     start = b""
@@ -70,7 +70,7 @@ class OwnFormat:
 
 
 class SeparatedText(OwnFormat):
-    """CSV or TSV; any text that is no other format is read as one of them."""
+    """CSV or TSV; a text of no other format is read as one of the two."""
 
     holds_lists = False
 
@@ -128,45 +128,34 @@ def _text(data: bytes, name: str) -> str:
         raise ReadError(f"{name}: expected a table as text or Parquet, found other bytes") from None
 
 
-class JsonArray(OwnFormat):
-    """One array of objects."""
+class Json(OwnFormat):
+    """An object for each row, all in one array or each on a line of its own (JSON lines)."""
 
-    suffix = ".json"
-    description = "one array of objects; a missing value is null"
-    start = b"["
+    def __init__(self, suffix: str, start: bytes, description: str) -> None:
+        self.suffix, self.start, self.description = suffix, start, description
+        self.is_array = start == b"["
 
     def read(self, data: bytes, name: str) -> list[dict[str, Any]]:
         """The objects."""
+        text = _text(data, name)
         try:
-            rows = self._parsed(_text(data, name))
+            lines = [text] if self.is_array else filter(str.strip, text.split("\n"))
+            rows = [json.loads(line) for line in lines]
+            rows = list(rows[0]) if self.is_array else rows
         except (ValueError, RecursionError) as error:  # also an integer of too many digits
             raise ReadError(f"{name}: cannot be read as JSON: {error}") from None
         if not all(isinstance(row, dict) for row in rows):
             raise ReadError(f"{name}: expected JSON objects, one for each row")
         return rows
 
-    def _parsed(self, text: str) -> list[Any]:
-        return list(json.loads(text))
-
-    def write(self, stream: IO[str], rows: Rows, columns: Columns) -> None:
-        """Write an object a line between brackets."""
-        lines = ",\n".join(json_line(row) for row in rows)
-        stream.write(f"[\n{lines}\n]\n" if lines else "[]\n")
-
-
-class JsonLines(JsonArray):
-    """One object a line."""
-
-    suffix = ".jsonl"
-    description = "JSON lines: one object a line"
-    start = b"{"
-
-    def _parsed(self, text: str) -> list[Any]:
-        return [json.loads(line) for line in text.split("\n") if line.strip()]
-
     def write(self, stream: IO[str], rows: Rows, columns: Columns) -> None:
         """Write an object a line; there is no header."""
-        stream.writelines(json_line(row) + "\n" for row in rows)
+        lines = map(json_line, rows)
+        if not self.is_array:
+            stream.writelines(line + "\n" for line in lines)
+        else:
+            text = ",\n".join(lines)
+            stream.write(f"[\n{text}\n]\n" if text else "[]\n")
 
 
 def json_line(row: Mapping[str, Any]) -> str:
@@ -203,8 +192,8 @@ def data_frame(rows: Sequence[Mapping[str, Any]], columns: Columns) -> polars.Da
     """
     Rows, whose values are of Python's own kinds, as a data frame of polars.
 
-    A column has the kind that is declared, or, in tables of other programs, one that holds all its
-    values: fractions among the counts, words among the numbers.
+    A column has its declared kind. In tables of other programs, where fractions stand among counts
+    or words among numbers, it has a kind that holds all its values.
     """
     import polars
 
@@ -227,8 +216,8 @@ def data_frame(rows: Sequence[Mapping[str, Any]], columns: Columns) -> polars.Da
 OWN_FORMATS: tuple[TableFormat, ...] = (
     SeparatedText(".csv", ",", "comma-separated values; a missing value is an empty cell"),
     SeparatedText(".tsv", "\t", "the same with tabs"),
-    JsonArray(),
-    JsonLines(),
+    Json(".json", b"[", "one array of objects; a missing value is null"),
+    Json(".jsonl", b"{", "JSON lines: one object a line"),
     Parquet(),
 )
 
@@ -247,7 +236,7 @@ def foreign_formats() -> tuple[TableFormat, ...]:
 
 
 def known_formats() -> dict[str, TableFormat]:
-    """All formats by suffix; the own ones cannot be replaced."""
+    """All formats by suffix; other packages cannot replace those of this one."""
     return {one.suffix: one for one in (*OWN_FORMATS, *foreign_formats()[::-1], *OWN_FORMATS)}
 
 
@@ -261,7 +250,7 @@ def format_of(path: Path) -> TableFormat:
         If there is none.
     """
     suffix = path.suffix.lower()
-    # other packages are asked only where they are needed, which takes a while
+    # looking for the formats of other packages takes a while, so it is done only if needed
     found = {one.suffix: one for one in OWN_FORMATS}.get(suffix) or known_formats().get(suffix)
     if found is None:
         raise SettingsError(
@@ -283,7 +272,7 @@ def read_rows(path: Path | str, *, whole: bool = False) -> list[dict[str, Any]]:
     path : path
         A file, or ``-`` for standard input.
     whole : bool, optional
-        Refuse a text whose last line has no end: a number there reads well without its last digits.
+        Refuse a text whose last line has no end, as its last number may have lost digits.
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """
-The figures that are installed, and those of some data: ``table.plot``.
+The installed figures, and those that can be drawn of some data: ``table.plot``.
 
-Each is a class that registers under the entry point ``scanfab.figures``, so that this room needs no
-drawing, and more of them can come from anywhere; :mod:`scanfab.viz.figures.figure` says how.
+A figure is a class that a package registers under the entry point ``scanfab.figures``, so this
+room imports no drawing code; :mod:`scanfab.viz.figures.figure` says how to write one.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def installed_figures() -> dict[str, Any]:
 
 
 def figures_of(kind: str) -> dict[str, Any]:
-    """Those of a kind of data: ``table``, ``frames``, ``calibration`` or ``map``."""
+    """The figures of a kind of data: ``table``, ``frames``, ``calibration`` or ``map``."""
     return {name: one for name, one in installed_figures().items() if one.kind == kind}
 
 

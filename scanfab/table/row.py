@@ -1,4 +1,4 @@
-"""A row of a table, the numbers in its columns, and how people see rows in a session."""
+"""Rows of tables, the numbers in their columns, and how a session shows them."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from scanfab.base.typing import FloatArray
 
 Rows = Sequence[Mapping[str, Any]]
 
-# the repr of a row shows so many pairs of name and value on a line, each so wide
+# the repr of a row: width of a name with its value, and how many of them stand on a line
 WIDTH, PAIRS = 26, 3
-# the columns of a fabric table that are shown, with their titles; other tables show the first ones
+# columns of a fabric table that a session shows, with titles; other tables show their first ones
 SHOWN = {
     "source": "source",
     "frame": "frame",
@@ -37,7 +37,7 @@ ANISOTROPIES = ("alpha_vs_axial", "alpha_c_axial")
 # columns that are left out if all rows have the same value
 OFTEN_SAME = ("source", "strain", "shear_strain", "cutoff")
 MOST_COLUMNS = 8
-# so many rows are shown at each end of a long table
+# rows that are shown at each end of a long table
 ENDS = 5
 
 
@@ -116,7 +116,7 @@ class Row(Mapping[str, Any]):
         return [*super().__dir__(), *self]
 
     def __repr__(self) -> str:
-        # a fit needs the values without each octant, a reader does not
+        # the values without each octant serve fits and are of no interest here
         names = [name for name in self if "_without_" not in name and "_half_" not in name]
         spelt = {n: f"{v:.4g}" if isinstance(v := self[n], float) else repr(v) for n in names}
         cells = [f"{n}={text}".ljust(WIDTH) for n, text in spelt.items() if self[n] is not None]
@@ -125,31 +125,31 @@ class Row(Mapping[str, Any]):
 
 
 def is_number(value: object) -> bool:
-    """Whether a value is a finite number: no truth value, and no integer beyond all floats."""
+    """Whether a value is a finite number; a bool is not, nor an integer larger than any float."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return abs(value) <= sys.float_info.max
 
 
 def number_of(row: Mapping[str, Any], name: str) -> float | None:
-    """A row's number in a column that need not exist; None for anything else there."""
+    """A row's number in a column; None if the column is missing or holds something else."""
     value = row.get(name)
     return float(value) if is_number(value) else None  # type: ignore[arg-type]
 
 
 def numbers_of(rows: Iterable[Mapping[str, Any]], name: str) -> list[float]:
-    """The numbers of such a column."""
+    """The numbers in a column, without the rows that have none."""
     return [value for row in rows if (value := number_of(row, name)) is not None]
 
 
 def column_of(rows: Iterable[Mapping[str, Any]], name: str) -> FloatArray:
-    """Such a column as an array, with NaN where a row has no number."""
+    """A column as an array, with NaN where a row has no number."""
     return np.array([number_of(row, name) for row in rows], np.float64)
 
 
 def variant_of(row: Mapping[str, Any]) -> str:
     """
-    What tells the curves of a source apart: the variant, and the size of its RV if there are more.
+    The name of a curve of a source: the variant, and the size of its RV if there are several.
 
     Examples
     --------
@@ -171,7 +171,7 @@ def groups_of(rows: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], list[A
 
 def total_error(row: Mapping[str, Any], name: str) -> float | None:
     """
-    The standard error to quote beside an anisotropy: of the scan and of the sample together.
+    The standard error to quote beside an anisotropy, which combines scan and sample.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def total_error(row: Mapping[str, Any], name: str) -> float | None:
 
 
 def as_text(rows: Rows, names: Sequence[str]) -> str:
-    """A few lines: how many rows, and those at both ends."""
+    """The number of rows, and the rows at both ends."""
     lines = _lines(rows, names) if rows else []
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     padded = ["  ".join(map(str.rjust, line, widths)) for line in lines]
@@ -234,23 +234,21 @@ def with_error(value: float | None, error: float | None) -> str:
 
 def _lines(rows: Rows, names: Sequence[str]) -> list[list[str]]:
     """Titles, and the cells of each row; dots for the rows in the middle of a long table."""
+
+    def cell(row: Mapping[str, Any], name: str) -> str:
+        value = row.get(name)
+        if name in ANISOTROPIES:
+            # the error of the scan alone would say too little
+            return with_error(number_of(row, name), total_error(row, name))
+        return "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
+
     shown = list(names[:MOST_COLUMNS])
     if any(name in names for name in ANISOTROPIES):
         same = [name for name in OFTEN_SAME if len({row.get(name) for row in rows}) <= 1]
         shown = [name for name in SHOWN if name in names and name not in same]
     is_long = len(rows) > 2 * ENDS + 1
     at_ends = [*rows[:ENDS], *rows[-ENDS:]] if is_long else rows
-    lines = [[_cell(row, name) for name in shown] for row in at_ends]
+    lines = [[cell(row, name) for name in shown] for row in at_ends]
     if is_long:
         lines.insert(ENDS, ["..."] * len(shown))
     return [[SHOWN.get(name, name) for name in shown], *lines]
-
-
-def _cell(row: Mapping[str, Any], name: str) -> str:
-    value = row.get(name)
-    if name in ANISOTROPIES:
-        # the error of the scan alone would say too little
-        return with_error(number_of(row, name), total_error(row, name))
-    if isinstance(value, float):
-        return f"{value:.3g}"
-    return "-" if value is None else str(value)

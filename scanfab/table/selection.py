@@ -1,4 +1,4 @@
-"""Which rows of fabric tables to compare or report: checked, of one cut-off, each frame once."""
+"""Choosing the rows of fabric tables to compare or report: one cut-off, each frame once."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Rows = list[dict[str, Any]]
 NEEDED = ("source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_c_axial")
 NAMES = ("source", "variant")
 NUMBERS = tuple(one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind in (int, float))
-# columns that no fabric table has, and the table that they give away
+# columns that only other tables have, and how to call these tables
 OTHER_TABLES = {
     "alpha_vs_axial_norm": "a table of scanfab compare",
     "slope_origin": "the summary of scanfab compare",
     "difference": "the differences of scanfab compare",
     "at_surface": "a table of scanfab map",
 }
-# cut-offs that agree in three digits, as they are printed for people, are the same
+# cut-offs that agree in three digits, as they are printed, are the same
 ROUNDING = 5e-3
 
 
@@ -36,9 +36,9 @@ def choose_rows(
     labels: Sequence[str] | None = None,
 ) -> list[Rows]:
     """
-    The rows of fabric tables that stand side by side, for each table in order.
+    The rows of several fabric tables to compare, for each table in order.
 
-    Rows that an earlier table holds already count once, with a warning.
+    A row that an earlier table holds too is left out, with a warning.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def choose_rows(
     cutoff : float, optional
         Keep the rows of this cut-off, in the unit of the tables, to three digits.
     labels : sequence of str, optional
-        A name for each table in place of its source, so that two runs of one sample are two.
+        A name for each table in place of its source, to compare two runs of one sample.
 
     Raises
     ------
@@ -79,15 +79,19 @@ def choose_rows(
         if cutoff is not None:
             named[number] = name, _of_cutoff(name, rows, cutoff)
     if labels:
-        return [_labelled(rows, label) for (_, rows), label in zip(named, labels, strict=True)]
+        for (_, rows), label in zip(named, labels, strict=True):
+            several = len({row["source"] for row in rows}) > 1
+            for row in rows:
+                row["source"] = f"{label}, {row['source']}" if several else label
+        return [rows for _, rows in named]
     return _each_once(named)
 
 
 def check_rows(rows: Sequence[Mapping[str, Any]], table: str = "") -> None:
     """
-    SettingsError if rows are not those of a fabric table; names table, row and column.
+    SettingsError if rows are not those of a fabric table; it names table, row and column.
 
-    Tables come from anywhere: a word or a list among the numbers must not go on as one.
+    Other programs write tables too, so a word or a list may stand where a number should be.
     """
     before = f"{table}: " if table else ""
     for number, row in enumerate(rows, start=1):
@@ -111,7 +115,7 @@ def check_rows(rows: Sequence[Mapping[str, Any]], table: str = "") -> None:
 
 
 def _of_cutoff(name: str, rows: Rows, cutoff: float) -> Rows:
-    """The rows of one cut-off; of a frame without grains, which has none, one a variant."""
+    """The rows of one cut-off; frames without grains have no cut-off and keep a row a variant."""
     known = sorted({row["cutoff"] for row in rows if row.get("cutoff") is not None})
     nearest = min(known, key=lambda one: abs(one - cutoff), default=math.nan)
     if not abs(nearest - cutoff) <= ROUNDING * abs(nearest):
@@ -128,14 +132,8 @@ def _of_cutoff(name: str, rows: Rows, cutoff: float) -> Rows:
     return list(kept.values())
 
 
-def _labelled(rows: Rows, label: str) -> Rows:
-    """Rows by the label; the sources of a table of several stay behind it."""
-    several = len({row["source"] for row in rows}) > 1
-    return [{**row, "source": f"{label}, {row['source']}" if several else label} for row in rows]
-
-
 def _each_once(tables: Sequence[tuple[str, Rows]]) -> list[Rows]:
-    """Without the rows that an earlier table holds, however the path of the source is spelt."""
+    """Leaves out rows that an earlier table holds, however the path of their source is spelt."""
     known: dict[tuple[Any, ...], tuple[str, dict[str, Any]]] = {}
     chosen: list[Rows] = []
     for name, rows in tables:

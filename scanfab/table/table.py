@@ -1,4 +1,4 @@
-"""A table of rows: computed, read back from a file, or compared."""
+"""Tables: computed, read back from a file, or made by a comparison."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Table(Sequence[Row]):
     rows : iterable of mapping
         Values by column; missing values are None.
     columns : sequence of Column, optional
-        What they hold; by default as declared, or as their values are.
+        Their declarations; by default those of fabric tables, or kinds that follow from the values.
 
     Examples
     --------
@@ -84,7 +84,7 @@ class Table(Sequence[Row]):
     """
 
     columns: tuple[Column, ...]
-    """What each column is called and holds."""
+    """The declarations of the columns."""
 
     def __init__(
         self, rows: Iterable[Mapping[str, Any]] = (), columns: Sequence[Column] | None = None
@@ -134,7 +134,7 @@ class Table(Sequence[Row]):
 
     @property
     def plot(self) -> Plots:
-        """The figures that are installed: ``table.plot.evolution(ax=ax)`` draws one on its Axes."""
+        """The installed figures; ``table.plot.evolution(ax=ax)`` draws one on given Axes."""
         return Plots(self, "map" if "block" in self.names else "table")
 
     def select(self, **wanted: Any) -> Table:
@@ -301,7 +301,7 @@ class Table(Sequence[Row]):
 
 
 def _columns(rows: Sequence[Mapping[str, Any]]) -> tuple[Column, ...]:
-    """The columns of rows, as they are declared, or else by their values."""
+    """The columns of rows, as fabric tables declare them, or else by their values."""
     if not rows:
         return table_columns()
     columns = {column.name: column for column in (*table_columns(), *MORE_COLUMNS)}

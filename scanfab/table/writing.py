@@ -1,4 +1,4 @@
-"""Rows of a table to a stream or a file: which columns of them, and with how many digits."""
+"""Writing rows to a stream or a file, with chosen columns and digits."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Excerpt:
     """Which columns of a table are written, and with how many digits."""
 
     fields: tuple[str, ...] = ()
-    """In the order in which they are written; none: all, as the table has them."""
+    """Names of columns in the order in which they are written; if empty, all of the table."""
     digits: int = DEFAULT_DIGITS
-    """Significant ones, of floats; with 17 the shortest form that reads back the same."""
+    """Significant digits of floats; with 17 the shortest text that reads back the same."""
 
     @classmethod
     def make(
@@ -34,9 +34,9 @@ class Excerpt:
         digits: int = DEFAULT_DIGITS,
     ) -> Excerpt:
         """
-        What users ask for, of some columns.
+        An excerpt by the options of users.
 
-        ``fields`` are their names, one by one or separated by commas.
+        ``fields`` are names out of ``columns``, as a sequence or as a text with commas.
 
         Raises
         ------
@@ -66,30 +66,13 @@ class Excerpt:
                 raise SettingsError(f"fields: the column {name} is named more than once")
         return cls(names, digits)
 
-    def for_format(self, table_format: TableFormat, columns: Sequence[Column]) -> Excerpt:
-        """
-        The same without the columns of lists, for a format whose cells hold one value.
-
-        Raises
-        ------
-        SettingsError
-            If all that is asked for are lists.
-        """
-        if getattr(table_format, "holds_lists", False):
-            return self
-        kept = tuple(one.name for one in self.columns(columns) if one.kind is not list)
-        if columns and not kept:
-            lists = ", ".join(one.name for one in self.columns(columns))
-            raise SettingsError(f"fields: {lists} are lists of numbers: write .json or .jsonl")
-        return replace(self, fields=kept)
-
     def columns(self, columns: Sequence[Column]) -> list[Column]:
-        """Those that are written, in their order."""
+        """The columns that are written, in their order."""
         by_name = {column.name: column for column in columns}
         return [by_name[name] for name in self.fields or by_name]
 
     def of(self, row: Mapping[str, Any]) -> dict[str, Any]:
-        """The columns of a row that are written, by name."""
+        """The values of a row that are written, by column."""
         values = {name: plain(row[name]) for name in self.fields or row}
         for name, value in values.items():
             if isinstance(value, float):
@@ -99,13 +82,13 @@ class Excerpt:
         return values
 
     def asked(self) -> dict[str, Any]:
-        """What differs from the default, as a manifest lists it."""
+        """The options that differ from their defaults, for the manifest."""
         asked: dict[str, Any] = {"fields": list(self.fields)} if self.fields else {}
         return asked if self.digits == DEFAULT_DIGITS else {**asked, "digits": self.digits}
 
 
 def plain(value: Any) -> Any:
-    """A value as all formats can write it: of Python's own kinds, None for what is not finite."""
+    """A value as all formats can write it: numpy's as Python's, and None if it is not finite."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     if isinstance(value, list | tuple):
@@ -123,9 +106,20 @@ def write_to(
     columns: Sequence[Column],
     excerpt: Excerpt = ALL,
 ) -> None:
-    """Write rows to a stream, which is of text or of bytes, as the format has it."""
-    excerpt = excerpt.for_format(table_format, columns)
-    table_format.write(stream, map(excerpt.of, rows), excerpt.columns(columns))
+    """
+    Write rows to a stream, which is of text or of bytes, as the format has it.
+
+    A format whose cells hold one value leaves out the columns of lists; SettingsError if all that
+    is asked for are lists.
+    """
+    asked = excerpt.columns(columns)
+    if not getattr(table_format, "holds_lists", False):
+        kept = [one for one in asked if one.kind is not list]
+        if asked and not kept:
+            lists = ", ".join(one.name for one in asked)
+            raise SettingsError(f"fields: {lists} are lists of numbers: write .json or .jsonl")
+        asked, excerpt = kept, replace(excerpt, fields=tuple(one.name for one in kept))
+    table_format.write(stream, map(excerpt.of, rows), asked)
 
 
 def check_output(path: Path) -> None:
@@ -144,8 +138,8 @@ def write_rows(
     """
     Write a table to a file, which is complete or untouched.
 
-    Its manifest, if any, is written when the table is complete, just before the file appears: a
-    table that is there is finished. Without one that of an earlier table is removed.
+    A manifest is written when the table is complete, just before the file appears, so that a table
+    with a manifest is always finished. Without a manifest, that of an earlier table is removed.
     """
     check_output(path)
     table_format = format_of(path)

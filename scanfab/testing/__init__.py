@@ -1,4 +1,4 @@
-"""A conformance kit, by which readers and writers of packings from any package try themselves."""
+"""Checks for readers and writers of packings of any package."""
 
 from scanfab.testing.readers import check_reader
 from scanfab.testing.writers import check_writer, differences, made_up_packings

@@ -1,7 +1,7 @@
 """
-What every writer of packings must do: what it writes is read back, to the last bit.
+The check of writers of packings: what they write must be read back to the last bit.
 
-Packings that ask everything of a format, and in what two packings differ.
+Also packings that need everything of a format, and the differences of two packings.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from scanfab.packing.contacts import ContactList
 from scanfab.packing.packing import Packing
 from scanfab.packing.search import find_contacts
 
-# no decimal number has these ids
+# ids that no float can hold
 LARGE = 2**60 + 1
 
 
@@ -46,7 +46,7 @@ def check_writer(
     Raises
     ------
     AssertionError
-        That says what got lost.
+        If something was lost; the message says what.
 
     Examples
     --------
@@ -151,12 +151,28 @@ def differences(one: Packing, two: Packing) -> list[str]:
         Sentences; empty if they agree.
     """
     first, second = _values_of(one), _values_of(two)
-    found = (_difference(name, value, second.get(name)) for name, value in first.items())
-    return [difference for difference in found if difference]
+    found = []
+    for name, value in first.items():
+        other = second.get(name)
+        if value is None or other is None:
+            found += [] if value is other else [f"{name}: {value!r} and {other!r}"]
+            continue
+        mine, theirs = np.asarray(value), np.asarray(other)
+        if mine.shape != theirs.shape:
+            found.append(f"{name}: shapes {mine.shape} and {theirs.shape}")
+            continue
+        if "U" in (mine.dtype.kind, theirs.dtype.kind) and mine.size:
+            mine, theirs = mine.astype(str), theirs.astype(str)
+        same = (mine == theirs) | ((mine != mine) & (theirs != theirs))
+        if not np.all(same):
+            place = np.unravel_index(int(np.argmin(same)), mine.shape) if mine.shape else ()
+            where = tuple(map(int, place))
+            found.append(f"{name}: {mine[place]!r} and {theirs[place]!r} at {where}")
+    return found
 
 
 def _values_of(packing: Packing) -> dict[str, Any]:
-    """All that a packing holds, by the names of messages; None: it has no such thing."""
+    """All that a packing holds, by names for messages; None for what it does not have."""
     parts = {
         "": ("position", "radius", "id", "wall_contacts", "step", "time"),
         "cell": ("vectors", "origin", "periodic"),
@@ -168,19 +184,3 @@ def _values_of(packing: Packing) -> dict[str, Any]:
         owner = getattr(packing, part) if part else packing
         found |= {f"{part} {name}".strip(): getattr(owner, name, None) for name in names}
     return found | {f"column {name}": values for name, values in flat(packing.columns).items()}
-
-
-def _difference(name: str, one: Any, two: Any) -> str:
-    """In words; empty if there is none."""
-    if one is None or two is None:
-        return "" if one is two else f"{name}: {one!r} and {two!r}"
-    first, second = np.asarray(one), np.asarray(two)
-    if first.shape != second.shape:
-        return f"{name}: shapes {first.shape} and {second.shape}"
-    if "U" in (first.dtype.kind, second.dtype.kind) and first.size:
-        first, second = first.astype(str), second.astype(str)
-    same = (first == second) | ((first != first) & (second != second))
-    if np.all(same):
-        return ""
-    place = np.unravel_index(int(np.argmin(same)), first.shape) if first.shape else ()
-    return f"{name}: {first[place]!r} and {second[place]!r} at {tuple(map(int, place))}"

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.errors import SettingsError
@@ -18,6 +18,7 @@ from scanfab.io.sources import READING, open_sources
 from scanfab.pipeline.frames import of_whole
 from scanfab.pipeline.job import Job
 from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
+from scanfab.pipeline.record import asked_for
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.told import recorded
 from scanfab.table.table import Table, load
@@ -25,6 +26,7 @@ from scanfab.table.writing import Excerpt
 from scanfab.viz.paraview import vtk_folders
 
 Source = Series | PathLike
+T = TypeVar("T")
 
 
 def compute_file(
@@ -93,8 +95,8 @@ def compute_file(
     Warns
     -----
     ScanfabWarning, ScanfabNote
-        Doubts of frames, and frames that were skipped; the manifest lists them, also those that are
-        filtered away.
+        Doubts of frames, and frames that were skipped, when all is done; the manifest lists them,
+        also those that are filtered away.
 
     Examples
     --------
@@ -110,77 +112,55 @@ def compute_file(
     kind = MapSettings if is_map(options) else Settings
     known = [*READING, *(one.name for one in options_of(MapSettings))]
     refuse_unknown("compute_file", options, known)
-    if not is_map(options):
+    if kind is Settings:
         options = {name: one for name, one in options.items() if name not in BLOCK_OPTIONS}
     with recorded() as told:
-        series, sources, reading = _opened(source, options)
-        series, settings = _whole(series, kind(**options))
+        opened = _opened(source, options)
+        parts = [of_whole(one, kind(**options)) for one in opened]
+        settings = _same(one for _, one in parts)
+        sources = [name for one in opened for name in one.sources or (one.name,)]
+        reading = take_reading(dict(_same(one.reading for one in opened)))
         excerpt = Excerpt.make(settings.columns, fields, digits)
-        folders = () if vtk is None else vtk_folders(Path(vtk), len(series), settings, go_on=resume)
         job = Job(
-            series,
+            [one for one, _ in parts],
             settings,
+            asked_for(sources, reading, settings, excerpt),
             Path(output),
             excerpt,
-            sources=sources,
-            reading=reading,
             resume=resume,
             manifest_path=None if manifest is None else Path(manifest),
-            observers=folders,
+            observers=() if vtk is None else vtk_folders(Path(vtk), len(parts), settings, resume),
             told=told,
             executor=executor,
         )
-
-        def advance() -> None:
-            if progress is not None:
-                progress(job.done, job.frames())
-
         with job.begun():
-            job.write(advance)
+            job.write(lambda: progress and progress(job.done, job.frames()))
     return load(Path(output))
 
 
-def _opened(
-    source: Source | Sequence[Source], options: dict[str, Any]
-) -> tuple[list[Series], list[str], dict[str, Any]]:
-    """Series, with what they were opened by; its options are taken out of others."""
+def _opened(source: Source | Sequence[Source], options: dict[str, Any]) -> Sequence[Series]:
+    """The series of a source; the options of reading are taken out of others."""
     one = isinstance(source, Series | str | os.PathLike) or not isinstance(source, Iterable)
     given: list[Any] = [source] if one else list(source)  # type: ignore[arg-type]
     if given and all(isinstance(one, Series) for one in given):
-        return given, *_opened_before(given, options)
+        for name in {*READING} & {*options}:
+            raise SettingsError(f"{name}: the series is open already: hand it to `read_series`")
+        return given
     if not given or not all(isinstance(one, str | os.PathLike) for one in given):
         raise SettingsError(
             f"expected a Series or the path of dumps, or several of one kind, found {source!r}: "
             f"of packings, compute() makes a table, which has save()"
         )
-    sources = [os.fspath(path) for one in given for path in expanded(one)]
-    reading = take_reading(options)
-    return open_sources(sources, **reading), sources, reading
+    paths = [os.fspath(path) for one in given for path in expanded(one)]
+    return open_sources(paths, **take_reading(options))
 
 
-def _whole(series: Sequence[Series], settings: Settings) -> tuple[list[Series], Settings]:
-    """Whole series, and settings that choose the frames of the parts that were given."""
-    found = [of_whole(one, settings) for one in series]
-    chosen = found[0][1]
-    if any(one.frames != chosen.frames for _, one in found):
+def _same(found: Iterable[T]) -> T:
+    """What is the same for all series of one table, as its manifest names it once."""
+    first, *others = found
+    if any(one != first for one in others):
         raise SettingsError(
-            "the series of one table are to be parts of the same frames, as its manifest names "
-            "them once: compute them into tables of their own"
+            "the series of one table are to be read with the same options, and to be parts of the "
+            "same frames: compute them into tables of their own"
         )
-    return [one for one, _ in found], chosen
-
-
-def _opened_before(
-    series: Sequence[Series], options: dict[str, Any]
-) -> tuple[list[str], dict[str, Any]]:
-    """What ``read_series`` was given."""
-    for name in READING:
-        if name in options:
-            raise SettingsError(f"{name}: the series is open already: hand it to `read_series`")
-    reading = [take_reading(dict(one.reading)) for one in series]
-    if any(one != reading[0] for one in reading):
-        raise SettingsError(
-            "the series of one table are to be read with the same options, as its manifest names "
-            "them once: compute them into tables of their own"
-        )
-    return [source for one in series for source in one.sources or (one.name,)], reading[0]
+    return first

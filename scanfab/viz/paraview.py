@@ -1,20 +1,20 @@
-"""Computed frames as ParaView files: which kinds there are, and what each holds."""
+"""ParaView files: one a frame and kind, and one collection (.pvd) a kind that knows the times."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
 
 from scanfab.base.errors import SettingsError
-from scanfab.base.typing import FloatArray
+from scanfab.base.files import check_folder, whole_file
 from scanfab.fabric.distribution import direction_points, mean_length_function
-from scanfab.fabric.tensor import COMPONENTS
 from scanfab.packing.sample import VARIANTS
-from scanfab.packing.window import Window
 from scanfab.pipeline.frame import FrameResult
 from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.pipeline.measurement import Measurement
@@ -22,64 +22,21 @@ from scanfab.pipeline.settings import Settings
 from scanfab.scan.lines import line_triads
 from scanfab.scan.segments import Segments, sample_segments
 from scanfab.table.row import Row, number_of
-from scanfab.viz import vtk_files as vtk
-from scanfab.viz.scene import contact_lines, grains_of
+from scanfab.table.table import Table
+from scanfab.viz.scene import grains_of
 
 LINES = 120
 TEXT_FIELDS = ("source", "variant", "contacts_from", "edge")
+ENTRY = re.compile(r'<DataSet timestep="([^"]*)" file="([^"]*)"/>')
 
-
-class VtkFolder(vtk.Folder):
-    """ParaView files of one series, to be called with each of its computed frames."""
-
-    def __call__(self, result: FrameResult) -> None:
-        """Write all files of a frame."""
-        with self.lock:
-            windows = {_name("window", rv): one for rv, one in _windows(result)}
-            # of several RVs the largest, which holds the others
-            window = [None, *windows.values()][-1]
-            fields = _fields(result.rows)
-            self._save("grains", vtk.grain_mesh(grains_of(result.sample, window)), result, fields)
-            contacts = vtk.contact_mesh(contact_lines(result.sample, window))
-            self._save("contacts", contacts, result, fields)
-            for name, one in windows.items():
-                surface = vtk.window_mesh(one.center, one.shape)
-                self._save(name, surface, result, fields)
-            for row in result.rows:
-                self._save_variant(result, row)
-
-    def _save_variant(self, result: FrameResult, row: Row) -> None:
-        fields = _fields([row])
-        if not result.measurements:
-            return
-        rv = number_of(row, "rv")
-        measured, name = result.measured(row.variant, rv), _name(row.variant, rv)
-        center = measured.solids.origin
-        lines = scan_line_sample(measured, row.variant)
-        mesh = vtk.line_mesh(lines, measured.plan.cutoff)
-        self._save(f"lines-{name}", mesh, result, fields)
-        space = measured.plan.space
-        kept = measured.kept(row.variant)
-        function = mean_length_function(measured.sums.axes, *kept, space)
-        if function is not None and row.alpha_vs is not None:
-            points, weights = direction_points(space)
-            surface = vtk.distribution_mesh(points, function(points), weights, space)
-            self._save(f"distribution-{name}", surface, result, fields)
-        tensors = _tensors(row)
-        if tensors:
-            size = 0.3 * _reach(result)
-            mesh = vtk.ellipsoid_mesh(tensors, center, size, space)
-            self._save(f"ellipsoids-{name}", mesh, result, fields)
-            mesh = vtk.tensor_points(tensors, center)
-            self._save(f"tensors-{name}", mesh, result, fields)
-
-    def _save(self, kind: str, mesh: Any, result: FrameResult, fields: Mapping[str, Any]) -> None:
-        self.save(kind, mesh, result.number, time_of(result), fields)
+Fields = Mapping[str, Any]
+Meshes = Iterator[tuple[str, Any, Fields]]
+"""The kind of a mesh, the mesh, and its field data."""
 
 
 def vtk_folders(
     folder: Path, count: int, settings: Settings, go_on: bool
-) -> Sequence[VtkFolder | MapFolder]:
+) -> Sequence[Callable[[FrameResult], None]]:
     """
     The folders of so many series; if there are several, each has its own in the one.
 
@@ -90,80 +47,88 @@ def vtk_folders(
     """
     if settings.cutoffs:
         raise SettingsError("vtk: files for ParaView are of one cut-off: leave out `cutoffs`")
-    own = [folder / f"series-{number}" for number in range(1, count + 1)]
-    chosen = own if count > 1 else [folder]
-    if isinstance(settings, MapSettings):
-        return [MapFolder(one, go_on) for one in chosen]
-    return [VtkFolder(one, go_on) for one in chosen]
+    chosen = [folder]
+    if count > 1:
+        chosen = [folder / f"series-{number}" for number in range(1, count + 1)]
+    meshes_of = map_meshes if isinstance(settings, MapSettings) else frame_meshes
+    return [VtkFolder(one, go_on, meshes_of) for one in chosen]
 
 
-def _windows(result: FrameResult) -> Iterator[tuple[float | None, Window]]:
-    """The RVs of a frame with their sizes, if there are several to be told apart."""
-    for measured in result.measurements:
-        for rv in measured.plan.rvs[:1]:
-            if rv.window is not None:
-                yield rv.fraction, rv.window
+def frame_meshes(result: FrameResult) -> Meshes:
+    """The grains, contacts and RVs of a frame, and what each variant's scan says."""
+    from scanfab.viz import meshes
+
+    # only where there are several RVs does the name of a file tell which it is of
+    windows = {
+        _name("window", rv.fraction): rv.window
+        for measured in result.measurements
+        for rv in measured.plan.rvs[:1]
+        if rv.window is not None
+    }
+    # of several RVs the largest, which holds the others
+    window = [None, *windows.values()][-1]
+    fields = _fields(result.rows)
+    yield "grains", meshes.grain_mesh(grains_of(result.sample, window)), fields
+    yield "contacts", meshes.contact_mesh(result.sample, window), fields
+    for name, one in windows.items():
+        yield name, meshes.window_mesh(one.center, one.shape), fields
+    if result.measurements:
+        # ellipsoids of all variants have the size of the last one's
+        last = result.rows[-1]
+        measured = result.measured(last.variant, number_of(last, "rv"))
+        position, _, region = measured.spheres_of(VARIANTS[last.variant])
+        reach = region.reach if region else float(np.linalg.norm(position, axis=1).max())
+        for row in result.rows:
+            yield from _variant_meshes(result, row, 0.3 * reach)
 
 
-def _name(kind: str, rv: float | None) -> str:
-    """Of a file: with the size of the RV, where there are several."""
-    return kind if rv is None else f"{kind}-rv{rv:g}"
+def _variant_meshes(result: FrameResult, row: Row, size: float) -> Meshes:
+    from scanfab.viz import meshes
+
+    rv, fields = number_of(row, "rv"), _fields([row])
+    measured, name = result.measured(row.variant, rv), _name(row.variant, rv)
+    center, space = measured.solids.origin, measured.plan.space
+    lines = scan_line_sample(measured, row.variant)
+    yield f"lines-{name}", meshes.line_mesh(lines, measured.plan.cutoff), fields
+    mean_length = mean_length_function(measured.sums.axes, *measured.kept(row.variant), space)
+    if mean_length is not None and row.alpha_vs is not None:
+        points, weights = direction_points(space)
+        mesh = meshes.distribution_mesh(points, mean_length(points), weights, space)
+        yield f"distribution-{name}", mesh, fields
+    every = {kind: Table([row]).tensor(kind)[0] for kind in ("gvs", "gc")}
+    tensors = {kind: matrix for kind, matrix in every.items() if np.isfinite(matrix).all()}
+    if tensors:
+        mesh = meshes.ellipsoid_mesh(tensors, center, size, space)
+        yield f"ellipsoids-{name}", mesh, fields
+        yield f"tensors-{name}", meshes.tensor_points(tensors, center), fields
 
 
-def scan_line_sample(measured: Measurement, variant: str, lines: int = LINES) -> Segments:
+def scan_line_sample(measured: Measurement, variant: str) -> Segments:
     """A few scan lines along the loading axis and across it, in the dump's coordinates."""
-    axis = measured.plan.axis
     position, radius, window = measured.spheres_of(VARIANTS[variant])
     space = measured.plan.space
-    frame = line_triads(np.array([axis]), space)[0]
+    frame = line_triads(np.array([measured.plan.axis]), space)[0]
     # along the axis, and along the first direction across it
     across = line_triads(frame[:1], space)[0] if space.is_plane else np.roll(frame, -1, axis=0)
-    found = sample_segments(position, radius, np.stack([frame, across]), lines, window, space)
+    found = sample_segments(position, radius, np.stack([frame, across]), LINES, window, space)
     return replace(found, ends=found.ends + measured.solids.origin)
 
 
-class MapFolder(vtk.Folder):
-    """A folder of ParaView files, to be called with each frame of a map."""
+def map_meshes(result: FrameResult) -> Meshes:
+    """The blocks of each variant of a map as cells with all columns."""
+    from scanfab.viz import meshes
 
-    def __call__(self, result: FrameResult) -> None:
-        """The blocks of each variant as cells with all columns."""
-        if result.blocks is None:
-            return
-        with self.lock:
-            for variant in dict.fromkeys(row.variant for row in result.rows):
-                rows = [row for row in result.rows if row.variant == variant]
-                values = _fields(rows)
-                # what is the same in all blocks is no value of a cell
-                fields = {name: values.pop(name)[:1] for name in TEXT_FIELDS if name in values}
-                mesh = vtk.block_mesh(result.blocks[variant in "cd"], values)
-                self.save(f"map-{variant}", mesh, result.number, time_of(result), fields)
+    if result.blocks is None:
+        return
+    for variant in dict.fromkeys(row.variant for row in result.rows):
+        values = _fields([row for row in result.rows if row.variant == variant])
+        # what is the same in all blocks is no value of a cell
+        fields = {name: values.pop(name)[:1] for name in TEXT_FIELDS if name in values}
+        yield f"map-{variant}", meshes.block_mesh(result.blocks[variant in "cd"], values), fields
 
 
-def time_of(result: FrameResult) -> float:
-    """Time of the dump, else its step, else the frame's number."""
-    packing = result.sample.packing
-    known = [value for value in (packing.time, packing.step) if value is not None]
-    return float(known[0] if known else result.number)
-
-
-def _reach(result: FrameResult) -> float:
-    last = result.rows[-1]
-    measured = result.measured(last.variant, number_of(last, "rv"))
-    position, _, window = measured.spheres_of(VARIANTS[last.variant])
-    return window.reach if window else float(np.linalg.norm(position, axis=1).max())
-
-
-def _tensors(row: Row) -> dict[str, FloatArray]:
-    """The row's tensors that exist, shape (3, 3)."""
-    found = {}
-    for name in ("gvs", "gc"):
-        matrix = np.empty((3, 3))
-        for component, (i, j) in COMPONENTS.items():
-            value = getattr(row, f"{name}_{component}")
-            matrix[i, j] = matrix[j, i] = np.nan if value is None else value
-        if np.isfinite(matrix).all():
-            found[name] = matrix
-    return found
+def _name(kind: str, rv: float | None) -> str:
+    return kind if rv is None else f"{kind}-rv{rv:g}"
 
 
 def _fields(rows: list[Row]) -> dict[str, Any]:
@@ -175,7 +140,85 @@ def _fields(rows: list[Row]) -> dict[str, Any]:
             # VTK's texts are ASCII
             columns[name] = [str(v).encode("ascii", "backslashreplace").decode() for v in values]
         else:
-            columns[name] = np.array(
-                [np.nan if value is None else value for value in values], np.float64
-            )
+            columns[name] = np.array([np.nan if v is None else v for v in values], np.float64)
     return columns
+
+
+class VtkFolder:
+    """
+    A folder of the ParaView files of one series, to be called with each of its computed frames.
+
+    Parameters
+    ----------
+    folder : Path
+        Is made if it does not exist.
+    go_on : bool, optional
+        Keep the frames of an earlier run in the collections.
+    meshes_of : callable, optional
+        The meshes of a frame: :func:`frame_meshes` or :func:`map_meshes`.
+
+    Raises
+    ------
+    SettingsError
+        If the folder cannot be made or written to.
+    """
+
+    def __init__(self, folder: Path, go_on: bool = False, meshes_of: Any = frame_meshes) -> None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise SettingsError(f"vtk: {folder} cannot be made: {error.strerror}") from None
+        check_folder(folder / "grains.pvd")
+        self.folder, self.go_on, self.meshes_of = folder, go_on, meshes_of
+        # of each kind the time of each of its files
+        self._times: dict[str, dict[str, float]] = {}
+        # frames come from several threads, and VTK is not made for that
+        self._lock = Lock()
+
+    def __call__(self, result: FrameResult) -> None:
+        """Write all files of a frame, and the collections with it."""
+        packing = result.sample.packing
+        known = [one for one in (packing.time, packing.step, result.number) if one is not None]
+        with self._lock:
+            for kind, mesh, fields in self.meshes_of(result):
+                suffix = "vtu" if type(mesh).__name__ == "UnstructuredGrid" else "vtp"
+                file = f"{kind}_{result.number:06d}.{suffix}"
+                save_mesh(mesh, self.folder / file, fields)
+                self._collect(kind, file, float(known[0]))
+
+    def _collect(self, kind: str, file: str, time: float) -> None:
+        """Add a file to the collection of its kind, which is whole after each frame."""
+        path = self.folder / f"{kind}.pvd"
+        if kind not in self._times:
+            before = path.read_text("utf-8") if self.go_on and path.exists() else ""
+            self._times[kind] = {name: float(at) for at, name in ENTRY.findall(before)}
+        self._times[kind][file] = time
+        entries = sorted((at, name) for name, at in self._times[kind].items())
+        lines = [f'    <DataSet timestep="{at!r}" file="{name}"/>\n' for at, name in entries]
+        text = (
+            '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+            f"{''.join(lines)}  </Collection>\n</VTKFile>\n"
+        )
+        with whole_file(path) as part:
+            part.write_text(text, encoding="utf-8")
+
+
+def save_mesh(mesh: Any, path: Path, fields: Fields) -> None:
+    """
+    Write a mesh with field data; the file is complete or untouched.
+
+    A field with the name of an array of the mesh is called ``row_NAME``: viewers ask by name.
+    """
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
+
+    taken = {*mesh.point_data, *mesh.cell_data}
+    for name, values in fields.items():
+        mesh.field_data[f"row_{name}" if name in taken else name] = values
+    writer = vtkXMLUnstructuredGridWriter() if path.suffix == ".vtu" else vtkXMLPolyDataWriter()
+    writer.SetInputData(mesh)
+    writer.SetDataModeToBinary()
+    # into memory first, as VTK crashes when it writes to a full disk
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    with whole_file(path) as part:
+        part.write_text(writer.GetOutputString(), encoding="utf-8", newline="\n")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -22,7 +22,7 @@ from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.settings import Settings
 from scanfab.table.curves import spelt_strain, strain_column
 from scanfab.table.plots import Plots
-from scanfab.table.row import Row, number_of, variant_of
+from scanfab.table.row import Row, number_of, numbers_of, variant_of
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -82,47 +82,29 @@ def scan_frames(
     return ScannedFrames(source, Settings(**options), rows)
 
 
-@dataclass(frozen=True, eq=False)
 class ScannedFrame:
-    """One frame and variant, with its title."""
+    """One frame and variant, scanned: what figures draw of it."""
 
-    result: FrameResult
-    title: str
-    variant: str
-    rv: float | None
-    """The size of the variant's RV, where the scan is of several."""
-
-    @property
-    def number(self) -> int:
+    def __init__(self, result: FrameResult, variant: str, rv: float | None, title: str) -> None:
+        self.result, self.variant, self.title = result, variant, title
+        self.number = result.number
         """Of the frame, as in the table."""
-        return self.result.number
-
-    @property
-    def measurement(self) -> Measurement:
+        self.measurement: Measurement = result.measured(variant, rv)
         """What the scan says."""
-        return self.result.measured(self.variant, self.rv)
-
-    @property
-    def row(self) -> Row:
+        self.space: Space = self.measurement.plan.space
+        """The plane of the frame, if its grains are discs."""
+        self.row: Row = next(
+            row for row in result.rows if (row["variant"], row.get("rv")) == (variant, rv)
+        )
         """Of the variant, at the first cut-off."""
-        key = self.variant, self.rv
-        return next(row for row in self.result.rows if (row["variant"], row.get("rv")) == key)
-
-    @property
-    def smallest(self) -> float:
+        sample = result.sample
+        self.smallest = float(sample.packing.radius[sample.grains].min())
         """The radius of the smallest grain, dump's unit."""
-        sample = self.result.sample
-        return float(sample.packing.radius[sample.grains].min())
 
     @property
     def spheres(self) -> tuple[FloatArray, FloatArray, Convex | None]:
         """What a few lines of the variant meet, and the window that clips them."""
         return self.measurement.spheres_of(VARIANTS[self.variant])
-
-    @property
-    def space(self) -> Space:
-        """The plane of the frame, if its grains are discs."""
-        return self.measurement.plan.space
 
     @property
     def normals(self) -> FloatArray:
@@ -166,50 +148,35 @@ class ScannedFrames:
     def __init__(
         self, source: Packing | Series, settings: Settings, rows: Rows | None = None, note: str = ""
     ) -> None:
-        self.source = source
-        self.settings = settings
-        self.note = note
+        self.source, self.settings, self.note = source, settings, note
         self.variant = "c" if "c" in settings.variants else settings.variants[0]
         in_window = VARIANTS[self.variant].in_window
         self.rv = settings.rvs[-1] if len(settings.rvs) > 1 and in_window else None
-        self.rows: Rows | None = None
-        self._scanned: dict[str, list[ScannedFrame]] = {}
-        if rows is not None:
-            self.rows = [row for row in rows if variant_of(row) == self._told_apart]
-            self._refuse_none(self.rows)
+        # the size of the RV, where there are several, tells rows of one variant apart
+        self._kind = variant_of({"variant": self.variant, "rv": self.rv})
+        self.rows: Rows | None = None if rows is None else self._own(rows)
 
     @property
     def name(self) -> str:
         """Of the variant, and of the source if it has a name."""
-        source = Frames(self.source, self.settings).name
-        if self.rows:
-            source = str(self.rows[0]["source"])
-        return f"variant {self._told_apart}{f' of {source}' if source else ''}"
-
-    @property
-    def _told_apart(self) -> str:
-        """The variant, and the size of its RV if there are several."""
-        return variant_of({"variant": self.variant, "rv": self.rv})
+        source = self.rows[0]["source"] if self.rows else Frames(self.source, self.settings).name
+        return f"variant {self._kind}{f' of {source}' if source else ''}"
 
     @property
     def plot(self) -> Plots:
         """The figures of the frames: ``frames.plot.rose(ax=ax)`` draws one on its Axes."""
         return Plots(self, "frames")
 
-    @property
+    @cached_property
     def frames(self) -> list[ScannedFrame]:
         """The frames, of which the variant alone is scanned."""
-        return self._of(self.variant)
+        return self._scan(self.variant)
 
-    @property
+    @cached_property
     def with_lines_of_table(self) -> list[ScannedFrame]:
         """The same along the lines of the table, which all its variants share."""
-        return self._of(self.settings.variants)
-
-    def _of(self, variants: str) -> list[ScannedFrame]:
-        if variants not in self._scanned:
-            self._scanned[variants] = self._scan(variants)
-        return self._scanned[variants]
+        variants = self.settings.variants
+        return self.frames if variants == self.variant else self._scan(variants)
 
     def _scan(self, variants: str) -> list[ScannedFrame]:
         first, last = self._ends
@@ -218,31 +185,20 @@ class ScannedFrames:
         results: list[FrameResult] = []
         # frames are numbered in the whole series, also those of a part
         whole = self.source.whole if isinstance(self.source, Series) else self.source
-        computed = compute_rows(whole, settings, observe=results.append)
-        rows = [row for row in computed if variant_of(row) == self._told_apart]
-        self._refuse_none(rows)
-        # of the table: what is asked of a strain file now may be another
-        rows_of = {row["frame"]: row for row in self.rows or rows}
-        column = strain_column(self.rows or rows)
-        drawn = {row["frame"] for row in rows if row["alpha_vs_axial"] is not None}
-        return [
-            ScannedFrame(
-                self._with_all_threads(one),
-                self._title(rows_of[one.number], column),
-                self.variant,
-                self.rv,
-            )
-            for one in sorted(results, key=lambda result: result.number)
-            if one.number in drawn
-        ]
-
-    def _with_all_threads(self, result: FrameResult) -> FrameResult:
-        """A frame whose further scans have the threads that both frames have shared."""
-        workers = self.settings.workers
-        measurements = (
-            replace(one, plan=replace(one.plan, workers=workers)) for one in result.measurements
-        )
-        return replace(result, measurements=tuple(measurements))
+        rows = self._own(list(compute_rows(whole, settings, observe=results.append)))
+        # titles have the strains of the table: a strain file may have changed since
+        told = self.rows or rows
+        column, told_of = strain_column(told), {row["frame"]: row for row in told}
+        found = []
+        for row in rows:
+            if row["alpha_vs_axial"] is not None:
+                number = row["frame"]
+                strain = spelt_strain(told_of[number], column, symbol=True)
+                parts = (f"variant {self._kind}", f"frame {number}", strain)
+                result = next(one for one in results if one.number == number)
+                title = ", ".join(filter(None, parts))
+                found.append(ScannedFrame(result, self.variant, self.rv, title))
+        return found
 
     @cached_property
     def _ends(self) -> tuple[int, int]:
@@ -254,18 +210,14 @@ class ScannedFrames:
             numbers = [row["frame"] for row in filled]
         return min(numbers), max(numbers)
 
-    def _title(self, row: Mapping[str, Any], column: str | None) -> str:
-        """Variant, frame and, if the table has one, the strain."""
-        strain = spelt_strain(row, column, symbol=True)
-        parts = (f"variant {self._told_apart}", f"frame {row['frame']}", strain)
-        return ", ".join(filter(None, parts))
-
-    def _refuse_none(self, rows: Rows) -> None:
-        if all(number_of(row, "alpha_vs_axial") is None for row in rows):
+    def _own(self, rows: Rows) -> Rows:
+        """The rows of the variant; SettingsError if there is nothing to draw."""
+        own = [row for row in rows if variant_of(row) == self._kind]
+        if not numbers_of(own, "alpha_vs_axial"):
             raise SettingsError(
-                f"there is nothing to draw: no frame has a void fabric of variant "
-                f"{self._told_apart}"
+                f"there is nothing to draw: no frame has a void fabric of variant {self._kind}"
             )
+        return own
 
     def __repr__(self) -> str:
         first, last = self._ends

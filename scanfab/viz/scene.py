@@ -1,7 +1,8 @@
-"""What there is to see in a frame, as plain arrays: grains, contacts, lines; for every viewer."""
+"""A frame to be looked at, as plain arrays for every viewer: its grains, its RV, lines in a cut."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -9,16 +10,25 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.convex import Convex
+from scanfab.base.errors import Note, PackingError, ReadError, SettingsError, tell
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
+from scanfab.io.series import Series
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import Window
+from scanfab.pipeline.frames import Frames
+from scanfab.pipeline.plan import Plan, make_plan
+from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.strain import Strains, shear_strain
+from scanfab.pipeline.values import Vector
+from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.segments import Segments, cut_lines
+from scanfab.table.curves import SAME, frame_strain_column
 
 # between the lines of a section and the plane across the axis, degrees
 LINE_ANGLE = 30.0
-# of a colour, each of its parts: what tells clumps apart that are neighbours
+# neighbouring clumps are told apart by shades of their colour: the colour times one of these
 SHADES = (1.0, 0.8, 0.62)
 
 
@@ -54,31 +64,14 @@ class Grains:
 
 
 @dataclass(frozen=True, eq=False)
-class ContactLines:
-    """All contacts of a frame as branch vectors, M rows; lengths in the dump's unit."""
-
-    ends: FloatArray
-    """Both centres, shape (M, 2, 3); the second next to the first through periodic faces."""
-    normal: FloatArray
-    force: FloatArray | None
-    """On the second grain, shape (M, 3), dump's unit."""
-    boundary: BoolArray
-    """Whether a boundary particle takes part."""
-    in_window: BoolArray
-    """Whether the contact point lies in the RV."""
-
-
-@dataclass(frozen=True, eq=False)
 class Scene:
     """One frame to be looked at."""
 
     grains: Grains
     center: FloatArray
     """Of the RV, or of the grains without an RV, shape (3,)."""
-    window: Convex | None
-    """The RV about its centre, of several the largest; None without one."""
-    smaller: tuple[Convex, ...] = ()
-    """The others."""
+    windows: tuple[Convex, ...] = ()
+    """The RVs about their centre, in ascending order."""
     lines: Segments | None = None
     """A few scan lines, in the dump's coordinates."""
     cutoff: float = 0.0
@@ -88,21 +81,149 @@ class Scene:
     space: Space = SPACE
     """The plane in which all lies, if the grains are discs."""
 
+    @property
+    def window(self) -> Convex | None:
+        """The largest RV; None without one."""
+        return self.windows[-1] if self.windows else None
+
+    @property
+    def is_section(self) -> bool:
+        """Whether it is seen as the plane through the centre cuts it."""
+        return self.lines is not None or self.space.is_plane
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What there is to see and to say of one frame."""
+
+    scene: Scene
+    number: int
+    """Of the frame, counted from 0."""
+    sample: Sample
+    strains: dict[str, float | None]
+    """Axial and shear strain since the first frame that has grains, by the names of their columns
+    in the fabric table; None where that is not known."""
+    first: Sample | None
+    """The first frame that has grains, which fixes all lengths of the series."""
+    plan: Plan | None
+    """None if the settings do not fit the series."""
+    strain_column: str | None
+    """Which of the strains tells the frames of the series apart."""
+    axis: Vector
+    """Loading axis, a unit vector."""
+
+
+def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
+    """
+    One frame to be looked at; nothing is scanned.
+
+    Parameters
+    ----------
+    series : Series
+        The frames.
+    settings : Settings
+        Boundary, rattlers, RV, cut-off, axis and strain count.
+    number : int, optional
+        Which frame; negative from the end.
+
+    Raises
+    ------
+    ScanfabError
+        If there is no such frame, or it cannot be read.
+    """
+    # damaged frames are skipped, unless it is the frame that is asked for
+    frames = Frames(series, replace(settings, on_error="skip"))
+    frame = series[number]
+    sample = frames.read(frame)
+    tell(frames.notes(frame, sample))
+    found = frames.first()
+    first, plan = None if found is None else found[2], None
+    if first is not None:
+        with suppress(SettingsError):  # the plan tells what does not fit
+            settings = settings_in(settings, first.packing.space)
+        plan = _plan(first, settings)
+    if plan is not None and sample.grains.any():
+        plan = plan.in_frame(sample)
+    scene = scene_of(sample, *(() if plan is None else plan.windows))
+    if plan is not None:
+        scene = about_window(replace(scene, cutoff=plan.cutoff))
+    strains = _strains(frame.number, sample, first, settings)
+    column = frame_strain_column(strains)
+    if all(value is not None and abs(value) < SAME for value in strains.values()):
+        # before any strain has begun, the last frame tells which of the strains will
+        for last_number, last in reversed(list(frames)):
+            with suppress(PackingError, ReadError):
+                later = _strains(last_number, frames.read(last), first, settings)
+                column = frame_strain_column(later)
+                break
+    return Look(scene, frame.number, sample, strains, first, plan, column, settings.axis)
+
+
+def _plan(first: Sample, settings: Settings) -> Plan | None:
+    """The plan of the series; None, with a warning, if it cannot be made."""
+    try:
+        # a strain that cannot be measured matters only to an RV that follows it
+        strain = settings.strain if settings.rv_follows == "strain" else "auto"
+        plan = make_plan(replace(settings, strain=strain), first)
+    except SettingsError as error:
+        tell([Note("no_rv", f"the RV is not shown: {error}")])
+        return None
+    tell(plan.notes)
+    return plan
+
+
+def _strains(
+    number: int, sample: Sample, first: Sample | None, settings: Settings
+) -> dict[str, float | None]:
+    """Both strains as the fabric table has them; None also where one cannot be had."""
+    axial, shear = None, None
+    with suppress(SettingsError):
+        strains = Strains.of(settings)
+        axial = (strains if first is None else strains.since(first)).at(number, sample)["strain"]
+    if first is not None and sample.grains.any():
+        shear = shear_strain(sample.packing.cell, first.packing.cell)
+    return {"strain": axial, "shear_strain": shear}
+
 
 def scene_of(sample: Sample, *windows: Window) -> Scene:
     """The grains of a frame and its RVs, in ascending order, about one centre."""
-    window = windows[-1] if windows else None
-    chosen = sample.grains if sample.grains.any() else np.ones(len(sample.packing), bool)
+    packing, window = sample.packing, windows[-1] if windows else None
     center = np.zeros(3) if window is None else window.center
-    if window is None and len(sample.packing):
-        center = sample.packing.position[chosen].mean(axis=0)
-        if sample.packing.space.across is not None:
-            center[sample.packing.space.across] = sample.packing.place_across
-    cell = sample.packing.cell if sample.packing.is_periodic else None
-    shape = None if window is None else window.shape
-    smaller = tuple(one.shape for one in windows[:-1])
-    space = sample.packing.space
-    return Scene(grains_of(sample, window), center, shape, smaller, cell=cell, space=space)
+    if window is None and len(packing):
+        chosen = sample.grains if sample.grains.any() else np.ones(len(packing), bool)
+        center = packing.position[chosen].mean(axis=0)
+        if packing.space.across is not None:
+            center[packing.space.across] = packing.place_across
+    return Scene(
+        grains_of(sample, window),
+        center,
+        tuple(one.shape for one in windows),
+        cell=packing.cell if packing.is_periodic else None,
+        space=packing.space,
+    )
+
+
+def grains_of(sample: Sample, window: Window | None) -> Grains:
+    """The particles of a frame, with what the sample knows of them."""
+    packing, bodies = sample.packing, sample.packing.bodies
+    return Grains(
+        position=packing.position,
+        radius=packing.radius,
+        id=packing.id,
+        contacts=sample.contact_numbers,
+        rattler=sample.rattlers,
+        boundary=sample.boundary,
+        in_window=inside(packing.position if bodies is None else bodies.place, sample, window),
+        to_place=None if bodies is None else bodies.to_place(packing.position, packing.cell),
+        body=None if bodies is None else bodies.number,
+    )
+
+
+def inside(points: FloatArray, sample: Sample, window: Window | None) -> BoolArray:
+    """Which points lie in the RV; none without one."""
+    if window is None or len(points) == 0:
+        return np.zeros(len(points), bool)
+    return window.contains(points, sample.packing)
 
 
 def about_window(scene: Scene) -> Scene:
@@ -121,8 +242,10 @@ def about_window(scene: Scene) -> Scene:
     other = np.linalg.norm(images - nearest[row], axis=1) > 1e-6 * grains.radius[row]
     rows = np.concatenate([np.arange(len(nearest)), row[other]])
     position = np.concatenate([nearest, images[other]]) + scene.center
-    values = {one.name: getattr(grains, one.name) for one in fields(grains)}
-    shown: dict[str, Any] = {name: of if of is None else of[rows] for name, of in values.items()}
+    shown: dict[str, Any] = {
+        one.name: None if (values := getattr(grains, one.name)) is None else values[rows]
+        for one in fields(grains)
+    }
     shown["position"] = position
     moved = Grains(**shown)
     moved.in_window[:] = scene.window.contains(moved.places - scene.center)
@@ -166,41 +289,3 @@ def towards_viewer(up: FloatArray, space: Space) -> FloatArray:
         return space.normal if space.across != 1 else -space.normal
     toward: FloatArray = np.cross(np.eye(3)[np.argmin(np.abs(up))], up)
     return toward / np.linalg.norm(toward)
-
-
-def grains_of(sample: Sample, window: Window | None) -> Grains:
-    """The particles of a frame, with what the sample knows of them."""
-    packing, bodies = sample.packing, sample.packing.bodies
-    places = packing.position if bodies is None else bodies.place
-    return Grains(
-        position=packing.position,
-        radius=packing.radius,
-        id=packing.id,
-        contacts=sample.contact_numbers,
-        rattler=sample.rattlers,
-        boundary=sample.boundary,
-        in_window=_inside(places, sample, window),
-        to_place=None if bodies is None else bodies.to_place(packing.position, packing.cell),
-        body=None if bodies is None else bodies.number,
-    )
-
-
-def contact_lines(sample: Sample, window: Window | None) -> ContactLines:
-    """The contacts of a frame as lines between centres."""
-    packing, contacts = sample.packing, sample.contacts
-    first, second = packing.position[contacts.pairs].transpose(1, 0, 2)
-    if packing.cell is not None:
-        second = second + contacts.image @ packing.cell.vectors
-    return ContactLines(
-        ends=np.stack([first, second], axis=1),
-        normal=contacts.normal,
-        force=contacts.force,
-        boundary=~sample.contacts_without(sample.boundary),
-        in_window=_inside(contacts.point, sample, window),
-    )
-
-
-def _inside(points: FloatArray, sample: Sample, window: Window | None) -> BoolArray:
-    if window is None or len(points) == 0:
-        return np.zeros(len(points), bool)
-    return window.contains(points, sample.packing)

@@ -5,26 +5,38 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pyvista
+from vtkmodules.vtkRenderingCore import vtkActor2D, vtkCoordinate, vtkPolyDataMapper2D
 
 from scanfab.base.convex import Convex
 from scanfab.base.errors import ScanfabError
 from scanfab.base.files import whole_file
 from scanfab.base.typing import BoolArray, FloatArray
-from scanfab.viz.figures.style import COLOURS
-from scanfab.viz.overlay import SIZE, Framing, add_scale, add_words
-from scanfab.viz.scene import SHADES, Grains, Scene, towards_viewer
-from scanfab.viz.vtk_files import window_mesh
+from scanfab.viz.figures.style import COLOURS, rounded_down
+from scanfab.viz.meshes import window_mesh
+from scanfab.viz.scene import SHADES, Scene, towards_viewer
 
 ADVICE = (
     "install one of them: on Debian or Ubuntu apt-get install libegl1 libgl1 libosmesa6, or "
     "apt-get install xvfb and run the command under xvfb-run"
 )
+# of the picture, pixels
+SIZE = (1200, 900)
+# of the picture's height: above the sample words, below it the scale
+TOP, BOTTOM = 0.13, 0.07
+MARGIN = 0.02
+# size of letters that can still be read
+SMALLEST = 12
+# in shares of the picture: a disk of the legend, and the bar of the scale
+AROUND = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
+DISK = 0.0075 * np.column_stack([np.cos(AROUND), SIZE[0] / SIZE[1] * np.sin(AROUND)])
+BAR = np.array([[0.0, 0.03], [1.0, 0.03], [1.0, 0.036], [0.0, 0.036]])
 
 
 def check_screen() -> None:
@@ -43,6 +55,27 @@ def check_screen() -> None:
             "this machine has no screen for a window (DISPLAY is not set): "
             'write a picture instead: `screenshot="FILE.png"`'
         )
+
+
+def check_drawing() -> None:
+    """
+    Make sure that VTK can draw without a screen, in a process of its own: where it cannot, it may
+    crash instead of saying so.
+
+    Raises
+    ------
+    ScanfabError
+        If it cannot; says what to install.
+    """
+    code = (
+        "from vtkmodules.vtkRenderingCore import vtkRenderWindow; "
+        "import vtkmodules.vtkRenderingOpenGL2; "
+        "w = vtkRenderWindow(); w.SetOffScreenRendering(1); w.SetSize(8, 8); "
+        "w.Render()"
+    )
+    command = [sys.executable, "-c", code]
+    if subprocess.run(command, capture_output=True, check=False).returncode != 0:
+        raise ScanfabError(f"VTK finds no OpenGL, EGL or OSMesa library to draw with: {ADVICE}")
 
 
 def show_scene(
@@ -69,195 +102,106 @@ def show_scene(
     """
     if screenshot is not None:
         check_drawing()
-    from vtkmodules.vtkCommonCore import vtkLogger
-
     # VTK would write to standard error; errors tell what is wrong
-    before = vtkLogger.GetCurrentVerbosityCutoff()
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    try:
-        _show(scene, np.asarray(axis, dtype=np.float64), title, screenshot)
-    finally:
-        vtkLogger.SetStderrVerbosity(before)
+    with pyvista.vtk_verbosity("off"):
+        plotter: Any = pyvista.Plotter(
+            off_screen=screenshot is not None, window_size=list(SIZE), title=title or "scanfab"
+        )
+        _draw(plotter, scene, np.asarray(axis, dtype=np.float64), title)
+        if screenshot is None:
+            plotter.show()
+            return
+        try:
+            with whole_file(screenshot) as part:
+                plotter.screenshot(str(part))
+        finally:
+            plotter.close()
 
 
-def _show(scene: Scene, up: FloatArray, title: str, screenshot: Path | None) -> None:
-    import pyvista
-
-    plotter: Any = pyvista.Plotter(
-        off_screen=screenshot is not None, window_size=list(SIZE), title=title or "scanfab"
-    )
-    toward = towards_viewer(up, scene.space)
-    is_section = scene.lines is not None or scene.space.is_plane
-    look = toward if is_section else toward + 0.45 * np.cross(up, toward) + 0.35 * up
-    drawn = _drawn(scene, toward, look)
-    _add_grains(plotter, scene, drawn, toward)
-    for window in (scene.window, *scene.smaller):
-        if window is not None:
-            _add_window(plotter, scene, window, toward)
-    if scene.lines is not None:
-        _add_lines(plotter, scene)
-    _framing(scene, drawn, up, look).aim(plotter)
-    add_words(plotter, title, _words(scene))
-    add_scale(plotter)
-    plotter.enable_anti_aliasing("ssaa")
-    plotter.add_axes(line_width=3, color="black", viewport=(0.0, 0.0, 0.16, 0.2))
-    if screenshot is None:
-        plotter.show()
-        return
-    try:
-        with whole_file(screenshot) as part:
-            plotter.screenshot(str(part))
-    finally:
-        plotter.close()
-
-
-def check_drawing() -> None:
-    """
-    Make sure that VTK can draw without a screen, in a process of its own: where it cannot, it may
-    crash instead of saying so.
-
-    Raises
-    ------
-    ScanfabError
-        If it cannot; says what to install.
-    """
-    code = (
-        "from vtkmodules.vtkRenderingCore import vtkRenderWindow; "
-        "import vtkmodules.vtkRenderingOpenGL2; "
-        "w = vtkRenderWindow(); w.SetOffScreenRendering(1); w.SetSize(8, 8); "
-        "w.Render()"
-    )
-    command = [sys.executable, "-c", code]
-    if subprocess.run(command, capture_output=True, check=False).returncode != 0:
-        raise ScanfabError(f"VTK finds no OpenGL, EGL or OSMesa library to draw with: {ADVICE}")
-
-
-def classes(grains: Grains, has_window: bool) -> dict[str, tuple[str, BoolArray]]:
-    """What is told apart by colour: name, colour, and which grains."""
-    grain = ~grains.boundary
-    held = grain & ~grains.rattler
-    if not has_window:
-        found = {"grain": (COLOURS["sky"], held)}
-    else:
-        found = {
-            "grain in the RV": (COLOURS["sky"], held & grains.in_window),
-            "grain outside": ("#D2D7DB", held & ~grains.in_window),
-        }
-    found["rattler"] = (COLOURS["orange"], grain & grains.rattler)
-    return {name: value for name, value in found.items() if value[1].any()}
-
-
-def shades(
-    grains: Grains, kinds: dict[str, tuple[str, BoolArray]]
-) -> Iterator[tuple[str, BoolArray]]:
-    """The colours of these classes, each in some shades that tell neighbouring clumps apart."""
-    from pyvista import Color
-
-    for colour, kind in kinds.values():
-        if grains.body is None:
-            yield colour, kind
-            continue
-        for number, shade in enumerate(SHADES):
-            mixed = Color([part * shade for part in Color(colour).float_rgb])
-            yield mixed.hex_rgb, kind & (grains.shade == number)
-
-
-def _drawn(scene: Scene, toward: FloatArray, look: FloatArray) -> BoolArray:
-    """
-    Which grains are drawn.
-
-    Of a section those that reach behind its plane; else those in the RV, and of those outside,
-    which would hide it in front, the half behind its centre.
-    """
-    grains = scene.grains
-    branch = grains.position - scene.center
-    if scene.lines is not None or scene.space.is_plane:
-        shown = branch @ toward < grains.radius
-    elif scene.window is not None:
+def _draw(plotter: Any, scene: Scene, up: FloatArray, title: str) -> None:
+    """All that is seen, with the camera in its place."""
+    grains, window, toward = scene.grains, scene.window, towards_viewer(up, scene.space)
+    look = toward if scene.is_section else toward + 0.45 * np.cross(up, toward) + 0.35 * up
+    if scene.is_section:
+        shown = (grains.position - scene.center) @ toward < grains.radius
+    elif window is not None:
+        # in front of the RV's centre the grains outside would hide it
         shown = grains.in_window | ((grains.places - scene.center) @ look <= 0.0)
     else:
-        shown = np.ones(len(branch), bool)
-    return np.asarray(shown & ~grains.boundary)
+        shown = np.ones(len(grains.radius), bool)
+    shown &= ~grains.boundary
+    names = _add_grains(plotter, scene, shown, toward)
+    for one in reversed(scene.windows):
+        _add_window(plotter, scene, one, toward)
+    if scene.lines is not None:
+        names |= _add_lines(plotter, scene)
+    points, radius = grains.position[shown], grains.radius[shown]
+    if window is not None:
+        points, radius = np.vstack([points, scene.center]), np.append(radius, window.reach)
+    aim(plotter, points, radius, up, look)
+    add_words(plotter, title, names)
+    _add_scale(plotter)
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.add_axes(line_width=3, color="black", viewport=(0.0, 0.0, 0.16, 0.2))
 
 
-def _framing(scene: Scene, drawn: BoolArray, up: FloatArray, look: FloatArray) -> Framing:
-    """About all that is drawn."""
-    points, radius = scene.grains.position[drawn], scene.grains.radius[drawn]
-    if scene.window is not None:
-        points = np.vstack([points, scene.center])
-        radius = np.append(radius, scene.window.reach)
-    return Framing.about(points, radius, up, look)
+def _add_grains(plotter: Any, scene: Scene, shown: BoolArray, toward: FloatArray) -> dict[str, str]:
+    """
+    Balls, in a section cut by the plane through the centre; of discs only the plane.
 
-
-def _add_grains(plotter: Any, scene: Scene, drawn: BoolArray, toward: FloatArray) -> None:
-    """Balls; if the scene has lines, cut by the plane through the centre."""
+    Gives back the names of the legend with their colours.
+    """
     grains = scene.grains
+    grain, rattler = ~grains.boundary & ~grains.rattler, ~grains.boundary & grains.rattler
+    kinds = {
+        "grain in the RV": (COLOURS["sky"], grain & grains.in_window),
+        "grain outside": ("#D2D7DB", grain & ~grains.in_window),
+        "rattler": (COLOURS["orange"], rattler),
+    }
+    if scene.window is None:
+        kinds = {"grain": (COLOURS["sky"], grain), "rattler": kinds["rattler"]}
     height = (grains.position - scene.center) @ toward
-    is_section = scene.lines is not None or scene.space.is_plane
-    for colour, kind in shades(grains, classes(grains, scene.window is not None)):
-        chosen = kind & drawn
-        if not chosen.any():
-            continue
-        if is_section:
-            _add_section(
-                plotter,
-                grains,
-                chosen & (height > -grains.radius),
-                height,
-                toward,
-                colour if scene.space.is_plane and scene.lines is None else _pale(colour),
-            )
-        if scene.space.is_plane:
-            continue
-        balls = _balls(grains.position[chosen], grains.radius[chosen])
-        if is_section:
-            balls = balls.clip(normal=toward, origin=scene.center)
-        plotter.add_mesh(balls, color=colour, smooth_shading=True, ambient=0.2, specular=0.2)
-
-
-def _pale(colour: str) -> str:
-    """Of a section, paler than the balls behind it."""
-    import pyvista
-
-    light = 0.45 * np.array(pyvista.Color(colour).float_rgb) + 0.55
-    return str(pyvista.Color(light.tolist()).hex_rgb)
-
-
-def _balls(position: FloatArray, radius: FloatArray) -> Any:
-    import pyvista
-
-    cloud = pyvista.PolyData(position)
-    cloud.point_data["diameter"] = 2.0 * radius
-    # fewer triangles for large samples
-    fineness = 24 if len(radius) < 5_000 else 12
-    ball = pyvista.Sphere(radius=0.5, theta_resolution=fineness, phi_resolution=fineness)
-    return cloud.glyph(geom=ball, scale="diameter", orient=False)
-
-
-def _add_section(
-    plotter: Any,
-    grains: Grains,
-    chosen: BoolArray,
-    height: FloatArray,
-    toward: FloatArray,
-    colour: str,
-) -> None:
-    """The disks in which a plane cuts grains; of discs themselves."""
-    import pyvista
-
-    if not chosen.any():
-        return
-    cloud = pyvista.PolyData(grains.position[chosen] - height[chosen, None] * toward)
-    cloud.point_data["diameter"] = 2.0 * np.sqrt(grains.radius[chosen] ** 2 - height[chosen] ** 2)
+    is_pale = not scene.space.is_plane or scene.lines is not None
     disk = pyvista.Disc(inner=0.0, outer=0.5, normal=toward, c_res=48)
-    disks = cloud.glyph(geom=disk, scale="diameter", orient=False)
-    plotter.add_mesh(disks, color=colour, lighting=False)
+    for colour, kind in kinds.values():
+        for number, shade in enumerate(SHADES):
+            chosen = kind & shown & (grains.shade == number)
+            tint = _mixed(colour, shade)
+            cut = chosen & (height > -grains.radius)
+            if scene.is_section and cut.any():
+                places = grains.position[cut] - height[cut, None] * toward
+                radius = np.sqrt(grains.radius[cut] ** 2 - height[cut] ** 2)
+                disks = _glyphs(places, radius, disk)
+                # paler than the balls behind it
+                flat = _mixed(tint, 0.45, 0.55) if is_pale else tint
+                plotter.add_mesh(disks, color=flat, lighting=False)
+            if chosen.any() and not scene.space.is_plane:
+                # fewer triangles for large samples
+                fine = 24 if chosen.sum() < 5_000 else 12
+                ball = pyvista.Sphere(radius=0.5, theta_resolution=fine, phi_resolution=fine)
+                balls = _glyphs(grains.position[chosen], grains.radius[chosen], ball)
+                if scene.is_section:
+                    balls = balls.clip(normal=toward, origin=scene.center)
+                plotter.add_mesh(balls, color=tint, smooth_shading=True, ambient=0.2, specular=0.2)
+    return {name: colour for name, (colour, kind) in kinds.items() if kind.any()}
+
+
+def _mixed(colour: str, share: float, white: float = 0.0) -> str:
+    """A colour times a share, with so much white."""
+    return str(
+        pyvista.Color([share * part + white for part in pyvista.Color(colour).float_rgb]).hex_rgb
+    )
+
+
+def _glyphs(places: FloatArray, radius: FloatArray, shape: Any) -> Any:
+    """A shape of diameter 1, as large as each radius says, at each place."""
+    cloud = pyvista.PolyData(places)
+    cloud.point_data["diameter"] = 2.0 * radius
+    return cloud.glyph(geom=shape, scale="diameter", orient=False)
 
 
 def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) -> None:
     """An RV's surface; in a section its outline."""
-    import pyvista
-
     center = tuple(scene.center)
     if scene.lines is None and not window.is_flat:
         surface = window_mesh(scene.center, window, nsub=5)
@@ -276,10 +220,8 @@ def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) 
     plotter.add_mesh(outline, color=COLOURS["blue"], lighting=False)
 
 
-def _add_lines(plotter: Any, scene: Scene) -> None:
-    """Void segments as tubes: kept and dropped."""
-    import pyvista
-
+def _add_lines(plotter: Any, scene: Scene) -> dict[str, str]:
+    """Void segments as tubes, kept and dropped; names of the legend with their colours."""
     lines = scene.lines
     assert lines is not None
     kept = lines.void & (lines.length >= scene.cutoff)
@@ -289,12 +231,99 @@ def _add_lines(plotter: Any, scene: Scene) -> None:
             segments = pyvista.line_segments_from_points(lines.ends[chosen].reshape(-1, 3))
             tubes = segments.tube(radius=thickness)
             plotter.add_mesh(tubes, color=COLOURS[colour], lighting=False)
+    return {"void segment kept": COLOURS["black"], "dropped": COLOURS["vermilion"]}
 
 
-def _words(scene: Scene) -> dict[str, str]:
-    """Names of the legend, each with its colour."""
-    found = classes(scene.grains, scene.window is not None)
-    names = {name: colour for name, (colour, _) in found.items()}
-    if scene.lines is not None:
-        names |= {"void segment kept": COLOURS["black"], "dropped": COLOURS["vermilion"]}
-    return names
+def aim(
+    plotter: Any, points: FloatArray, radius: FloatArray, up: FloatArray, look: FloatArray
+) -> None:
+    """
+    Place the camera of a parallel view that balls fill, below the words and above the scale.
+
+    Parameters
+    ----------
+    plotter : pyvista.Plotter
+        Its camera looks at the balls.
+    points, radius : ndarray, shapes (N, 3) and (N,)
+        Their centres and radii, dump's unit; without any the picture is of the origin.
+    up, look : ndarray, shape (3,)
+        Upwards, and towards the camera; need not be at right angles.
+    """
+    if len(points) == 0:
+        points, radius = np.zeros((1, 3)), np.ones(1)
+    toward = look / np.linalg.norm(look)
+    right = np.cross(up, toward)
+    right /= np.linalg.norm(right)
+    upright = np.cross(toward, right)
+    frame = np.stack([right, upright, toward])
+    at = points @ frame.T
+    low, high = (at - radius[:, None]).min(axis=0), (at + radius[:, None]).max(axis=0)
+    width, height, _ = high - low
+    # half the picture's height: the sample, with the words above and the scale below it
+    half = 0.5 * max(height / (1.0 - TOP - BOTTOM), width * SIZE[1] / SIZE[0] / 0.96)
+    middle = 0.5 * (low + high) + np.array([0.0, (TOP - BOTTOM) * half, 0.0])
+    middle[2] = at[:, 2].mean()
+    middle = middle @ frame
+    plotter.enable_parallel_projection()
+    plotter.camera_position = [middle + 10.0 * half * toward, middle, upright]
+    plotter.camera.parallel_scale = half
+    plotter.reset_camera_clipping_range()
+
+
+def add_words(plotter: Any, title: str, names: Mapping[str, str]) -> None:
+    """Title and legend above the sample: dark words, each name beside a disk of its colour."""
+    words = _write(plotter, title, MARGIN, 1.0 - 0.055, 12)
+    font, box = words.GetTextProperty(), [0.0] * 4
+    words.GetBoundingBox(plotter.renderer, box)
+    while box[1] - box[0] > (1.0 - 2.0 * MARGIN) * SIZE[0] and font.GetFontSize() > SMALLEST:
+        font.SetFontSize(font.GetFontSize() - 1)
+        words.GetBoundingBox(plotter.renderer, box)
+    place = MARGIN
+    for name, colour in names.items():
+        _fill(plotter, DISK + np.array([place + 0.008, 1.0 - 0.088]), colour)
+        _write(plotter, name, place + 0.022, 1.0 - 0.1, 10)
+        place += 0.045 + 0.0118 * len(name)
+
+
+def _add_scale(plotter: Any) -> None:
+    """A bar with its length in the dump's unit; it follows the zoom of a window."""
+    words = _write(plotter, "", 0.0, 0.055, 10)
+    bar = _fill(plotter, BAR, "black")
+
+    def update(*_: object) -> None:
+        across = 2.0 * plotter.camera.parallel_scale * SIZE[0] / SIZE[1]
+        length = rounded_down(0.2 * across)
+        left = 1.0 - MARGIN - length / across
+        bar.points[:, 0] = np.where(BAR[:, 0] > 0.5, 1.0 - MARGIN, left)
+        bar.points[:, 1] = BAR[:, 1]
+        bar.Modified()
+        words.SetInput(f"{length:g}")
+        words.SetPosition(left, 0.045)
+
+    update()
+    plotter.camera.AddObserver("ModifiedEvent", update)
+
+
+def _write(plotter: Any, text: str, x: float, y: float, size: int) -> Any:
+    """Words at a place in shares of the window, from the lower left."""
+    return plotter.add_text(
+        text, position=(x, y), viewport=True, font_size=size, color="black", font="arial"
+    )
+
+
+def _fill(plotter: Any, corners: FloatArray, colour: str) -> Any:
+    """A polygon, in the same shares; returned, so that it can be moved."""
+    shape = pyvista.PolyData(
+        np.column_stack([corners, np.zeros(len(corners))]),
+        faces=[len(corners), *range(len(corners))],
+    )
+    shares = vtkCoordinate()
+    shares.SetCoordinateSystemToNormalizedViewport()
+    mapper = vtkPolyDataMapper2D()
+    mapper.SetInputData(shape)
+    mapper.SetTransformCoordinate(shares)
+    actor = vtkActor2D()
+    actor.SetMapper(mapper)
+    actor.GetProperty().SetColor(*pyvista.Color(colour).float_rgb)
+    plotter.renderer.AddActor(actor)
+    return shape

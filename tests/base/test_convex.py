@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from scanfab import SettingsError, box, cylinder, direction_rule, ellipsoid, sphere
-from scanfab.base.shapes import Hull
+from scanfab.base.bodies import Hull
 from tests.helpers.lattices import rotation
 from tests.helpers.windows import cut_ball, hull_of, leaning
 

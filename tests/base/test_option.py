@@ -12,7 +12,7 @@ from scanfab.base.option import number, one_of, option, optional, options_of, ta
 
 @dataclass(frozen=True)
 class Weather:
-    wind_speed: float = option(group="sample", default=3.0)
+    wind_speed: float = option(group="sample", default=3.0, metavar="KNOTS")
     """How hard it blows."""
     rain: int | None = option(group="scan", spelling="--wet", metavar="N|auto")
     """

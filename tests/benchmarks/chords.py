@@ -1,8 +1,7 @@
-"""The sweep of one direction against its floor, a list per line, and Embree."""
+"""The sweep of one direction against its floor and Embree, and what a scan's options cost."""
 
 from __future__ import annotations
 
-import ctypes
 import shutil
 import subprocess
 import tempfile
@@ -10,15 +9,21 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numba import njit
+from scipy.spatial import ConvexHull
 
-from scanfab.base.shapes import sphere
+from scanfab.base.convex import Convex
+from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron, sphere
+from scanfab.scan.directions import DirectionRule
+from scanfab.scan.edges import EDGES
+from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.lines import line_triads
+from scanfab.scan.scan import ScanSums, scan_lines
 from scanfab.scan.solids import Solids
-from tests.benchmarks.packings import PAPER, dense, solids_near
-from tests.benchmarks.scans import CLOSE, CUTOFF, ONE_AXIS, sweep
+from tests.benchmarks.packings import PAPER, copied, dense, solids_near, tenth
 from tests.benchmarks.timing import interleaved, table
 
 HERE = Path(__file__).parent
@@ -26,6 +31,16 @@ HERE = Path(__file__).parent
 DIRECTIONS = 16
 EMBREE = "Embree 3, 16 rays a packet, all hits"
 FLOOR = "floor: only the square roots (Numba)"
+
+
+CLOSE, CUTOFF = 0.05, 0.5
+ONE_AXIS = DirectionRule("one", np.array([[0.36, 0.48, 0.8]]), np.ones(1), None, turned=False)
+
+
+def sweep(solids: Solids, variants: str = "c", directions: int = 1, **options: Any) -> ScanSums:
+    """A scan with one replicate for each direction."""
+    options = {"spacing": CLOSE, "cutoff": CUTOFF, **options}
+    return scan_lines(solids, ONE_AXIS, variants=variants, replicates=range(directions), **options)
 
 
 def rv_solids() -> Solids:
@@ -81,58 +96,6 @@ def floor(u, v, radius, first, spacing, lines, window):
     return total, count
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def list_chords(u, v, depth, radius, first, spacing, lines, window, filled, starts, ends):
-    """Put each line's chords behind one another; with no room for them, only count."""
-    for k in range(u.size):
-        low, high = chord_rows(v[k], radius[k], first, spacing, lines)
-        for row in range(low, high):
-            y = first + row * spacing
-            left, right, reach2 = chord_span(u[k], v[k], radius[k], y, first, spacing, window)
-            for line in range(row * lines + left, row * lines + right):
-                if starts.size > 0:
-                    du = first - u[k] + spacing * (line - row * lines)
-                    half = np.sqrt(max(reach2 - du * du, 0.0))
-                    starts[filled[line]] = depth[k] - half
-                    ends[filled[line]] = depth[k] + half
-                filled[line] += 1
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def merge(starts, ends, half, cutoff):
-    """Length and number of the kept gaps of a line."""
-    length, kept, solid = 0.0, 0, -half
-    for k in np.argsort(starts):
-        gap = min(starts[k], half) - solid
-        if gap >= cutoff:
-            length, kept = length + gap, kept + 1
-        solid = max(solid, ends[k])
-    if half - solid >= cutoff:
-        length, kept = length + half - solid, kept + 1
-    return length, kept
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def list_per_line(u, v, depth, radius, first, spacing, lines, window, cutoff):
-    """Lists of the chords of every line, sorted and merged; length and number of kept gaps."""
-    filled, none = np.zeros(lines * lines, np.int64), np.empty(0)
-    list_chords(u, v, depth, radius, first, spacing, lines, window, filled, none, none)
-    stops = np.cumsum(filled)
-    filled = stops - filled
-    starts, ends = np.empty(stops[-1]), np.empty(stops[-1])
-    list_chords(u, v, depth, radius, first, spacing, lines, window, filled, starts, ends)
-    length, kept, begin = 0.0, 0, 0
-    for line in range(lines * lines):
-        x, y = first + line % lines * spacing, first + line // lines * spacing
-        half2 = window * window - x * x - y * y
-        if half2 > 0.0:
-            part = slice(begin, stops[line])
-            found = merge(starts[part], ends[part], np.sqrt(half2), cutoff)
-            length, kept = length + found[0], kept + found[1]
-        begin = stops[line]
-    return length, kept
-
-
 class Projected:
     """The spheres along the axis, and the grid over the window."""
 
@@ -151,30 +114,6 @@ class Projected:
         with ThreadPoolExecutor(threads) as pool:
             return list(pool.map(lambda _: self.floor(), range(DIRECTIONS)))
 
-    def list_per_line(self):
-        return list_per_line(self.u, self.v, self.depth, self.radius, *self.grid, CUTOFF)
-
-
-def floor_in_c(projected: Projected, folder: Path):
-    """The same loop compiled by gcc; None if there is none."""
-    if shutil.which("gcc") is None:
-        return None
-    library = folder / "floor.so"
-    # the order of a sum may be any, as for Numba
-    flags = ["-O3", "-march=native", "-fno-math-errno", "-fassociative-math", "-fno-signed-zeros"]
-    flags += ["-fno-trapping-math", "-ffinite-math-only", "-shared", "-fPIC"]
-    command = ["gcc", *flags, str(HERE / "floor.c"), "-o", str(library), "-lm"]
-    subprocess.run(command, check=True)
-    function = ctypes.CDLL(str(library)).floor_c
-    double = ctypes.c_double
-    function.restype = double
-    arrays = [
-        one.ctypes.data_as(ctypes.c_void_p) for one in (projected.u, projected.v, projected.radius)
-    ]
-    first, spacing, lines, window = projected.grid
-    rest = (double(first), double(spacing), ctypes.c_long(lines), double(window))
-    return lambda: function(ctypes.c_long(projected.u.size), *arrays, *rest)
-
 
 def embree(projected: Projected, folder: Path):
     """A way that returns Embree's own seconds, without the time to load; None if there is none."""
@@ -191,20 +130,16 @@ def embree(projected: Projected, folder: Path):
 
 
 def chords(repeats: int) -> str:
-    """One direction in one thread: the scan, its floor, a list per line, and Embree."""
+    """One direction in one thread: the scan, its floor, and Embree."""
     solids = rv_solids()
     projected = Projected(solids)
     count = projected.floor()[1]
     ways = {
         "scanfab, variant c": partial(sweep, solids),
         FLOOR: projected.floor,
-        "list per line, sorted and merged (Numba)": projected.list_per_line,
     }
     note = f"\n\n{len(solids.radius):,} grains reach into the RV; {count:,} chords."
     with tempfile.TemporaryDirectory() as name:
-        in_c = floor_in_c(projected, Path(name))
-        if in_c is not None:
-            ways["the same floor in C, gcc -O3 -march=native"] = in_c
         seconds = interleaved(ways, repeats, clock=time.process_time)
         rays = embree(projected, Path(name))
         if rays is None:
@@ -231,4 +166,49 @@ def threads(repeats: int) -> str:
     return table(["two threads", "of one"], [(n, f"{one:.2f}") for n, one in gain.items()])
 
 
-SECTIONS = {"chords": chords, "threads": threads}
+def shapes() -> dict[str, Convex]:
+    """Windows of one volume, that of a sphere of ten mean radii."""
+    corners = np.random.default_rng(0).normal(size=(20, 3))
+    corners /= np.linalg.norm(corners, axis=1, keepdims=True)
+    found = {
+        "cube": box([1.0, 1.0, 1.0]),
+        "cylinder, oblique": cylinder(1.0, 4.0, [1, 2, 3]),
+        "ellipsoid": ellipsoid([1.0, 1.0, 2.0]),
+        "polyhedron of 36 faces": polyhedron(corners, ConvexHull(corners).simplices)[0],
+    }
+    volume = sphere(10.0).volume
+    return {
+        name: shape.deformed(np.cbrt(volume / shape.volume) * np.eye(3))
+        for name, shape in found.items()
+    }
+
+
+def scans(repeats: int) -> str:
+    """What a chord costs by variants, edge rule and window, and in a cell that repeats."""
+    position, radius, edge = copied(2)
+    removed = tenth(len(radius))
+    medium = CellGrains(position, radius, removed, np.diag([edge] * 3), np.ones(3, bool))
+    ball, rules = sphere(10.0), [f"RV of 10 mean radii, `{rule}`" for rule in EDGES]
+    solids = {
+        "all grains, a": (Solids(position, radius, removed), "a"),
+        "all grains, ab": (Solids(position, radius, removed), "ab"),
+        "the same in a cell that repeats, ab": (
+            Solids(position, radius, removed, None, medium), "ab",
+        ),
+        **{name: (solids_near(ball, rule), "c") for name, rule in zip(rules, EDGES, strict=True)},
+        **{f"{name} of its volume": (solids_near(one), "c") for name, one in shapes().items()},
+    }  # fmt: skip
+    columns = []
+    for spacing, directions in ((CLOSE, 2), (1.5, 800)):
+        words: Any = {"spacing": spacing, "directions": directions}
+        ways = {name: partial(sweep, *one, **words) for name, one in solids.items()}
+        chords = {name: int(way().chords.sum()) for name, way in ways.items()}
+        # `start` has chords beyond the window as well, which count as its cost
+        chords |= dict.fromkeys(rules, chords[rules[0]])
+        seconds = interleaved(ways, repeats, clock=time.process_time)
+        columns.append([f"{1e9 * seconds[name] / chords[name]:.2f}" for name in ways])
+    titles = ["scan", f"ns a chord, lines {CLOSE} mean radii apart", "1.5 mean radii apart"]
+    return table(titles, list(zip(solids, *columns, strict=True)))
+
+
+SECTIONS = {"chords": chords, "threads": threads, "scans": scans}

@@ -21,7 +21,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-MODULES = ("chords", "scans", "scaling", "startup", "reading")
+MODULES = ("chords", "scaling", "startup", "reading")
 PACKAGES = ("scanfab", "numpy", "numba", "polars")
 
 

@@ -50,12 +50,6 @@ def interleaved(*words: Any, **options: Any) -> dict[str, float]:
     return {name: float(np.median(one)) for name, one in samples(*words, **options).items()}
 
 
-def over_first(seconds: Mapping[str, float]) -> list[tuple[str, str]]:
-    """Rows of a table: each way, and how many times as long as the first it takes."""
-    first = next(iter(seconds.values()))
-    return [(name, f"{value / first:.2f}") for name, value in seconds.items()]
-
-
 def table(titles: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     """A Markdown table."""
     lines = [titles, ["---"] * len(titles), *rows]

@@ -17,7 +17,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from functools import partial
 from pathlib import Path
 from random import Random
 
@@ -29,70 +28,52 @@ FRAMES = 12
 WORDS = ("compute", "dumps", "--tolerance", "2e-3", "--quiet", "-o", "t.csv")
 
 
-class Campaign:
-    """Runs in one folder, which are to give the same bytes."""
-
-    def __init__(self, folder: Path, seed: int) -> None:
-        self.folder = folder
-        self.random = Random(seed)
-        write_series(folder / "dumps", FRAMES)
-        assert self.run("--workers", "1").wait() == 0
-        self.expected = self.taken()
-
-    def run(self, *words: str) -> subprocess.Popen[str]:
-        return subprocess.Popen(
-            [*PROGRAM, *WORDS, *words], cwd=self.folder, stderr=subprocess.PIPE, text=True
-        )
-
-    def taken(self) -> bytes:
-        """The bytes of the table, which is removed."""
-        path = self.folder / "t.csv"
-        data = path.read_bytes()
-        path.unlink()
-        (self.folder / "t.csv.manifest.json").unlink()
-        return data
-
-    def fault(self, code: int, said: str) -> str | None:
-        """What is wrong with an ended run."""
-        if code != 0:
-            return f"exit code {code}: {said}"
-        return None if self.taken() == self.expected else "OTHER bytes"
-
-    def cluster(self, name: str) -> DaskCluster:
-        (self.folder / name).mkdir()
-        return DaskCluster(self.folder / name)
-
-    def workers_killed(self, cluster: DaskCluster, number: int) -> str | None:
-        """One run, in whose course one to three workers are killed."""
-        deaths = self.random.randint(1, 3)
-        process = self.run("--scheduler-file", str(cluster.file))
-        for _ in range(deaths):
-            time.sleep(self.random.uniform(0.0, 3.0))
-            cluster.kill(self.random.randrange(len(cluster.workers)))
-            cluster.add()
-        return self.fault(*ended(process))
-
-    def scheduler_killed(self, number: int) -> str | None:
-        """One run that loses its scheduler, and goes on with another."""
-        with self.cluster(f"scheduler-{number}") as first:
-            process = self.run("--scheduler-file", str(first.file))
-            time.sleep(self.random.uniform(2.0, 6.0))
-            first.kill_scheduler()
-            code, said = ended(process)
-        if code == 1:  # 0: it was faster than the signal
-            with self.cluster(f"scheduler-{number}-next") as second:
-                code, said = ended(self.run("--resume", "--scheduler-file", str(second.file)))
-        return self.fault(code, said)
-
-
 def main(worker_runs: int = 50, scheduler_runs: int = 10, seed: int = 0) -> int:
     """The number of runs whose bytes differ."""
-    with tempfile.TemporaryDirectory() as folder:
-        campaign = Campaign(Path(folder), seed)
-        with campaign.cluster("workers") as cluster:
-            killed = partial(campaign.workers_killed, cluster)
-            wrong = count_wrong("workers killed", worker_runs, killed)
-        return wrong + count_wrong("scheduler killed", scheduler_runs, campaign.scheduler_killed)
+    random = Random(seed)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_series(folder / "dumps", FRAMES)
+
+        def run(*words: str) -> subprocess.Popen[str]:
+            command = [*PROGRAM, *WORDS, *words]
+            return subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True)
+
+        def taken() -> bytes:
+            data = (folder / "t.csv").read_bytes()
+            for one in folder.glob("t.csv*"):
+                one.unlink()
+            return data
+
+        def fault(code: int, said: str) -> str | None:
+            if code != 0:
+                return f"exit code {code}: {said}"
+            return None if taken() == expected else "OTHER bytes"
+
+        def workers_killed(number: int) -> str | None:
+            process = run("--scheduler-file", str(workers.file))
+            for _ in range(random.randint(1, 3)):
+                time.sleep(random.uniform(0.0, 3.0))
+                workers.kill(random.randrange(len(workers.workers)))
+                workers.add()
+            return fault(*ended(process))
+
+        def scheduler_killed(number: int) -> str | None:
+            with DaskCluster(folder / f"scheduler-{number}") as first:
+                process = run("--scheduler-file", str(first.file))
+                time.sleep(random.uniform(2.0, 6.0))
+                first.kill_scheduler()
+                code, said = ended(process)
+            if code == 1:  # 0: it was faster than the signal
+                with DaskCluster(folder / f"scheduler-{number}-next") as second:
+                    code, said = ended(run("--resume", "--scheduler-file", str(second.file)))
+            return fault(code, said)
+
+        assert ended(run("--workers", "1"))[0] == 0
+        expected = taken()
+        with DaskCluster(folder / "workers") as workers:
+            wrong = count_wrong("workers killed", worker_runs, workers_killed)
+        return wrong + count_wrong("scheduler killed", scheduler_runs, scheduler_killed)
 
 
 if __name__ == "__main__":

@@ -135,7 +135,7 @@ class _Execution:
         self.fuzzing, self.reader, self.out, self.folder = fuzzing, reader, out, folder
         self.counter = os.open(folder / "count", os.O_WRONLY)
         self.printed = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115
-        self.count, self.peak = 0, _peak()
+        self.count = 0
 
     def __call__(self, data: bytes) -> None:
         fuzzing = self.fuzzing
@@ -149,36 +149,17 @@ class _Execution:
         path.write_bytes(data[2:])
         options = fuzzing.OPTIONS[data[1] % len(fuzzing.OPTIONS)]
         began = time.monotonic()
-        said: list[bytes] = []
         try:
             with _silence(self.printed) as said:
                 fuzzing.read_everything(path, self.reader, options)
+            if said:
+                raise fuzzing.ForbiddenError(f"printed: {said[0][:200]!r}")
+            if time.monotonic() - began > SECONDS / 2:
+                raise fuzzing.ForbiddenError("slow")
         except (Exception, SystemExit) as error:
             _keep(self.out, data, path.suffix, error)
         finally:
             path.unlink()
-        self._check(data, path.suffix, time.monotonic() - began, b"".join(said))
-
-    def _check(self, data: bytes, suffix: str, seconds: float, said: bytes) -> None:
-        """Nothing printed, not slow, and no memory: libFuzzer asks for it once a second only."""
-        more = _peak() - self.peak
-        problems = {
-            f"printed: {said[:200]!r}": bool(said),
-            f"slow: {seconds:.0f} s": seconds > SECONDS / 2,
-            f"memory: {more} MB": more > MEGABYTES,
-        }
-        for problem, is_there in problems.items():
-            if is_there:
-                _keep(self.out, data, suffix, self.fuzzing.ForbiddenError(problem))
-        if more > MEGABYTES:
-            os._exit(1)  # the peak never falls
-
-
-def _peak() -> int:
-    """The most memory that the process ever asked for, touched or not, in MB."""
-    with open("/proc/self/status") as status:
-        line = next(line for line in status if line.startswith("VmPeak"))
-    return int(line.split()[1]) >> 10
 
 
 def _keep(out: Path, data: bytes, suffix: str, error: BaseException) -> None:
@@ -205,8 +186,6 @@ def _keep(out: Path, data: bytes, suffix: str, error: BaseException) -> None:
 def _silence(file) -> Iterator[list[bytes]]:
     """What Python or C++ prints meanwhile is listed."""
     said: list[bytes] = []
-    sys.stdout.flush()
-    sys.stderr.flush()
     kept = {number: os.dup(number) for number in (1, 2)}
     for number in kept:
         os.dup2(file.fileno(), number)
@@ -220,8 +199,7 @@ def _silence(file) -> Iterator[list[bytes]]:
             os.close(copy)
         file.seek(0)
         said += filter(None, [file.read()])
-        file.seek(0)
-        file.truncate()
+        file.truncate(0)
 
 
 if __name__ == "__main__":

@@ -1,36 +1,25 @@
-"""Every kind of bad input: the message, the exit code, and the untouched output."""
+"""Bad input: the message, the exit code, and what is left of the result."""
 
 from __future__ import annotations
 
 import errno
-import gzip
 import os
 import re
 import shlex
 import shutil
 import subprocess
-import sys
 import time
 import tracemalloc
 from functools import partial
-from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from scanfab.base import plugins
-from scanfab.io import reader
-from scanfab.pipeline.part import PartFile
-from tests.helpers.dumps import (
-    cubic_rows,
-    dump_text,
-    write,
-)
+from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.interruptions import PROGRAM
 
 SCAN = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin")
-BOX = ((0, 4),) * 3
 HEADER = 9
 """Lines before the first grain."""
 
@@ -45,8 +34,7 @@ def refusal(compute, tmp_path_factory):
     """The one message of a command that fails, with nothing printed and FILE untouched."""
 
     def say(*words):
-        output = tmp_path_factory.mktemp("out") / "table.csv"
-        output.write_text("precious")
+        output = write(tmp_path_factory.mktemp("out") / "table.csv", "precious")
         answers = {compute(*words, *more, code=1) for more in ((), ("-o", output))}
         ((out, err),) = answers
         assert out == ""
@@ -61,8 +49,8 @@ def refusal(compute, tmp_path_factory):
 
 def grains(folder: Path, rows=None, name="dump_0.txt", **options) -> Path:
     """A dump of a small cube of grains, or of the given rows."""
-    text = dump_text(cubic_rows() if rows is None else rows, box=BOX, **options)
-    return write(folder / name, text)
+    rows = cubic_rows() if rows is None else rows
+    return write(folder / name, dump_text(rows, box=((0, 4),) * 3, **options))
 
 
 def changed(column: int, value: object) -> list[tuple[object, ...]]:
@@ -72,47 +60,33 @@ def changed(column: int, value: object) -> list[tuple[object, ...]]:
     ]
 
 
-# the text of a dump
+def _cut(share, text):
+    return text[: int(share * len(text))].encode()
 
 
-@pytest.mark.parametrize(
-    ("column", "value", "words"),
-    [
-        *((column, value, f"grain 7.*{value}") for column in (2, 5) for value in ("nan", "-inf")),
-        (3, "abc", f"line {HEADER + 7}: expected a number in the column y, found 'abc'"),
-        (5, 0, "grain 7: the radius"),
-        (5, -0.5, "grain 7: the radius"),
-        (0, 8, "the id 8 occurs twice"),
-    ],
-)
-def test_a_value_that_cannot_be_names_file_and_grain(tmp_path, refusal, column, value, words):
-    file = grains(tmp_path, changed(column, value))
-    assert re.search(f"{file}.*{words}", refusal(file))
-
-
-def _cut(share, data):
-    return data[: int(share * len(data))]
-
-
-def _line(words, data):
-    lines = data.splitlines(keepends=True)
-    return b"".join([*lines[:33], words, *lines[34:]])
+def _line(words, text):
+    lines = text.splitlines()
+    return "\n".join([*lines[:33], words, *lines[34:]]).encode()
 
 
 @pytest.mark.parametrize(
     ("damage", "words"),
     [
         *((partial(_cut, share), "") for share in (0.3, 0.7, 0.99)),
-        (lambda data: b"".join(data.splitlines(keepends=True)[:HEADER]), "counts 64 rows"),
-        (partial(_line, b"7 1 0.5\n"), ", line 34: "),
-        (partial(_line, b"7 1 0.5 0.5 0.5 0.5 0.5\n"), ", line 34: "),
-        (lambda data: gzip.compress(data)[:600], ""),
-        (lambda data: np.random.default_rng(0).bytes(10_000), ""),
+        (partial(_line, "7 1 0.5"), ", line 34: "),
+        (partial(_line, "7 1 0.5 0.5 0.5 0.5 0.5"), ", line 34: "),
+        (partial(_line, "25 1 nan 0.5 0.5 0.5"), "grain 25.*nan"),
+        (partial(_line, "25 1 0.5 0.5 0.5 -inf"), "grain 25.*-inf"),
+        (partial(_line, "25 1 0.5 abc 0.5 0.5"), "line 34: expected a number in the column y, "),
+        (partial(_line, "25 1 0.5 0.5 0.5 0"), "grain 25: the radius"),
+        (partial(_line, "25 1 0.5 0.5 0.5 -0.5"), "grain 25: the radius"),
+        (partial(_line, "24 1 0.5 0.5 0.5 0.5"), "the id 24 occurs twice"),
+        (lambda text: np.random.default_rng(0).bytes(10_000), ""),
     ],
 )
-def test_damaged_text_names_the_file(tmp_path, refusal, damage, words):
+def test_a_damaged_dump_names_the_file_and_the_place(tmp_path, refusal, damage, words):
     file = grains(tmp_path)
-    file.write_bytes(damage(file.read_bytes()))
+    file.write_bytes(damage(file.read_text()))
     assert re.search(f"{file}.*{words}", refusal(file))
 
 
@@ -133,27 +107,19 @@ def test_a_count_that_is_too_large_is_refused_at_once(tmp_path, refusal, count):
     assert most < 50e6
 
 
-# folders and series
-
-
 @pytest.mark.parametrize(
-    ("names", "lines"),
+    ("names", "words"),
     [
         ([], [": the folder holds no files"]),
         (["one_0.txt", "one_1.txt", "two_0.txt"], ["/one_*.txt", "/two_0.txt"]),
-        (
-            ["dump_1.txt", "dump_1_big.txt", "dump_2.txt", "dump_2_big.txt"],
-            ["/dump_1.txt FOLDER/dump_2.txt", "/dump_*_big.txt"],
-        ),
         (["dump_7.txt", "dump_07.txt"], ["/dump_07.txt", "/dump_7.txt"]),
     ],
 )
-def test_a_folder_without_a_series_or_with_several(tmp_path, refusal, names, lines):
+def test_a_folder_without_a_series_or_with_several(tmp_path, refusal, names, words):
     for name in names:
         grains(tmp_path, name=name)
     message = refusal(tmp_path)
-    for line in lines:
-        assert f"{tmp_path}{line}".replace("FOLDER", str(tmp_path)) in message
+    assert all(f"{tmp_path}{word}" in message for word in words)
 
 
 @pytest.fixture
@@ -184,9 +150,6 @@ def test_a_broken_frame_can_be_skipped_also_the_first(partly_broken, compute, wo
     assert {row["frame"] for row in compute(partly_broken, *words, code=1).rows} == {"2"}
 
 
-# what does not fit the sample
-
-
 def test_one_grain_far_away_is_too_far_for_the_whole_alone(tmp_path, refusal, compute):
     file = grains(tmp_path, changed(4, 4000.0))
     assert "far away from all others" in refusal(file)
@@ -195,41 +158,19 @@ def test_one_grain_far_away_is_too_far_for_the_whole_alone(tmp_path, refusal, co
     assert found.rows[0]["grains"] == compute(grains(tmp_path), "--variants", "c").rows[0]["grains"]
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--rv-radius", "1", "--rv-center", "50", "2", "2"], "holds no grain"),
-        (["--rv-radius", "2", "--rv-center", "6", "2", "2"], "beyond the sample"),
-        (["--rv-radius", "4"], "beyond the sample"),
-        (["--rv", "70"], "--rv, which is a fraction"),
-    ],
-)
-def test_an_rv_without_grains_or_larger_than_the_sample(tmp_path, refusal, options, words):
-    message = refusal(grains(tmp_path), *options)
-    assert message.startswith("the RV (radius ")
-    assert words in message
-    assert "--rv-center" in message
-
-
 def test_an_rv_at_the_surface_is_a_warning(tmp_path, compute):
     file = grains(tmp_path, cubic_rows(8))
     told = [compute(file, "--rv", rv).err for rv in ("0.9", "0.7")]
     assert ["comes within one of the largest radii" in one for one in told] == [True, False]
 
 
-def test_a_boundary_on_a_missing_column_names_those_that_exist(tmp_path, refusal):
-    message = refusal(grains(tmp_path), "--boundary", "mask=3")
-    assert "--boundary: there is no column 'mask'; the columns are id, radius" in message
-
-
 def test_a_boundary_that_is_everything(tmp_path, compute):
-    """Known only at the end: the first frames of a series may be of boundary alone."""
     output = write(tmp_path / "table.csv", "precious")
     words = (grains(tmp_path), "--boundary", "type=1")
     printed, written = compute(*words, code=1), compute(*words, "-o", output, code=1)
     for answer in (printed, written):
         assert "error: --boundary: type=1 selects all particles" in answer.err
-    assert [row["alpha_vs"] for row in printed.rows] == [""] * 4
+    assert printed.rows == []
     assert output.read_text() == "precious"
 
 
@@ -242,27 +183,19 @@ def test_a_cut_off_that_no_segment_reaches_leaves_empty_cells(tmp_path, compute)
     assert answer.err.count("did you mean 1rmin?") == 1
 
 
-def test_only_rattlers_leave_variant_b_empty(tmp_path, compute):
-    answer = compute(grains(tmp_path), "--min-contacts", "99", "--variants", "ab")
-    whole, without = answer.rows
+def test_grains_that_are_removed_leave_no_void_fabric_and_no_solid(tmp_path, compute):
+    answer = compute(grains(tmp_path), "--min-contacts", "99", "--variants", "abd")
+    whole, without, inside = answer.rows
     assert whole["alpha_vs"] != ""
     assert without["alpha_vs"] == without["coordination"] == without["alpha_c"] == ""
     assert (without["grains"], without["rattlers"], without["contacts"]) == ("0", "64", "0")
-    assert "variant b: no grain is left, all 64 are rattlers" in answer.err
-
-
-def test_one_grain_leaves_no_void_and_no_solid_if_it_is_removed(tmp_path, compute):
-    file = grains(tmp_path, [cubic_rows()[0]])
-    answer = compute(file, "--variants", "abc", code=1)
-    assert {row["alpha_vs"] for row in answer.rows} == {""}
+    assert (inside["solid_fraction"], inside["alpha_vs"], inside["mean_length"]) == ("0.0", "", "")
     assert "nan" not in answer.out.lower()
-    removed = compute(file, "--variants", "d", code=1)
-    assert removed.rows[0]["solid_fraction"] == "0.0"
-    assert removed.rows[0]["alpha_vs"] == removed.rows[0]["mean_length"] == ""
-    assert "variant d: no grain is left" in removed.err
-
-
-# the machine
+    assert "variant b: no grain is left, all 64 are rattlers" in answer.err
+    assert "variant d: no grain is left, all 33 that reach into the RV" in answer.err
+    alone = compute(grains(tmp_path, cubic_rows()[:1]), "--variants", "abc", code=1)
+    assert {row["alpha_vs"] for row in alone.rows} == {""}
+    assert "nan" not in alone.out.lower()
 
 
 @pytest.mark.parametrize(
@@ -283,18 +216,6 @@ def test_what_nobody_may_read_or_write(tmp_path, compute, monkeypatch, where, na
     assert not (tmp_path / "table.csv").exists()
 
 
-def test_a_full_disk_leaves_the_old_result(tmp_path, compute, monkeypatch):
-    file, output = grains(tmp_path), write(tmp_path / "table.csv", "precious")
-
-    def full(*_):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(PartFile, "add", full)
-    answer = compute(file, "-o", output, code=1)
-    assert os.strerror(errno.ENOSPC) in answer.err
-    assert output.read_text() == "precious"
-
-
 @pytest.mark.skipif(shutil.which("sh") is None, reason="needs a POSIX shell to close a stream")
 @pytest.mark.parametrize(
     ("words", "stream", "message"),
@@ -302,10 +223,9 @@ def test_a_full_disk_leaves_the_old_result(tmp_path, compute, monkeypatch):
         (["compute", *SCAN, "FILE"], ">&-", "standard output is closed"),
         (["formats"], ">&-", "standard output is closed"),
         (["compute", "-", "--format", "liggghts"], "<&-", "standard input: expected a dump"),
-        (["inspect", "--json", "FILE"], ">/dev/full", os.strerror(errno.ENOSPC)),
     ],
 )
-def test_a_standard_stream_that_is_closed_or_full(tmp_path, words, stream, message):
+def test_a_standard_stream_that_is_closed(tmp_path, words, stream, message):
     file = grains(tmp_path)
     command = [*PROGRAM, *(str(file) if word == "FILE" else word for word in words)]
     shell = ["sh", "-c", f"{shlex.join(command)} {stream}"]
@@ -314,21 +234,3 @@ def test_a_standard_stream_that_is_closed_or_full(tmp_path, words, stream, messa
     assert message in done.stderr
     assert "Traceback" not in done.stderr
     assert "Exception" not in done.stderr
-
-
-@pytest.mark.parametrize("failure", ["raise ImportError('no libpfc')", "import sys; sys.exit(3)"])
-def test_a_plugin_that_fails_is_a_warning(tmp_path, compute, monkeypatch, failure):
-    write(tmp_path / "brokenplugin.py", failure)
-    file = grains(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "brokenplugin", raising=False)
-    broken = EntryPoint("pfc", "brokenplugin:Reader", reader.GROUP)
-    points = plugins.entry_points
-    monkeypatch.setattr(plugins, "entry_points", lambda group: [*points(group=group), broken])
-    reader.installed_readers.cache_clear()
-    try:
-        answer = compute(file)
-    finally:
-        reader.installed_readers.cache_clear()
-    assert len(answer.rows) == 4
-    assert "warning: the reader 'pfc'" in answer.err

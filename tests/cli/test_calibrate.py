@@ -80,27 +80,6 @@ def test_with_a_file_the_words_are_the_output(calibrate, tmp_path, word):
 
 
 @pytest.mark.parametrize(
-    ("words", "message", "code"),
-    [
-        (("--frame", "7"), "the series has no frame in 7:8", 1),
-        (("--tolerance", "0"), "tolerance: expected a number above 0", 2),
-        (("--plot", "ladders.doc"), "figures can be written as .png", 2),
-        (("--plot", "nowhere/ladders.png"), "there is no folder", 2),
-        (("-o", "steps.doc"), "results can be written as .csv", 2),
-        (("--directions", "fibonacci:1"), "lie in one plane", 2),
-        (("--rv", "3"), "beyond the sample", 1),
-        (("--rv", "0.5,0.6"), "nor several rv", 1),
-        (("--boundary", "mask=5"), "no particle of any frame has mask=5", 1),
-    ],
-)
-def test_bad_input_is_one_message(calibrate, words, message, code):
-    boundary = () if "--boundary" in words else ("--boundary", "mask=3")
-    answer = calibrate(TRIAXIAL, *boundary, *words, code=code)
-    assert answer.out == ""
-    assert message in answer.err
-
-
-@pytest.mark.parametrize(
     ("rows", "message"),
     [
         (cubic_rows()[:1], "leaves a void fabric in variant c"),

@@ -76,6 +76,7 @@ def test_a_map_says_which_block_a_row_is_of(lines):
     assert dict(zip(heads(head), row.split(), strict=True))["block"] == "7"
     assert {"x", "y", "z", "at surface"} <= set(heads(head))
     assert "r inner" not in heads(head)
+    assert "at surface" not in lines(60, print_table, [Row(**ROWS[0], **place)], Excerpt())[0]
 
 
 def test_columns_and_digits_that_were_asked_for_are_shown(lines):

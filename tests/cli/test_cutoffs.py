@@ -44,13 +44,6 @@ def assert_same(one, other, name):
         assert one == other, name
 
 
-def test_more_is_kept_at_shorter_cutoffs(command):
-    rows = command("--cutoffs", "2rmin,0,1rmin", "--frames", "1", "--variants", "c").rows
-    kept = [(float(row["cutoff"]), -int(row["segments"])) for row in rows]
-    assert kept == sorted(kept)
-    assert len({segments for _, segments in kept} - {0}) == 3
-
-
 @pytest.mark.parametrize("cutoffs", ["0:1rmin:0.5rmin", "1rmin,0.0005,1rmin"])
 def test_a_resumed_run_finds_the_rows_of_all_cutoffs(command, cutoffs, tmp_path, monkeypatch):
     """Equal cut-offs too: every frame has as many rows as were asked for."""

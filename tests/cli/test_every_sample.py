@@ -5,72 +5,29 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.helpers.dumps import dump_text
+from tests.helpers.dumps import dump_text, write
 from tests.helpers.truth import SAMPLE_DATA
 
 FAST = ("--tolerance", "0.05", "--workers", "1", "--spacing", "0.1", "--directions", "6")
-EDGE = 4
-GRID = 2.0 * np.stack(np.meshgrid(*[np.arange(EDGE)] * 3, indexing="ij"), -1).reshape(-1, 3) + 1
-FLAT = np.column_stack([GRID[: EDGE**2, 1:], np.zeros(EDGE**2)])
-TWOS = np.arange(len(GRID)) // 2
-BOX = ((0, 2 * EDGE),) * 3
-DISCS = str(SAMPLE_DATA / "lammps_biaxial" / "discs.0.lammpstrj.gz")
+GRID = 2.0 * np.stack(np.meshgrid(*[np.arange(4)] * 3, indexing="ij"), -1).reshape(-1, 3) + 1
+FLAT = np.column_stack([GRID[:16, 1:], np.zeros(16)])
 
 
 @pytest.fixture
 def compute(tmp_path, ask):
-    """What is told of the dumps in a folder."""
+    """What is told of dumps with these positions."""
 
-    def told(*words, code=0):
+    def told(*frames, words=(), code=0):
+        for step, position in enumerate(frames):
+            rows = [(k + 1, *place, 1.02) for k, place in enumerate(position)]
+            text = dump_text(rows, "id x y z radius", step=step, box=((0, 8),) * 3)
+            write(tmp_path / f"dump.{step}", text)
         out = tmp_path / "table.csv"
         answer = ask("compute", tmp_path, *FAST, *words, "-o", out, code=code)
         assert code == 0 or not out.exists()
         return answer.told
 
     return told
-
-
-@pytest.fixture
-def dump(tmp_path):
-    def dump(step, position, bodies=None):
-        bodies = np.full(len(position), -1) if bodies is None else bodies
-        rows = [(k + 1, *p, 1.02, b) for k, (p, b) in enumerate(zip(position, bodies, strict=True))]
-        text = dump_text(rows, "id x y z radius clump", step=step, box=BOX)
-        (tmp_path / f"dump.{step}").write_text(text)
-
-    return dump
-
-
-@pytest.fixture
-def pairs(tmp_path):
-    def pairs(change=lambda rows: None, columns=6):
-        near = [
-            (i + 1, j + 1, 0, *(-0.5 * (GRID[j] - GRID[i])))
-            for i in range(len(GRID))
-            for j in range(i + 1, len(GRID))
-            if np.linalg.norm(GRID[i] - GRID[j]) < 2.01
-        ]
-        names = " ".join(f"c_p[{k + 1}]" for k in range(columns))
-        text = dump_text([row[:columns] for row in near], names, word="ENTRIES", box=BOX)
-        lines = text.splitlines()
-        change(lines)
-        (tmp_path / "pairs.0").write_text("\n".join(lines) + "\n")
-
-    return pairs
-
-
-@pytest.mark.parametrize(
-    ("frames", "words"),
-    [
-        ([(GRID, TWOS), (GRID, (np.arange(len(GRID)) + 1) // 2)], "frame 1: other spheres are one"),
-        ([(GRID, TWOS), (GRID[:-4], TWOS[:-4] + 7)], "frame 1: 30 grains of 60 spheres, where"),
-        ([(GRID, np.append(TWOS[:-1], 0))], "1 body of several spheres, such as number 0, reach"),
-    ],
-)
-def test_bodies_that_change_or_cannot_be_are_told(compute, dump, frames, words):
-    for step, (position, bodies) in enumerate(frames):
-        dump(step, position, bodies)
-    assert words in compute()
 
 
 @pytest.mark.parametrize("source", ["liggghts_periodic", "yade_triaxial", "lammps_discs"])
@@ -96,52 +53,17 @@ def test_who_says_that_each_sphere_is_a_grain_is_told_of_no_clumps(ask):
         ((FLAT, FLAT[:, [0, 2, 1]]), "dump.1: the series is read as discs in the plane x-y"),
     ],
 )
-def test_frames_of_mixed_dimension_are_an_error(compute, dump, frames, words):
-    for step, position in enumerate(frames):
-        dump(step, position)
-    assert words in compute(code=1)
+def test_frames_of_mixed_dimension_are_an_error(compute, frames, words):
+    assert words in compute(*frames, code=1)
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("words", "code", "message"),
     [
-        (("--axis", "z"), "--axis: the axis z leads out of the plane x-y"),
-        (("--axis", "0,1,1"), "leads out of the plane x-y"),
-        (("--rv-shape", "cylinder"), "--rv-shape: cylinder is no window of discs"),
-        (("--rv-shape", "box", "--rv-size", "1,1,1"), "--rv-size: expected two, A,B"),
-        (("--rv-center", "7", "7", "3"), "--rv-center: lies outside the plane x-y"),
-        (("--directions", "lebedev:11"), "--directions: lebedev:11 is a rule of three dimensions"),
+        (("--with", "forces"), 1, "--with forces needs"),
+        (("--with", "state"), 0, "the contacts have no forces: stress"),
+        (("--rattlers", "force"), 1, "the rule --rattlers force needs the"),
     ],
 )
-def test_what_is_of_space_is_refused_of_discs(ask, words, message):
-    # a place is right or wrong by the data, an option by the plane
-    code = 1 if "--rv-center" in words else 2
-    words = (*FAST, *words, "--contacts", "geometric")
-    assert message in ask("compute", DISCS, *words, code=code).told
-
-
-def test_a_map_of_discs_is_refused(ask):
-    answer = ask("map", DISCS, "--contacts", "geometric", "--grid", "2,2,1", code=1)
-    assert "spheres in space, but all grains are discs" in answer.told
-
-
-def _not_a_number(rows):
-    rows[12] = " ".join([*rows[12].split()[:-1], "nan"])
-
-
-@pytest.mark.parametrize(
-    ("change", "columns", "words", "code", "message"),
-    [
-        (lambda rows: None, 6, ("--with", "forces"), 0, ""),
-        (lambda rows: rows.pop(), 6, ("--with", "forces"), 1, "counts 144 rows, found 143"),
-        (lambda rows: None, 3, ("--with", "forces"), 1, "--with forces needs the forces of cont"),
-        (lambda rows: None, 3, ("--with", "state"), 0, "the contacts have no forces: stress"),
-        (lambda rows: None, 3, ("--rattlers", "force"), 1, "the rule --rattlers force needs the"),
-        (lambda rows: None, 6, ("--with", "forces", "--contacts", "geometric"), 1, "by geometry"),
-        (_not_a_number, 6, ("--with", "forces"), 1, "a force that is no finite number"),
-    ],
-)
-def test_forces_that_are_not_there(compute, dump, pairs, change, columns, words, code, message):
-    dump(0, GRID)
-    pairs(change, columns)
-    assert message in compute(*words, code=code)
+def test_forces_that_are_not_there(compute, words, code, message):
+    assert message in compute(GRID, words=words, code=code)

@@ -50,12 +50,23 @@ def finished_run(*words: str) -> bytes:
     return Path("finished.csv").read_bytes()
 
 
-def test_an_empty_folder_waits_for_frames(folder, finished):
-    thread = meanwhile([partial(time.sleep, 0.5), *copied(folder, sorted(finished.iterdir()))])
-    assert follow() == 0
+def is_followed(steps: list, *words: str) -> bool:
+    """Whether a run beside these steps ends with the bytes of a run behind them."""
+    thread = meanwhile(steps)
+    assert follow(*words) == 0
     thread.join()
-    assert Path("t.csv").read_bytes() == finished_run()
     assert not Path("t.csv.part").exists()
+    return Path("t.csv").read_bytes() == finished_run(*words)
+
+
+@pytest.mark.parametrize("suffix", ["txt", "npz"])
+def test_an_empty_folder_waits_for_frames(folder, finished, suffix):
+    files = sorted(finished.iterdir())
+    if suffix == "npz":
+        Path("converted").mkdir()
+        assert run(["convert", str(finished), "converted/f_{step}.npz"]) == 0
+        files = sorted(Path("converted").iterdir())
+    assert is_followed([partial(time.sleep, 0.5), *copied(folder, files)])
 
 
 def test_grains_wait_for_their_contacts(folder):
@@ -63,11 +74,8 @@ def test_grains_wait_for_their_contacts(folder):
     steps = []
     for grains, contacts in sample_frames()[:3]:
         steps += [*copied(folder, [grains]), partial(time.sleep, 1.4), *copied(folder, [contacts])]
-    thread = meanwhile(steps)
-    assert follow("--boundary", "mask=3") == 0
-    thread.join()
+    assert is_followed(steps, "--boundary", "mask=3")
     data = Path("t.csv").read_bytes()
-    assert data == finished_run("--boundary", "mask=3")
     assert b",file," in data
     assert b",geometric," not in data
 
@@ -75,16 +83,11 @@ def test_grains_wait_for_their_contacts(folder):
 def test_a_folder_with_contact_files_only_waits(folder):
     (folder / "pairs_0.txt").write_text(pairs_text(step=0))
     grains = dump_text(cubic_rows(), step=0).encode()
-    thread = meanwhile(
-        [partial(time.sleep, 0.5), partial(in_halves, grains, folder / "dump_0.txt", 0.1)]
-    )
-    assert follow() == 0
-    thread.join()
-    assert Path("t.csv").read_bytes() == finished_run()
+    write_it = partial(in_halves, grains, folder / "dump_0.txt", 0.1)
+    assert is_followed([partial(time.sleep, 0.5), write_it])
 
 
 def test_one_file_that_grows(folder, finished):
-    texts = [path.read_bytes() for path in sorted(finished.iterdir())]
     growing = folder / "dump.txt"
     growing.write_bytes(b"")
 
@@ -93,23 +96,9 @@ def test_one_file_that_grows(folder, finished):
             stream.write(part)
         time.sleep(0.1)
 
+    texts = [path.read_bytes() for path in sorted(finished.iterdir())]
     halves = [half for text in texts for half in (text[: len(text) // 2], text[len(text) // 2 :])]
-    thread = meanwhile([partial(append, half) for half in halves])
-    words = ["compute", f"dumps/{growing.name}", *FAST]
-    assert run([*words, "--follow-for", "2", "-o", "t.csv"]) == 0
-    thread.join()
-    assert run([*words, "-o", "finished.csv"]) == 0
-    assert Path("t.csv").read_bytes() == Path("finished.csv").read_bytes()
-
-
-def test_frames_of_every_kind_of_file(folder):
-    frames = write_series(folder.parent / "series", 3)
-    Path("converted").mkdir()
-    assert run(["convert", str(frames), "converted/f_{step}.npz"]) == 0
-    thread = meanwhile(copied(folder, sorted(Path("converted").iterdir())))
-    assert follow() == 0
-    thread.join()
-    assert Path("t.csv").read_bytes() == finished_run()
+    assert is_followed([partial(append, half) for half in halves])
 
 
 @pytest.fixture
@@ -168,29 +157,23 @@ def test_without_any_frame_the_table_has_no_rows(folder, capsys):
     assert "scanfab: note: dumps: no reader knows" in capsys.readouterr().err
 
 
-def test_a_broken_file_stops_it_or_is_skipped(folder, finished, capsys):
+def test_a_broken_file_stops_it_or_is_skipped_and_a_last_one_left_out(folder, finished, capsys):
     files = sorted(finished.iterdir())
-    for path in files:
+    broken, half = folder / files[1].name, files[1].read_bytes()[:300]
+    shutil.copy(files[0], folder)
+    broken.write_bytes(half)
+    assert follow(seconds=1.5) == 0
+    assert f"warning: dumps/{broken.name}: is left out, as it was not" in capsys.readouterr().err
+    broken.unlink()
+    assert Path("t.csv").read_bytes() == finished_run()
+    for path in files[2:]:
         shutil.copy(path, folder)
-    (folder / files[1].name).write_bytes(files[1].read_bytes()[:300])
+    broken.write_bytes(half)
     assert follow(seconds=0.5) == 1
-    said = capsys.readouterr().err
-    assert f"dumps/{files[1].name}" in said
+    assert f"dumps/{broken.name}" in capsys.readouterr().err
     assert Path("t.csv.part").read_text().count("\n") == 2
-    Path("t.csv.part").unlink()
     assert follow("--on-error", "skip", seconds=0.5) == 1
     assert Path("t.csv").read_bytes() == finished_run("--on-error", "skip")
-
-
-def test_a_last_file_that_is_never_whole_is_left_out(folder, finished, capsys):
-    files = sorted(finished.iterdir())
-    shutil.copy(files[0], folder)
-    (folder / files[1].name).write_bytes(files[1].read_bytes()[:300])
-    assert follow(seconds=1.5) == 0
-    said = capsys.readouterr().err
-    assert f"warning: dumps/{files[1].name}: is left out, as it was not whole" in said
-    (folder / files[1].name).unlink()
-    assert Path("t.csv").read_bytes() == finished_run()
 
 
 def test_a_folder_that_vanishes_is_named_and_nothing_is_lost(folder, finished, capsys):
@@ -208,29 +191,21 @@ def test_a_folder_that_vanishes_is_named_and_nothing_is_lost(folder, finished, c
     assert Path("t.csv").read_bytes() == finished_run()
 
 
-def test_what_belongs_before_is_an_error(folder, finished):
+def test_files_that_change_before_the_next_frame_are_an_error(folder, finished):
     files = sorted(finished.iterdir())
     for path in files[1:3]:
         shutil.copy(path, folder)
-    series = scanfab.follow_series(folder, seconds=5)
-    frames = iter(series)
-    assert next(frames).number == 0
-    assert next(frames).number == 1
-    shutil.copy(files[0], folder)
-    with pytest.raises(ReadError, match=f"{files[0].name}: is new, and belongs before"):
-        next(frames)
-
-
-def test_a_file_that_grows_after_it_was_taken_is_an_error(folder, finished):
-    files = sorted(finished.iterdir())
-    for path in files[:2]:
-        shutil.copy(path, folder)
-    frames = iter(scanfab.follow_series(folder, seconds=5))
-    next(frames), next(frames)
-    with open(folder / files[1].name, "a") as stream:
+    growing, other = (iter(scanfab.follow_series(folder, seconds=5)) for _ in range(2))
+    for frames in (growing, other):
+        assert [next(frames).number, next(frames).number] == [0, 1]
+    with open(folder / files[2].name, "a") as stream:
         stream.write("\n")
-    with pytest.raises(ReadError, match=f"{files[1].name}: has changed after its frame was taken"):
-        next(frames)
+    with pytest.raises(ReadError, match=f"{files[2].name}: was taken as frame 1, but since then"):
+        next(growing)
+    shutil.copy(files[2], folder)
+    shutil.copy(files[0], folder)
+    with pytest.raises(ReadError, match=f"{files[1].name}: was taken as frame 0, but since then"):
+        next(other)
 
 
 def test_the_plot_is_drawn_again(folder, finished, monkeypatch):
@@ -254,10 +229,8 @@ def test_frames_cannot_be_counted_from_the_end(folder, frames):
 
 
 def test_it_ends_with_the_last_frame_that_is_asked_for(folder, finished):
-    for path in finished.iterdir():
-        shutil.copy(path, folder)
-    words = ["compute", "dumps", *FAST, "--follow", "--frames", ":2", "-o", "t.csv"]
-    assert run(words) == 0
+    shutil.copytree(finished, folder, dirs_exist_ok=True)
+    assert run(["compute", "dumps", *FAST, "--follow", "--frames", ":2", "-o", "t.csv"]) == 0
     assert Path("t.csv").read_bytes() == finished_run("--frames", ":2")
 
 

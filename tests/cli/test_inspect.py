@@ -55,10 +55,10 @@ def test_people_get_lines_without_colour(series, ask):
     assert "\x1b" not in out
 
 
-def test_it_takes_the_options_of_compute_also_from_a_settings_file(tmp_path, frames):
+def test_it_takes_the_options_of_compute(tmp_path, frames):
     file = write(tmp_path / "dump.txt", dump_text(names="id type x y z mass"))
-    write(tmp_path / "scanfab.toml", '[compute]\nradius = 0.2\nformat = "liggghts"\n')
-    (frame,) = frames(file, "--cell", "1", "1", "1", "--periodic", "z", "--rv-shape", "cylinder")
+    words = ("--radius", "0.2", "--cell", "1", "1", "1", "--periodic", "z")
+    (frame,) = frames(file, *words, "--rv-shape", "cylinder")
     assert frame["radius_max"] == 0.2
     assert frame["periodic"] == [False, False, True]
     assert frame["rv_shape"].startswith("cylinder of radius ")

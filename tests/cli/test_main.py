@@ -38,56 +38,6 @@ def test_help_lists_every_command_and_imports_no_heavy_package() -> None:
         assert f"\n  {command} " in answer.stdout
 
 
-@pytest.mark.parametrize(
-    ("args", "message"),
-    [
-        (["--variants", "xyz"], "--variants: expected letters out of abcd, found 'xyz'"),
-        (["--cutoff", "1foo"], "--cutoff: expected a length"),
-        (["--spacing", "-1"], "--spacing: expected a length"),
-        (["--directions", "nonsense:3"], "--directions: no rule is called 'nonsense:3'"),
-        (["--boundary", "mask"], "--boundary: expected COLUMN=VALUE"),
-        (["--frames", "a:b"], "--frames: expected a slice"),
-        (["--format", "nonsense"], "there is no reader called 'nonsense'; the readers are"),
-        (["--cell", "1", "2"], "--cell: expected three lengths"),
-        (["--columns", "radius"], "--columns: expected NAME=COLUMN"),
-        (["--seed", "x"], "'--seed': 'x' is not a valid integer"),
-        (["--tolerence", "1"], "No such option '--tolerence'"),
-        (["-o", "table.docx"], "results can be written as .csv"),
-        (["-o", "nowhere/table.csv"], "there is no folder nowhere to write to"),
-        (["--digits", "0", "-o", "t.csv"], "--digits: expected"),
-        (["--fields", "alpha"], "--fields: "),
-        (["--resume"], "--resume goes with -o FILE"),
-        (["--figure", "rose"], "--figure goes with --plot FILE"),
-        (["--follow-for", "-1"], "--follow-for"),
-        (["--vtk", "v", "--scheduler", "tcp://x:1"], "--vtk is written where frames are computed"),
-    ],
-)
-def test_wrong_usage_is_exit_code_2_and_one_message(ask, args, message) -> None:
-    """In this process; one that ends with this code is that of the missing source."""
-    said = ask("compute", TRIAXIAL, *args, code=2)
-    assert message in said.told
-    assert said.out == ""
-
-
-@pytest.mark.parametrize(
-    ("word", "hint"),
-    [
-        ("computee", "No such command 'computee'. Did you mean 'compute'?"),
-        ("nonsense", "No such command 'nonsense'. Choose from compute, merge, compare, inspect"),
-    ],
-)
-def test_a_command_that_does_not_exist_gets_a_suggestion(ask, word: str, hint: str) -> None:
-    assert hint in ask(word, code=2).told
-
-
-def test_missing_source_is_wrong_usage() -> None:
-    answer = scanfab("compute", "nowhere")
-    assert answer.returncode == 2
-    assert "nowhere: there is no such file, folder or glob" in answer.stderr
-    assert answer.stdout == ""
-    assert "Traceback" not in answer.stderr
-
-
 def test_unreadable_source_is_exit_code_1_and_debug_shows_why(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("nothing\n")
     answer = scanfab("compute", tmp_path)

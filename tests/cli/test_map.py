@@ -77,33 +77,3 @@ def test_a_run_that_was_stopped_goes_on_but_not_with_other_blocks(
     other = ("--grid", "1,2,1", "-o", output, "--resume")
     assert "grid" in ask("map", series, *FAST, *other, code=2).err
     assert output.read_bytes() == table.read_bytes()
-
-
-@pytest.mark.parametrize(
-    ("words", "code", "message"),
-    [
-        ([], 2, "just one of --grid, --slices and --shells, found none"),
-        (["--slices", "2", "--shells", "2"], 2, "found --slices and --shells"),
-        (["--grid", "2,2"], 2, "expected three numbers of blocks, such as 4,4,8, found '2,2'"),
-        (["--grid", "0,2,2"], 2, "found '0,2,2'"),
-        (["--slices", "-1"], 2, "--slices: expected 1 or more, found"),
-        (["--shells", "0"], 2, "--shells: expected 1 or more, found"),
-        (["--slices", "two"], 2, "two"),
-        (["--slices", "2", "--variants", "cd", "--rv", "0.4,0.6"], 2, "--rv: expected one size"),
-        (["--slices", "2", "--with", "state"], 2, "No such option '--with'"),
-        (["--slices", "2", "--cutoffs", "1,2"], 2, "No such option '--cutoffs'"),
-        (["--grid", "100,100,100"], 1, "so that they are at least 4 mean radii thick"),
-        (["--slices", "1000000"], 1, "--slices: makes blocks 4.329e-06 thick"),
-        (["--slices", "2", "--variants", "cd", "--rv", "1e-3"], 1, "holds no grain"),
-    ],
-)
-def test_what_is_no_map_is_told(series, ask, words, code, message):
-    assert message in ask("map", series, *FAST, *words, code=code).told
-
-
-def test_blocks_without_grains_have_rows_and_are_said(series, ask):
-    """The RV reaches beyond the sample's corner: of its box some blocks hold no grain at all."""
-    words = ["--variants", "c", "--rv", "0.9", "--rv-center", "3", "3", "3", "--cutoff", "0.1rmin"]
-    printed = ask("map", series, *FAST, "--grid", "3,3,3", *words, "--frames", ":1")
-    assert len(printed.rows) == 27
-    assert "27 blocks have no void fabric" in printed.err

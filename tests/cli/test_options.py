@@ -13,7 +13,7 @@ import pytest
 from scanfab.base.option import GROUPS, option, options_of, takes_options, whole
 from scanfab.cli import options as cli_options
 from scanfab.cli.compute import compute
-from scanfab.cli.sources import SourceCommand
+from scanfab.cli.options import SourceCommand
 from scanfab.pipeline.options import OPTIONS
 from scanfab.pipeline.record import asked_for
 from scanfab.pipeline.settings import Settings
@@ -64,12 +64,12 @@ def test_a_made_up_option_takes_one_declaration(monkeypatch):
 
     @click.command(cls=SourceCommand)
     @cli_options.options("stray_light", "rv")
-    def command(**chosen: object) -> Settings:
+    def command(sources: object, **chosen: object) -> Settings:
         return Wider(**chosen)
 
     fabric = help_of(command).split("\nFabric:\n")[1]
     assert fabric.startswith("  --stray-light N         How much of it, as --rv.  [default: 7]\n")
-    made = command.main(["--stray-light", "5"], standalone_mode=False)
+    made = command.main(["-", "--stray-light", "5"], standalone_mode=False)
     assert (made.stray_light, made.rv, Wider().stray_light) == (5, 0.7, 7)
     refused = pytest.raises(click.UsageError, match=r"stray_light: expected a number below 9, fou")
     with refused, cli_options.usage_errors():

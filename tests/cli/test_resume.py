@@ -15,16 +15,14 @@ from pathlib import Path
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.pipeline import measurement
-from scanfab.pipeline.part import PartFile
+from scanfab.pipeline.frame import compute_frame
 from scanfab.pipeline.record import read_manifest
-from scanfab.table.formats import OWN_FORMATS, JsonArray
-from tests.helpers.dumps import cubic_rows, dump_text, write
+from scanfab.table.formats import OWN_FORMATS, Json
+from tests.helpers.dumps import cubic_rows, dump_text, pairs_text, write
 from tests.helpers.interruptions import PROGRAM, interrupted_at_row, write_series
 from tests.helpers.truth import SAMPLE_DATA
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")
-every_format = pytest.mark.parametrize("suffix", [one.suffix for one in OWN_FORMATS])
 
 
 @pytest.fixture(scope="module")
@@ -50,15 +48,19 @@ def last_frame(five_frames, dumps):
 
 @pytest.fixture
 def compute(dumps, monkeypatch):
-    """Runs the command; says its exit code, and how many frames it has scanned."""
-    scan, scanned = measurement.scan_to_tolerance, []
-    monkeypatch.setattr(
-        measurement, "scan_to_tolerance", lambda *words: scanned.append(1) or scan(*words)
-    )
+    """Runs the command; says its exit code, and how many frames it has computed."""
+    computed = []
+
+    def counted(*words, **more):
+        found = compute_frame(*words, **more)
+        computed.append(1)
+        return found
+
+    monkeypatch.setattr("scanfab.pipeline.compute.compute_frame", counted)
 
     def compute(output: str, *words: str, sources: tuple[str, ...] = ("dumps",)):
-        scanned.clear()
-        return run(["compute", *sources, *FAST, "-o", output, *words]), len(scanned)
+        computed.clear()
+        return run(["compute", *sources, *FAST, "-o", output, *words]), len(computed)
 
     return compute
 
@@ -94,32 +96,22 @@ def is_whole(compute):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
-def test_a_run_stopped_by_signals_again_and_again(dumps, compute, is_whole):
-    part = Path("t.csv.part")
-    for sent, code in ((signal.SIGTERM, 143), (signal.SIGKILL, -9), (signal.SIGINT, 130)):
-        before = part.stat().st_size if part.exists() else 0
-        words = ["compute", "dumps", *FAST, "--tolerance", "1e-3", "--workers", "1"]
-        with subprocess.Popen(
-            [*PROGRAM, *words, "--resume", "-o", "t.csv"], stderr=subprocess.DEVNULL
-        ) as process:
-            end = time.monotonic() + 60
-            while (
-                not part.exists()
-                or part.read_bytes().count(b"\n") < 2
-                or before == (part.stat().st_size)
-            ):
-                assert time.monotonic() < end
-                time.sleep(0.002)
-            process.send_signal(sent)
-            assert process.wait(60) in (code, 0)
-        if not part.exists():
-            break
+@pytest.mark.parametrize(("sent", "code"), [(signal.SIGTERM, 143), (signal.SIGKILL, -9)])
+def test_a_run_that_is_stopped_by_a_signal(dumps, compute, is_whole, sent, code):
+    """tests.campaigns.interrupt does it at random, again and again."""
+    part, words = Path("t.csv.part"), [*FAST, "--tolerance", "1e-3", "--workers", "1"]
+    with subprocess.Popen([*PROGRAM, "compute", "dumps", *words, "-o", "t.csv"]) as process:
+        while process.poll() is None and (not part.exists() or part.read_bytes().count(b"\n") < 2):
+            time.sleep(0.002)
+        process.send_signal(sent)
+        assert process.wait(60) in (code, 0)
     assert compute("t.csv", "--tolerance", "1e-3", "--resume")[0] == 0
     assert is_whole("t.csv", "--tolerance", "1e-3")
 
 
-@every_format
-def test_an_interrupted_run_is_gone_on_with(compute, stop, is_whole, capsys, suffix):
+@pytest.mark.parametrize("suffix", [one.suffix for one in OWN_FORMATS])
+def test_an_interrupted_run_is_gone_on_with(compute, stop, last_frame, is_whole, capsys, suffix):
+    """And frames that come later are added to the complete table."""
     table = f"table{suffix}"
     stop(table)
     told = capsys.readouterr().err
@@ -127,14 +119,24 @@ def test_an_interrupted_run_is_gone_on_with(compute, stop, is_whole, capsys, suf
         "interrupted after 2 of 4 frames; the same command with --resume goes on\n"
     )
     assert not Path(table).exists()
+    with open(f"{table}.part", "ab") as part:
+        part.write(b'{"inputs": [], "rows"')  # killed while it wrote a frame
     assert compute(table, "--resume", "--workers", "1") == (0, 2)
     assert "interrupted" not in capsys.readouterr().err
+    assert is_whole(table)
+    last_frame()
+    assert compute(table, "--resume", "--workers", "1") == (0, 1)
+    assert is_whole(table)
+    assert compute(table, "--resume") == (0, 0)
     assert is_whole(table)
 
 
 def test_without_a_part_everything_is_computed(compute, is_whole, capsys):
     assert compute("table.csv", "--resume") == (0, 4)
+    assert "will be replaced at the end" not in capsys.readouterr().err
     assert is_whole("table.csv")
+    assert compute("table.csv") == (0, 4)
+    assert "table.csv: the table that is there will be replaced" in capsys.readouterr().err
     assert run(["compute", "dumps", "--resume"]) == 2
     assert "--resume goes with -o FILE" in capsys.readouterr().err
 
@@ -173,42 +175,6 @@ def test_how_far_an_interrupted_run_is_is_told(dumps, stop, compute, monkeypatch
     assert told.splitlines()[-1].startswith("scanfab: error: ")
 
 
-def test_a_failure_behind_the_last_frame_says_so(compute, capsys, monkeypatch):
-    def full(*_):
-        raise OSError(28, os.strerror(28))
-
-    monkeypatch.setattr(JsonArray, "write", full)
-    assert compute("table.json")[0] == 1
-    said = "stopped after the last frame, before the table was complete; the same command with"
-    assert said in capsys.readouterr().err
-
-
-def test_frames_that_an_earlier_run_skipped_are_not_forgotten(compute, dumps, stop, is_whole):
-    """Exit code 1, as without the interruption."""
-    (dumps / "dump_100.txt").write_text("ITEM: TIMESTEP\n")
-    stop("table.csv", "--on-error", "skip", row=5)
-    assert compute("table.csv", "--on-error", "skip", "--resume") == (1, 1)
-    assert is_whole("table.csv", "--on-error", "skip")
-
-
-def test_a_second_run_into_the_same_file_is_refused(compute, capsys, monkeypatch, is_whole):
-    """However it begins; and the first goes on undisturbed."""
-    add, codes = PartFile.add, []
-
-    def second_run_meanwhile(self, *words):
-        add(self, *words)
-        if not codes:
-            codes.append(None)
-            codes[:] = [compute("table.csv", *more)[0] for more in (["--resume"], [])]
-
-    with monkeypatch.context() as patch:
-        patch.setattr(PartFile, "add", second_run_meanwhile)
-        assert compute("table.csv")[0] == 0
-    assert codes == [1, 1]
-    assert "error: table.csv.part: another run is writing to it" in capsys.readouterr().err
-    assert is_whole("table.csv")
-
-
 def test_where_there_are_no_locks_runs_go_on(compute, monkeypatch):
     fcntl = pytest.importorskip("fcntl", reason="such locks are POSIX")
 
@@ -219,7 +185,16 @@ def test_where_there_are_no_locks_runs_go_on(compute, monkeypatch):
     assert compute("table.csv")[0] == 0
 
 
-@pytest.mark.parametrize("text", ["{", "[1]", "", '{"settings": 3}', '{"settings": {}}\n7', "ü"])
+def test_a_failure_behind_the_last_frame_says_so(compute, capsys, monkeypatch):
+    def full(*_):
+        raise OSError(28, os.strerror(28))
+
+    monkeypatch.setattr(Json, "write", full)
+    assert compute("table.json")[0] == 1
+    assert "stopped after the last frame, before the table was" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["{", "[1]", '{"settings": 3}', '{"settings": {}}\n7', "\xfc"])
 def test_a_damaged_part_is_refused_and_kept(compute, stop, capsys, text):
     stop("table.csv")
     part = Path("table.csv.part")
@@ -233,17 +208,11 @@ def test_a_damaged_part_is_refused_and_kept(compute, stop, capsys, text):
     assert Path("table.1.csv.part").read_bytes() == before
 
 
-def test_a_part_that_is_a_pipe_is_refused_at_once(compute, capsys):
-    os.mkfifo("table.csv.part")
-    assert compute("table.csv") == (2, 0)
-    assert "table.csv.part: is a pipe, expected a file or nothing" in capsys.readouterr().err
-
-
-def test_frames_that_a_part_has_and_nobody_chooses_now_are_refused(dumps, stop, compute, capsys):
+def test_frames_that_a_part_has_and_nobody_chooses_now_are_left_out(dumps, stop, compute, is_whole):
     stop("table.csv", "--frames=-3:")
     shutil.copy(dumps / "dump_300.txt", dumps / "dump_500.txt")
-    assert compute("table.csv", "--frames=-3:", "--resume") == (2, 0)
-    assert "it holds frame 1, which is not chosen now" in capsys.readouterr().err
+    assert compute("table.csv", "--frames=-3:", "--resume") == (0, 2)
+    assert is_whole("table.csv", "--frames=-3:")
 
 
 def test_dumps_behind_the_rows_of_a_part_may_change(dumps, stop, compute, is_whole):
@@ -263,36 +232,9 @@ def test_dumps_behind_the_rows_of_a_part_may_change(dumps, stop, compute, is_who
 # a complete FILE
 
 
-@every_format
-def test_frames_that_came_later_are_added(compute, last_frame, is_whole, suffix):
-    table = f"table{suffix}"
-    assert compute(table) == (0, 4)
-    last_frame()
-    assert compute(table, "--resume", "--workers", "1") == (0, 1)
-    assert is_whole(table)
-    assert compute(table, "--resume") == (0, 0)
-    assert is_whole(table)
-
-
-def test_a_table_that_is_replaced_is_told_of(compute, capsys):
-    note = "table.csv: the table that is there will be replaced at the end of this run; --resume"
-    for words, is_told in (((), False), (("--resume",), False), ((), True)):
-        assert compute("table.csv", *words)[0] == 0
-        assert (note in capsys.readouterr().err) == is_told
-
-
-def test_rows_of_several_sources_stay_in_their_order(compute, five_frames, last_frame, is_whole):
-    both = {"sources": ("dumps", str(five_frames))}
-    assert compute("table.csv", **both) == (0, 9)
-    last_frame()
-    assert compute("table.csv", "--resume", **both) == (0, 1)
-    assert is_whole("table.csv", **both)
-
-
 @pytest.mark.parametrize(
     ("first", "then", "every", "computed"),
     [
-        ("1:3", ":3", ":3", 1),
         (":2", "2:", ":", 2),
         (":", ":1", ":", 0),
         ("-1:", "-2:", "-2:", 1),
@@ -307,6 +249,13 @@ def test_other_frames_join_those_of_the_table(compute, is_whole, first, then, ev
     assert run(["report", "table.csv", "-o", "report.html"]) == 0
 
 
+def test_frames_that_nobody_has_chosen_stay_out(compute, last_frame, is_whole):
+    assert compute("table.csv") == (0, 4)
+    last_frame()
+    assert compute("table.csv", "--resume", "--frames=:1") == (0, 0)
+    assert is_whole("table.csv", "--frames=:4")
+
+
 def test_frames_that_make_no_slice_are_refused(compute, last_frame, capsys):
     last_frame()
     assert compute("table.csv", "--frames=:2")[0] == 0
@@ -317,26 +266,23 @@ def test_frames_that_make_no_slice_are_refused(compute, last_frame, capsys):
     assert Path("table.csv").read_bytes() == before
 
 
-@pytest.mark.parametrize(
-    ("first", "spoil", "said"),
-    [
-        ((), lambda: Path("table.csv.manifest.json").unlink(), "there is no table.csv.manifest"),
-        (("--fields", "strain,alpha_vs"), lambda: None, "it lacks the columns source and frame"),
-    ],
-)
-def test_a_table_that_does_not_tell_what_made_it_is_refused(compute, capsys, first, spoil, said):
-    assert compute("table.csv", *first)[0] == 0
-    spoil()
-    assert compute("table.csv", *first, "--resume") == (2, 0)
-    assert said in capsys.readouterr().err
+def test_a_table_that_does_not_tell_what_made_it_is_refused(compute, capsys):
+    assert compute("few.csv", "--fields", "strain,alpha_vs")[0] == 0
+    assert compute("few.csv", "--fields", "strain,alpha_vs", "--resume") == (2, 0)
+    assert "it lacks the columns source and frame" in capsys.readouterr().err
+    Path("few.csv.manifest.json").unlink()
+    assert compute("few.csv", "--resume") == (2, 0)
+    assert "there is no few.csv.manifest.json" in capsys.readouterr().err
 
 
-def test_a_frame_that_was_skipped_is_tried_again(compute, dumps, is_whole, capsys):
+def test_a_frame_that_was_skipped_is_tried_again(compute, dumps, stop, is_whole, capsys):
     """As long as it cannot be read the exit code is 1; once it can, its rows are there."""
     second, skip = dumps / "dump_100.txt", ("--on-error", "skip")
     good = second.read_text()
     second.write_text("ITEM: TIMESTEP\n")
-    assert compute("table.csv", *skip) == (1, 3)
+    stop("table.csv", *skip, row=5)
+    assert compute("table.csv", *skip, "--resume") == (1, 1)
+    assert is_whole("table.csv", *skip)
     assert compute("table.csv", *skip, "--resume") == (1, 0)
     assert "frame 1 skipped" in capsys.readouterr().err
     second.write_text(good)
@@ -359,28 +305,15 @@ def test_part_and_table_are_gone_on_with_together(compute, stop, last_frame, is_
     assert is_whole("table.csv")
 
 
-def test_warnings_of_the_first_run_stay_in_the_manifest(compute, last_frame):
-    assert compute("table.csv")[0] == 0
-    path = Path("table.csv.manifest.json")
-    found = json.loads(path.read_text())
-    path.write_text(json.dumps({**found, "warnings": ["frame 1: something was told"]}))
-    last_frame()
-    assert compute("table.csv", "--resume")[0] == 0
-    assert read_manifest(Path("table.csv"))["warnings"][0] == "frame 1: something was told"
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("--fields", "source,frame,variant,alpha_vs_axial", "--digits", "4"),
-        # columns that were left out are no failure
-        ("--fields", "source,frame"),
-    ],
-)
-def test_columns_and_digits_are_those_of_the_table(compute, last_frame, is_whole, words):
+@pytest.mark.parametrize("fields", ["source,frame,variant,alpha_vs_axial", "source,frame"])
+def test_columns_digits_and_warnings_are_those_of_the_table(compute, last_frame, is_whole, fields):
+    """Columns that were left out are no failure."""
+    words, path = ("--fields", fields, "--digits", "4"), Path("table.csv.manifest.json")
     assert compute("table.csv", *words) == (0, 4)
+    path.write_text(json.dumps({**json.loads(path.read_text()), "warnings": ["frame 1: this"]}))
     last_frame()
     assert compute("table.csv", *words, "--resume") == (0, 1)
+    assert read_manifest(Path("table.csv"))["warnings"] == ["frame 1: this"]
     assert is_whole("table.csv", *words)
 
 
@@ -397,16 +330,11 @@ def test_a_figure_needs_its_columns(compute, capsys):
     # one of frames is drawn of the dumps
     assert compute("table.csv", *few, *figure, "--figure", "histogram")[0] == 0
     assert Path("plot.png").stat().st_size > 1000
-    Path("plot.png").unlink()
-    all_of_it = ("--fields", "source,frame,variant,strain,alpha_vs_axial,alpha_c_axial")
-    assert compute("table.csv", *all_of_it) == (0, 4)
-    assert compute("table.csv", *all_of_it, *figure) == (0, 0)
-    assert Path("plot.png").stat().st_size > 1000
 
 
 @pytest.mark.parametrize(
     "last",
-    ["pipeline.job.write_rows", "pipeline.job.write_manifest", "pipeline.part.PartFile.remove"],
+    ["job.write_rows", "job.write_manifest", "record.PartFile.remove"],
 )
 @pytest.mark.parametrize("is_new", [True, False])
 def test_a_run_killed_before_its_last_step(compute, monkeypatch, is_whole, capsys, last, is_new):
@@ -418,7 +346,7 @@ def test_a_run_killed_before_its_last_step(compute, monkeypatch, is_whole, capsy
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(f"scanfab.{last}", killed)
+        patch.setattr(f"scanfab.pipeline.{last}", killed)
         assert compute("t.csv") == (130, 4)
     is_finished = last.endswith("remove")
     assert run(["merge", "t.csv", "-o", "merged.csv"]) == (0 if is_finished else 1)
@@ -432,8 +360,8 @@ def test_a_run_killed_before_its_last_step(compute, monkeypatch, is_whole, capsy
 
 
 @pytest.fixture(params=["part", "table"])
-def begun(request, compute, stop, capsys):
-    """A FILE.part or a FILE; says whether it is left alone by a run, for some reason."""
+def begun(request, compute, stop):
+    """Leaves a FILE.part or a FILE behind, and says which."""
 
     def begin(*words: str, **sources: tuple[str, ...]) -> str:
         if request.param == "part":
@@ -459,7 +387,6 @@ def is_refused(compute, capsys):
 @pytest.mark.parametrize(
     ("words", "named"),
     [
-        (["--seed", "1"], "seed"),
         (["--digits", "5", "--rv", "0.6"], "digits, rv"),
         (["--contacts", "geometric"], "contacts"),
     ],
@@ -468,27 +395,20 @@ def test_other_settings_are_refused_and_named(begun, is_refused, words, named):
     assert is_refused(begun(), f"it was made with other settings ({named})", *words)
 
 
-def _changed() -> None:
-    path = Path("dumps/dump_100.txt")
-    path.write_text(path.read_text().replace("0.5", "0.49"))
-
-
-def _earlier() -> None:
-    write(Path("dumps/dump_50.txt"), dump_text(cubic_rows(), step=50, box=((0, 4),) * 3))
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (_changed, "dumps/dump_100.txt has changed since"),
-        (_earlier, "dumps/dump_50.txt is new, and not behind the last frame"),
-        (Path("dumps/dump_0.txt").unlink, "dumps/dump_0.txt is not among the files that are read"),
-    ],
-)
-def test_other_inputs_are_refused(begun, is_refused, change, said):
-    left = begun()
-    change()
-    assert is_refused(left, said)
+def test_other_inputs_are_refused(begun, is_refused, dumps):
+    left, first = begun(), dumps / "dump_0.txt"
+    text = first.read_text()
+    for changed in (text.replace("0.5", "0.49"), text + text):
+        first.write_text(changed)
+        assert is_refused(left, "dumps/dump_0.txt has changed since")
+    first.write_text(text)
+    for new in ("dump_50.txt", "pairs_100.txt"):
+        content = dump_text(cubic_rows(), step=50) if new == "dump_50.txt" else pairs_text(step=100)
+        write(dumps / new, content)
+        assert is_refused(left, f"dumps/{new} is new, and not behind the last frame")
+        (dumps / new).unlink()
+    first.unlink()
+    assert is_refused(left, "dumps/dump_0.txt is not among the files that are read")
 
 
 def test_a_dump_of_many_snapshots_may_grow(begun, compute, five_frames, is_whole):
@@ -528,18 +448,28 @@ def test_strains_that_frames_get_later_are_refused(begun, is_refused):
     assert is_refused(left, "s.csv has changed since", "--strain", "s.csv")
 
 
-@pytest.mark.parametrize(
-    ("grains", "beside"),
-    [("before-spheres-*", "before-periCell-*"), ("saved_spheres.*", "saved_*.xml*")],
-)
-def test_what_is_read_beside_the_grains_is_an_input(compute, is_refused, grains, beside):
+def test_what_is_read_beside_the_grains_is_an_input(compute):
     """The cell, as YADE has it."""
     shutil.copytree(SAMPLE_DATA / "yade_strained", "yade")
-    words, source = ("--contacts", "geometric"), {"sources": (f"yade/{grains}",)}
+    words = ("--contacts", "geometric", "--resume")
+    source = {"sources": ("yade/before-spheres-*",)}
     assert compute("t.csv", *words, **source) == (0, 3)
-    cells = sorted(Path("yade").glob(beside))
+    cells = sorted(Path("yade").glob("before-periCell-*"))
     listed = {one["path"] for one in read_manifest(Path("t.csv"))["inputs"]}
     assert {str(path) for path in cells} <= listed
-    assert compute("t.csv", *words, "--resume", **source) == (0, 0)
+    assert compute("t.csv", *words, **source) == (0, 0)
     cells[0].write_bytes(gzip.compress(b"something else"))
-    assert compute("t.csv", *words, "--resume", **source) == (2, 0)
+    assert compute("t.csv", *words, **source) == (2, 0)
+
+
+def test_a_run_without_rows_leaves_the_table_that_is_there(compute, capsys):
+    """In an array of more jobs than frames, a job without frames still writes its own table."""
+    assert compute("table.csv")[0] == 0
+    before = Path("table.csv").read_bytes()
+    capsys.readouterr()
+    assert compute("table.csv", "--frames", "9:")[0] == 1
+    assert (
+        "this run has no rows, so the table that is there stays as it is" in capsys.readouterr().err
+    )
+    assert Path("table.csv").read_bytes() == before
+    assert [compute("other.csv", "--frames", "9:")[0] for _ in range(2)] == [0, 0]

@@ -6,13 +6,11 @@ import json
 import shlex
 
 import pytest
-from matplotlib.figure import Figure
 
 import scanfab
 from scanfab.cli.main import run
 from scanfab.pipeline.repeat import repeat_command
-from scanfab.viz.scanned_frames import scan_frames
-from tests.helpers.interruptions import interrupted_at_row, write_series
+from tests.helpers.interruptions import write_series
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")
 OPTIONS = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "ac"}
@@ -49,17 +47,6 @@ def test_the_manifest_repeats_it(table, ask):
     assert table.with_name("again.csv").read_bytes() == table.read_bytes()
 
 
-def test_a_run_that_was_stopped_goes_on(series, table, tmp_path, monkeypatch, ask):
-    """In the middle of a frame, which has three rows."""
-    output = tmp_path / "table.csv"
-    command = ["compute", series, *FAST, *RVS, "--workers", "1", "-o", output]
-    with interrupted_at_row(monkeypatch, 8) as rows:
-        ask(*command, code=130)
-    assert len(rows) == 8
-    ask(*command, "--resume")
-    assert output.read_bytes() == table.read_bytes()
-
-
 def test_curves_are_told_apart_by_their_rv(table, series, ask, tmp_path):
     rows = ask("compare", table, "--summary").rows
     assert list(rows[0])[-1] == "rv"
@@ -75,25 +62,6 @@ def test_curves_are_told_apart_by_their_rv(table, series, ask, tmp_path):
     # a table of one has no column for it
     ask("compute", series, *FAST, "-o", tmp_path / "one.csv")
     assert "rv" not in ask("compare", tmp_path / "one.csv", "--summary").rows[0]
-
-
-def test_figures_have_a_curve_for_each(table):
-    axes = Figure().subplots()
-    scanfab.load(table).plot.evolution(ax=axes)
-    names = [text.get_text() for text in axes.get_legend().get_texts()]
-    for name in ("variant a", "variant c RV 0.5", "variant c RV 0.7"):
-        assert any(name in one for one in names), names
-    colours = {line.get_color() for line in axes.get_lines() if len(line.get_xdata()) > 1}
-    assert len(colours) >= 3
-
-
-def test_frames_are_drawn_of_the_largest(series):
-    frames = scan_frames(scanfab.read_series(series), rv="0.5,0.7", **OPTIONS)
-    assert repr(frames) == f"ScannedFrames(variant c RV 0.7 of {series}, frames 0 and 3)"
-    first = frames.frames[0]
-    computed = scanfab.compute(scanfab.read_series(series)[:1], rv="0.5,0.7", **OPTIONS)
-    assert first.row.alpha_vs_axial == pytest.approx(computed[2].alpha_vs_axial)
-    assert len(first.normals) == computed[2].contacts
 
 
 def test_paraview_report_and_view_show_all(table, series, tmp_path, ask):

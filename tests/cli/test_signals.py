@@ -79,7 +79,7 @@ def test_a_part_without_rows_and_half_a_file_are_removed(tmp_path, rows):
 from pathlib import Path
 from scanfab.table.columns import COLUMNS, complete_row
 from scanfab.base.files import whole_file
-from scanfab.pipeline.part import PartFile
+from scanfab.pipeline.record import PartFile
 
 def run(args):
     part = PartFile(Path("table.csv"))

@@ -54,22 +54,8 @@ def test_so_do_warnings_in_results_and_manifests(by_stdin, tmp_path):
     assert first.startswith("frame 0 skipped: standard input: grain 0: the radius")
 
 
-@pytest.mark.parametrize("command", ["inspect", "compute", "view", "calibrate"])
-def test_globs_are_expanded_and_must_match(ask, tmp_path, command):
-    write(tmp_path / "dump_0.txt", dump_text(cubic_rows()))
-    assert "matches nothing" in ask(command, tmp_path / "other_*.txt", code=2).told
-
-
 def test_a_glob_is_read_as_its_files(ask, tmp_path):
     for frame in (0, 1):
         write(tmp_path / f"dump_{frame}.txt", dump_text(cubic_rows(), step=frame))
     by_glob, by_folder = ask("inspect", tmp_path / "dump_*.txt"), ask("inspect", tmp_path)
     assert by_glob.out == by_folder.out
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [(("-",), "standard input needs --format"), (("-", ".", "--format", "table"), "of its own")],
-)
-def test_standard_input_is_a_series_of_its_own_with_a_format(ask, words, message):
-    assert message in ask("compute", *words, code=2).told

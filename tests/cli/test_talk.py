@@ -8,8 +8,8 @@ import time
 
 import pytest
 
-from scanfab.cli import talk
-from scanfab.cli.talk import working
+from scanfab.cli import console
+from scanfab.cli.console import working
 from tests.helpers.dumps import write
 from tests.helpers.interruptions import write_series
 
@@ -74,8 +74,8 @@ def test_quiet_and_verbose_exclude_one_another(said, command):
 )
 def test_a_log_gets_a_line_of_progress_each_minute(said, monkeypatch, words, every, says):
     """Here of a few milliseconds; nothing in a run that takes less."""
-    assert talk.EVERY == 60.0
-    monkeypatch.setattr(talk, "EVERY", every)
+    assert console.EVERY == 60.0
+    monkeypatch.setattr(console, "EVERY", every)
     _, lines = said("compute", "--tolerance", "1e-3", "--workers", "1", *words)
     states = [line for line in lines if re.match(r"scanfab: \d of 3 frames", line)]
     assert bool(states) == bool(says)

@@ -98,21 +98,6 @@ def test_shape_and_surface_are_resumed_unless_the_file_has_changed(compute, tmp_
     assert f"{file} has changed since" in told
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--rv-shape", "box", "--rv-size", "1,2"], "--rv-size: expected A,B,C, full edges"),
-        (["--rv-size", "1,2,3"], "--rv-size: the shape sphere takes none: choose --rv-radius"),
-        (["--rv-shape", "box", "--rv-radius", "2"], "--rv-radius: is that of a sphere"),
-        (["--rv-shape", "box", "--rv-axis", "x"], "--rv-axis: is that of a cylinder"),
-        (["--rv-shape", "none.stl"], "closed convex surface that exists (.stl .vtp .ply .obj)"),
-        (["--rv-follows", "sand"], "--rv-follows: expected none or strain"),
-    ],
-)
-def test_what_cannot_be_is_told_with_what_to_choose(compute, words, message):
-    assert message in compute(*words, code=2)
-
-
 def test_broken_surfaces_are_told(compute, tmp_path):
     file = tmp_path / "open.ply"
     corners = corners_of_a_box(np.full(3, 0.004))
@@ -120,10 +105,3 @@ def test_broken_surfaces_are_told(compute, tmp_path):
     assert "open.ply: the surface is not closed" in compute("--rv-shape", file, code=1)
     file.write_bytes(b"ply\nnonsense")
     assert "open.ply: cannot be read" in compute("--rv-shape", file, code=1)
-
-
-@pytest.mark.parametrize("words", [SHAPES["box"], [*SHAPES["cylinder"], "--cut"]])
-def test_view_draws_the_window(tmp_path, ask, words):
-    picture = tmp_path / "view.png"
-    ask("view", SHEAR, "--frame", "1", *words, "--screenshot", picture)
-    assert picture.stat().st_size > 10_000

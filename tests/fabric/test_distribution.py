@@ -5,21 +5,30 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scanfab.base.space import Space
 from scanfab.fabric.distribution import direction_points, fit_even, mean_length_function
-from scanfab.scan.directions import direction_rule
+from scanfab.scan.directions import direction_rule, plane_rule
 
 
 def even(n):
     """Of degree 6."""
     x, y, z = np.moveaxis(n, -1, 0)
-    return 1.0 + 0.3 * z**2 - 0.2 * x * y + 0.1 * x**2 * z**2 + 0.05 * z**6
+    return 1.0 + 0.3 * z**2 - 0.2 * x * y + 0.1 * x**2 * z**2 + 0.05 * z**6 + 0.04 * x**4 * y**2
 
 
-@pytest.mark.parametrize("rule", ["lebedev:17", "product:13", "fibonacci:200"])
+@pytest.mark.parametrize(
+    "rule",
+    [
+        direction_rule("lebedev:17"),
+        direction_rule("product:13"),
+        direction_rule("fibonacci:200"),
+        plane_rule(20, Space(2)),
+    ],
+)
 def test_even_polynomials_of_degree_six_come_back(rule):
-    axes = direction_rule(rule).axes
-    function = fit_even(axes, even(axes), np.random.default_rng(0).uniform(1, 2, len(axes)))
-    points, _ = direction_points()
+    axes, weights = rule.axes, np.random.default_rng(0).uniform(1, 2, len(rule))
+    function = fit_even(axes, even(axes), weights, rule.space)
+    points, _ = direction_points(rule.space)
     assert function.degree == 6
     assert function(points) == pytest.approx(even(points), abs=1e-10)
     assert function(-points) == pytest.approx(function(points), abs=1e-12)

@@ -38,13 +38,6 @@ def test_contacts_drawn_from_harmonics_give_them_back(a2, a4):
     assert abs(found["c_a4"] - a4) < 4 * found["c_a4_se"]
 
 
-def test_the_error_of_isotropic_contacts_is_known():
-    found = Harmonics().values(measured_of(directions(5000, np.random.default_rng(2))))
-    for order in (2, 4):
-        expected = np.sqrt((2 * order + 1) / 5000)
-        assert found[f"c_a{order}_se"] == pytest.approx(expected, rel=0.05)
-
-
 def test_lengths_of_known_harmonics_give_them_back():
     axes = direction_rule("lebedev:15").axes[None]
     weights = direction_rule("lebedev:15").weights

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from scanfab.fabric.contact import contact_fabric
-from scanfab.fabric.invariants import Invariants, fabric_deviator, intensity
+from scanfab.fabric.invariants import Invariants, intensity
 from scanfab.fabric.void import void_fabric
 from scanfab.scan.directions import direction_rule
-from tests.fabric.test_forces import directions, drawn
+from tests.fabric.test_forces import directions
 from tests.helpers.measured import measured_of
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -71,14 +71,3 @@ def test_principal_values_and_b():
     assert [found[f"gc_{k}"] for k in (1, 2, 3)] == pytest.approx([0.5, 0.3, 0.2])
     assert found["b_c"] == pytest.approx(1 / 3)
     assert found["f_c"] == pytest.approx(intensity(contact_fabric(normals).matrix))
-
-
-def test_spam_has_the_same_numbers():
-    """SPAM 0.9.1: fabricTensor gives G, F and a; its axes are z, y, x, in whatever order."""
-    spam = pytest.importorskip("spam.orientations", reason="SPAM is not on every system")
-    normals = drawn(500, np.random.default_rng(5), 0.7)
-    tensor, deviator, a = spam.fabricTensor(normals)
-    found = contact_fabric(normals).matrix
-    np.testing.assert_allclose(tensor, found, atol=1e-14)
-    np.testing.assert_allclose(deviator, fabric_deviator(found), atol=1e-13)
-    assert values(normals)["f_c"] == pytest.approx(a)

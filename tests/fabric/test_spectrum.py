@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import Cell, Packing
+from scanfab import Packing
 from scanfab.base.space import Space
-from scanfab.fabric.spectrum import LONGEST_GAP, predicted_alpha
+from scanfab.fabric.predicted import LONGEST_GAP, predicted_alpha
 from scanfab.packing.search import NearPairs
 
 NAME = "alpha_vs_axial_contacts"
@@ -46,29 +46,6 @@ def test_touching_pairs_give_their_second_order_and_no_fourth():
         expected = cutoff * added / number / 5
         found = predicted_alpha(pairs, porosity, cutoff, (0, 0, 1))
         assert found == pytest.approx(expected, rel=0.02, abs=1e-12)
-
-
-def flattened(side, height, radius=0.5):
-    """A lattice of equal grains, nearer to one another along z."""
-    grid = np.stack(np.meshgrid(*3 * [np.arange(float(side))], indexing="ij"), -1).reshape(-1, 3)
-    cell = [float(side), float(side), height * side]
-    return Packing(grid * [1.0, 1.0, height], radius, cell=Cell(cell))
-
-
-@pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
-def test_a_lattice_that_overlaps_along_z():
-    """Hard along x and y, overlapping along z: without a cut-off all anisotropy is that."""
-    table = scanfab.compute(
-        flattened(3, 0.99), variants="a", cutoffs="0", directions="lebedev:29", spacing=0.03
-    )
-    row = table[0]
-    assert row["alpha_vs_axial"] > 5 * row["alpha_vs_axial_se"]
-    assert row[NAME] == pytest.approx(
-        row["alpha_vs_axial"], rel=0.1, abs=3 * row["alpha_vs_axial_se"]
-    )
-    assert scanfab.compute(flattened(2, 1.0), variants="a", cutoffs="0")[0][NAME] == pytest.approx(
-        0, abs=1e-12
-    )
 
 
 def test_discs_in_a_row_that_overlap():

@@ -23,6 +23,7 @@ class DaskCluster:
     """A scheduler and its workers, in a folder that has their file and logs."""
 
     def __init__(self, folder: Path, workers: int = 2) -> None:
+        folder.mkdir(exist_ok=True)
         self.folder = folder
         self.file = folder / "scheduler.json"
         self.workers: list[subprocess.Popen[bytes]] = []

@@ -17,12 +17,6 @@ SECTIONS = (
 )  # fmt: skip
 
 
-def sections_of(text: str) -> dict[str, str]:
-    """The sections of a numpydoc docstring by their titles."""
-    parts = re.split(r"^(\w+)\n-{3,}\n", text, flags=re.MULTILINE)
-    return dict(zip(parts[1::2], parts[2::2], strict=True))
-
-
 def named_in(section: str) -> list[str]:
     """The names that a section describes: those of its lines that are not indented."""
     lines = [line for line in section.splitlines() if line and not line.startswith(" ")]
@@ -30,48 +24,38 @@ def named_in(section: str) -> list[str]:
     return [name.strip().lstrip("*") for line in names for name in line.split(",")]
 
 
-def faults_of_function(function: Any, with_example: bool) -> Iterator[str]:
-    """Of a function or method."""
-    text = inspect.getdoc(function) or ""
-    found = sections_of(text)
-    yield from _faults_of_text(text, found)
-    signature = inspect.signature(function)
+def faults_of(thing: Any, with_example: bool = True) -> Iterator[str]:
+    """Of a function, method, property or class: what numpydoc or the signature asks for."""
+    text = inspect.getdoc(thing) or ""
+    parts = re.split(r"^(\w+)\n-{3,}\n", text, flags=re.MULTILINE)
+    found = dict(zip(parts[1::2], parts[2::2], strict=True))
+    summary = text.split("\n\n")[0].strip()
+    if not summary.endswith((".", ":")):
+        yield f"has no summary that is a sentence, but {summary!r}"
+    if list(found) != [title for title in SECTIONS if title in found]:
+        yield f"has sections that numpydoc does not know, or in another order: {list(found)}"
+    for error in named_in(found.get("Raises", "")):
+        if not hasattr(scanfab, error) and not hasattr(builtins, error):
+            yield f"raises {error}, which is no public error"
+    is_class = inspect.isclass(thing)
+    is_property = isinstance(thing, property | cached_property)
+    if is_property or (is_class and issubclass(thing, Exception)):
+        return
+    signature = inspect.signature(thing)
     names = [name for name in signature.parameters if name not in ("self", "cls")]
     described = named_in(found.get("Parameters", ""))
+    if is_class:
+        described += named_in(found.get("Attributes", ""))
+        fields = {name for one in thing.__mro__ for name in vars(one).get("__annotations__", {})}
+        names += [one for one in described if one in fields or hasattr(thing, one)]
+        described, names = sorted(set(described)), sorted(set(names))
     if described != names:
-        yield f"describes the parameters {described}, but takes {names}"
+        yield f"describes {described}, but has or takes {names}"
     gives = signature.return_annotation not in (None, "None", inspect.Signature.empty)
-    if gives and not {"Returns", "Yields"} & set(found):
+    if gives and not is_class and not {"Returns", "Yields"} & set(found):
         yield "does not say what it returns"
     if with_example and ">>>" not in found.get("Examples", ""):
         yield "has no example"
-
-
-def faults_of_class(kind: type) -> Iterator[str]:
-    """Of a class: what it is made of and what it has, in its own docstring."""
-    text = inspect.getdoc(kind) or ""
-    found = sections_of(text)
-    yield from _faults_of_text(text, found)
-    if issubclass(kind, Exception):
-        return
-    described = named_in(found.get("Parameters", "")) + named_in(found.get("Attributes", ""))
-    names = list(inspect.signature(kind).parameters)
-    missing = [name for name in names if name not in described]
-    if missing:
-        yield f"does not describe {missing}"
-    if len(set(described)) < len(described):
-        yield f"describes something twice: {described}"
-    for name in described:
-        if name not in names and not _is_attribute(kind, name):
-            yield f"describes {name}, which it does not have"
-    if ">>>" not in found.get("Examples", ""):
-        yield "has no example"
-
-
-def _is_attribute(kind: type, name: str) -> bool:
-    return hasattr(kind, name) or any(
-        name in vars(one).get("__annotations__", {}) for one in kind.__mro__
-    )
 
 
 def members_of(kind: type) -> Iterator[tuple[str, Any]]:
@@ -82,47 +66,19 @@ def members_of(kind: type) -> Iterator[tuple[str, Any]]:
         # a field may have a function for its usual value
         if name.startswith("_") or name in vars(owner).get("__annotations__", {}):
             continue
-        if owner.__module__.startswith("scanfab"):
+        member = getattr(member, "__func__", member)
+        is_code = isinstance(member, property | cached_property) or inspect.isfunction(member)
+        if owner.__module__.startswith("scanfab") and is_code:
             yield name, member
-
-
-def faults_of_member(member: Any) -> Iterator[str]:
-    """Of a method or property; the summary of a property says what it is."""
-    if isinstance(member, property | cached_property):
-        text = inspect.getdoc(member) or ""
-        yield from _faults_of_text(text, sections_of(text))
-    elif isinstance(member, staticmethod | classmethod):
-        yield from faults_of_function(member.__func__, with_example=False)
-    elif inspect.isfunction(member):
-        yield from faults_of_function(member, with_example=False)
-
-
-def _faults_of_text(text: str, found: dict[str, str]) -> Iterator[str]:
-    summary = text.split("\n\n")[0].strip()
-    if not summary.endswith((".", ":")):
-        yield f"has no summary that is a sentence, but {summary!r}"
-    for title in found:
-        if title not in SECTIONS:
-            yield f"has a section {title!r}, which numpydoc does not know"
-    if list(found) != [title for title in SECTIONS if title in found]:
-        yield f"has its sections in another order than numpydoc: {list(found)}"
-    for error in named_in(found.get("Raises", "")):
-        if not hasattr(scanfab, error) and not hasattr(builtins, error):
-            yield f"raises {error}, which is no public error"
 
 
 def faults(name: str) -> list[str]:
     """Of one public name and all that it brings; empty if there is nothing to mend."""
     named = getattr(scanfab, name)
-    if inspect.isclass(named):
-        own = [f"{name} {fault}" for fault in faults_of_class(named)]
-        if issubclass(named, Exception):
-            return own
-        return own + [
-            f"{name}.{member} {fault}"
-            for member, value in members_of(named)
-            for fault in faults_of_member(value)
-        ]
-    if callable(named):
-        return [f"{name} {fault}" for fault in faults_of_function(named, with_example=True)]
-    return []
+    if not callable(named):
+        return []
+    found = [f"{name} {fault}" for fault in faults_of(named)]
+    if inspect.isclass(named) and not issubclass(named, Exception):
+        for member, value in members_of(named):
+            found += [f"{name}.{member} {fault}" for fault in faults_of(value, with_example=False)]
+    return found

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from scanfab.viz.figures.page import make_figures, save_figures
-from scanfab.viz.scanned_frames import ScannedFrames
 
 BYTES = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 
@@ -11,12 +10,6 @@ BYTES = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 def save_rows(path, rows, name=None, **offered):
     """A figure of a table, or the page of all, as a file."""
     save_figures(path, make_figures(rows, "table", name, **offered))
-
-
-def frame_figure(series, settings, rows, name):
-    """A figure of the first and the last frame of a table."""
-    (figure,) = make_figures(ScannedFrames(series, settings, rows), "frames", name)
-    return figure
 
 
 def fitted(axes):

@@ -178,6 +178,28 @@ def edge_sums(solids, enters, leaves, cutoff, rule):
     return np.array([length, number, left])
 
 
+def plane_sums(position, radius, angle, offset, spacing, cutoff, window=None, rule="clip"):
+    """
+    Length and number of the segments of discs in x-y, on lines side by side at an angle with x.
+
+    Without a window those between the first and the last disc of each line; else those that count
+    by a rule at its edge.
+    """
+    direction, u = np.array([[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0]])
+    reach = (np.linalg.norm(position, axis=1) + radius).max() if window is None else window.reach
+    number = ceil(reach / spacing) + 1
+    feet = (np.arange(-number, number + 1)[:, None] + offset) * spacing * u
+    total = np.zeros(3)
+    for foot, found in zip(feet, chords_of_lines(position, radius, feet, direction), strict=True):
+        solids = union(found)
+        if window is None:
+            kept = [one for one in lengths(gaps_between(solids)) if one >= cutoff]
+            total += sum(kept), len(kept), 0
+        else:
+            total += edge_sums(solids, *within(window, foot, direction), cutoff, rule)
+    return total[:2]
+
+
 def void_segments(position, radius, triad, offset, spacing, clip):
     """The void segments on a grid of lines: those of the whole sample, those of the window."""
     whole, window = [], []

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from scanfab.base.bodies import Hull
 from scanfab.base.convex import Convex, Quadric
-from scanfab.base.shapes import Hull, box, cylinder, ellipsoid, polyhedron
+from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron
 from scanfab.scan.directions import direction_rule
 from tests.helpers.lattices import rotation
 

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, ScanfabWarning, compute, find_contacts
+from scanfab import Cell, Packing, ScanfabWarning, compute
 from tests.helpers.lattices import Spheres
 
 EDGES = np.array([6.0, 5.0, 7.0])
@@ -76,53 +76,20 @@ def test_rattler_that_reaches_in_through_a_face_is_void_in_d():
     assert (c.grains, d.grains) == (0, 0)
 
 
-def test_every_grain_and_the_rv_shifted_by_one_vector(spheres):
-    """Grains wrap through faces, the RV stays in the cell: nothing changes."""
-    before = table(spheres, [2.5, 2.3, 2.6])
-    shift = np.array([0.9, 0.4, 2.1])
-    after = table(spheres.moved(shift), np.array([2.5, 2.3, 2.6]) + shift)
-    assert_same_tables(before, after)
+CENTER = np.array([2.5, 2.3, 2.6])
+SHIFT = np.array([0.9, 0.4, 2.1])
+# by whole turns of the cell, as unwrapped dumps have them
+TURNS = np.random.default_rng(0).integers(-3, 4, (112, 3)) * EDGES
 
 
-def test_cell_wrapped_elsewhere(spheres):
-    """Another corner of the same repeated packing, the RV in place."""
-    center = np.array([2.5, 2.3, 2.6])
-    before = table(spheres, center)
-    assert_same_tables(before, table(spheres, center, origin=(-0.7, 0.2, -2.2)))
-
-
-def test_grains_written_outside_the_cell(spheres):
-    """By whole turns of the cell, as unwrapped dumps have them."""
-    turns = np.random.default_rng(0).integers(-3, 4, (112, 3))
-    center = np.array([2.5, 2.3, 2.6])
-    unwrapped = Spheres(spheres.position + turns * EDGES, spheres.radius)
-    assert_same_tables(table(spheres, center), table(unwrapped, center))
-
-
-def test_every_grain_shifted_under_an_rv_at_rest(spheres):
-    """The RV sees another part of a homogeneous sample: solid fraction and ℓ scatter, no more."""
-    shifts = np.random.default_rng(1).random((24, 3)) * EDGES
-    rows = [table(spheres.moved(shift), [3.0, 2.5, 3.5])[0] for shift in shifts]
-    fractions = np.array([row.solid_fraction for row in rows])
-    # the mean over all places is the solid fraction of the cell
-    volume = np.prod(EDGES)
-    points = np.random.default_rng(2).random((60_000, 3)) * EDGES
-    cell = Cell(EDGES)
-    solid = np.zeros(len(points), bool)
-    for centre, radius in zip(spheres.position, spheres.radius, strict=True):
-        branch = points - centre
-        branch = branch + cell.nearest_image(branch) @ cell.vectors
-        solid |= np.linalg.norm(branch, axis=1) < radius
-    assert 4 / 3 * np.pi * np.sum(spheres.radius**3) / volume > solid.mean()  # they overlap
-    error = np.hypot(fractions.std() / np.sqrt(24), np.sqrt(0.25 / 60_000))
-    assert abs(fractions.mean() - solid.mean()) < 4 * error
-
-
-def test_contacts_through_faces_are_found_from_the_inside(spheres):
-    """Each contact of the cell once: half of those that the repeated packing's centre has."""
-    packing = find_contacts(Packing(*spheres, cell=Cell(EDGES)))
-    around = find_contacts(repeated(spheres))
-    ends = around.contacts.pairs
-    middle = 13 * 112
-    own = (ends >= middle) & (ends < middle + 112)
-    assert 2 * len(packing.contacts) == own.sum()
+@pytest.mark.parametrize(
+    ("moved", "center", "origin"),
+    [
+        (SHIFT, CENTER + SHIFT, (0, 0, 0)),
+        (0.0, CENTER, (-0.7, 0.2, -2.2)),
+        (TURNS, CENTER, (0, 0, 0)),
+    ],
+    ids=["grains and RV shifted", "cell from another corner", "grains outside the cell"],
+)
+def test_the_same_medium_described_in_another_way(spheres, moved, center, origin):
+    assert_same_tables(table(spheres, CENTER), table(spheres.moved(moved), center, origin=origin))

@@ -1,12 +1,12 @@
 """Discs in a plane: what is known in closed form, the naive twin, and planes that are alike."""
 
+from itertools import product
 from math import asin, hypot, pi, sqrt
 
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, Sample, Window, compute, find_contacts
-from scanfab.base.shapes import circle, ellipse, rectangle
+from scanfab import Cell, Packing, Sample, Window, box, compute, ellipsoid, find_contacts, sphere
 from scanfab.base.space import Space
 from scanfab.fabric.void import void_fabric
 from scanfab.pipeline.measurement import solids_of
@@ -15,13 +15,13 @@ from scanfab.scan.lines import drawn_lines, turned_triads
 from scanfab.scan.scan import scan_lines, sums_of
 from scanfab.scan.solids import Solids
 from scanfab.scan.tallies import tally_triads
-from tests.helpers import naive_plane
+from tests.helpers import naive
 
 XY = Space(2)
 WINDOWS = {
-    "circle": (circle(4.0, XY), naive_plane.in_circle(4.0)),
-    "box": (rectangle([7.0, 4.0], XY), naive_plane.in_box(3.5, 2.0)),
-    "ellipse": (ellipse([4.5, 2.5], XY), naive_plane.in_ellipse(4.5, 2.5)),
+    "circle": sphere(4.0, XY),
+    "box": box([7.0, 4.0], None, XY),
+    "ellipse": ellipsoid([4.5, 2.5], None, XY),
 }
 ANGLES = (0.1, 0.9, 2.0, 2.7)
 
@@ -81,7 +81,7 @@ def poisson(random, density, reach):
 @pytest.mark.parametrize("cutoff", [0.0, 0.7, 1.6])
 def test_empty_circle(cutoff):
     """ℓ = (R²(π/2 - asin(c/2R)) + (c/2)√(R² - c²/4)) / √(R² - c²/4)."""
-    found = mean_lengths(solids_in([], circle(1.0, XY)), along(*ANGLES), 0.005, cutoff, "c")
+    found = mean_lengths(solids_in([], sphere(1.0, XY)), along(*ANGLES), 0.005, cutoff, "c")
     h = sqrt(1 - cutoff**2 / 4)
     assert agrees(found, (pi / 2 - asin(cutoff / 2) + cutoff / 2 * h) / h)
 
@@ -89,7 +89,7 @@ def test_empty_circle(cutoff):
 def test_discs_without_overlap_in_a_circle():
     """ℓ = (πR² - Σπr²)/(2R + Σ2r) in every direction, whatever the arrangement."""
     discs = separate(np.random.default_rng(3), 30, 8.0)
-    found = mean_lengths(solids_in(discs, circle(8.0, XY)), along(*ANGLES), 0.01, 0.0, "c")
+    found = mean_lengths(solids_in(discs, sphere(8.0, XY)), along(*ANGLES), 0.01, 0.0, "c")
     r = np.array(discs)[:, 2]
     assert agrees(found, (pi * 64 - np.sum(pi * r**2)) / (16 + np.sum(2 * r)))
 
@@ -110,7 +110,7 @@ def test_two_discs_along_their_axis(distance, cutoff):
 @pytest.mark.parametrize("name", WINDOWS)
 def test_an_empty_window_has_the_mean_chord_of_its_shape(name):
     """ℓ(n) = area / width; at the cut-off c its covariogram: c + g(c)/-g'(c)."""
-    window, _ = WINDOWS[name]
+    window = WINDOWS[name]
     rule = along(*ANGLES)
     for cutoff in (0.0, 1.0):
         shared, slope = window.overlap(rule.axes, cutoff)
@@ -131,7 +131,7 @@ def fine_length(solids, triad, cutoff, spacing=0.05, grids=400):
 def test_poisson_discs(edge):
     """ℓ = c + 1/β with β = 2ρ⟨r⟩; clipped to a window c + A1/(A0 + βA1)."""
     random, density, cutoff, found = np.random.default_rng(11), 0.6, 0.5, []
-    window = circle(5.0, XY)
+    window = sphere(5.0, XY)
     for _ in range(60):
         position, radius = flat(poisson(random, density, 25.0))
         packing = Packing(position, radius, dim=2)
@@ -170,27 +170,30 @@ def test_a_periodic_poisson_medium():
     assert np.all(error < [0.03, 0.01, 0.005])
 
 
+def assert_naive(solids, around, window, variants, spacing, cutoff, edge="clip"):
+    """Each direction's length and number are those of the twin, which takes all discs around."""
+    rule = along(*ANGLES)
+    triads, offsets = turned_triads(rule, rule_triads(rule), 7, 0)
+    tallies = tally_triads(solids, triads, offsets, spacing, cutoff, variants)
+    sums = sums_of(triads[None], tallies[None], variants, edge)
+    for d, angle in enumerate(ANGLES):
+        # along the twin's u, which may point the other way
+        shift = offsets[d, 0] * round(triads[d][0] @ [-np.sin(angle), np.cos(angle), 0.0])
+        for variant in variants:
+            limit = window if variant == "c" else None
+            words = (*around, angle, shift, spacing, cutoff, limit, edge)
+            found = [one[0, d] for one in sums.kept(variant)]
+            np.testing.assert_allclose(found, naive.plane_sums(*words), rtol=1e-9, atol=1e-9)
+
+
 @pytest.mark.parametrize("name", WINDOWS)
 @pytest.mark.parametrize("cutoff", [0.0, 0.6])
 def test_the_naive_twin_of_open_samples(name, cutoff):
     """Overlapping discs, by lines row by row and by lists: whole and window, to rounding."""
-    random = np.random.default_rng(5)
-    window, clip = WINDOWS[name]
-    discs = poisson(random, 0.5, 6.0)
-    rule = along(*ANGLES)
+    discs = poisson(np.random.default_rng(5), 0.5, 6.0)
+    solids = solids_in(discs, WINDOWS[name])
     for spacing in (0.05, 1.1):
-        triads, offsets = turned_triads(rule, rule_triads(rule), 7, 0)
-        solids = solids_in(discs, window)
-        tallies = tally_triads(solids, triads, offsets, spacing, cutoff, "abcd")
-        sums = sums_of(triads[None], tallies[None], "abcd")
-        for d, angle in enumerate(ANGLES):
-            shift = naive_offset(triads[d], angle, offsets[d, 0])
-            words = discs, angle, shift, spacing, cutoff
-            whole = naive_plane.whole_sums(*words, 12.0)
-            inside = naive_plane.window_sums(*words, clip, 12.0)
-            for variant, expected in (("a", whole), ("c", inside)):
-                found = [one[0, d] for one in sums.kept(variant)]
-                np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+        assert_naive(solids, flat(discs), WINDOWS[name], "ac", spacing, cutoff)
 
 
 @pytest.mark.parametrize("name", WINDOWS)
@@ -199,38 +202,23 @@ def test_the_naive_twin_of_open_samples(name, cutoff):
 def test_the_naive_twin_of_edge_rules_in_periodic_cells(name, edge, tilt):
     """All discs with their images, from a cell that leans, too."""
     random = np.random.default_rng(6)
-    vectors = np.array([[13.0, 0.0], [tilt, 12.0]])
-    place = random.random((40, 2)) @ vectors
-    discs = np.column_stack([place, random.uniform(0.4, 0.9, 40)])
-    window, clip = WINDOWS[name]
-    cell = Cell([[13.0, 0, 0], [tilt, 12.0, 0], [0, 0, 0.5]])
-    packing = Packing(place, discs[:, 2], cell=cell)
-    sample = Sample(find_contacts(packing), np.zeros(40, bool))
-    middle = np.array([5.0, 6.0, 0.0])
-    solids = solids_of(sample, Window(middle, window), variants="c", edge=edge)
-    rule, spacing, cutoff = along(*ANGLES), 0.4, 0.5
-    triads, offsets = turned_triads(rule, rule_triads(rule), 8, 0)
-    tallies = tally_triads(solids, triads, offsets, spacing, cutoff, "c")
-    sums = sums_of(triads[None], tallies[None], "c", edge)
-    # far enough for the longest segment
-    around = naive_plane.images(discs - [5.0, 6.0, 0.0], vectors, 90.0)
-    for d, angle in enumerate(ANGLES):
-        shift = naive_offset(triads[d], angle, offsets[d, 0])
-        words = around, angle, shift, spacing, cutoff, clip, 6.0, edge
-        expected = naive_plane.window_sums(*words)
-        found = [one[0, d] for one in sums.kept("c")]
-        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
-    assert len(sample.contacts) == naive_plane.contacts(discs, vectors)
+    vectors = np.array([[13.0, 0, 0], [tilt, 12.0, 0], [0, 0, 0.5]])
+    position, radius = random.random((40, 3)) * [1, 1, 0] @ vectors, random.uniform(0.4, 0.9, 40)
+    packing = Packing(position[:, :2], radius, cell=Cell(vectors))
+    sample, middle = Sample(find_contacts(packing), np.zeros(40, bool)), np.array([5.0, 6.0, 0.0])
+    solids = solids_of(sample, Window(middle, WINDOWS[name]), variants="c", edge=edge)
+    # images far enough for the longest segment
+    shifts = np.array(list(product(range(-8, 9), range(-8, 9), [0]))) @ vectors
+    around = (position - middle + shifts[:, None]).reshape(-1, 3), np.tile(radius, len(shifts))
+    assert_naive(solids, around, WINDOWS[name], "c", 0.4, 0.5, edge)
+    periodic = (True, True, False)
+    expected = naive.contacts(position, radius, vectors=vectors, periodic=periodic)
+    assert len(sample.contacts) == len(expected)
 
 
 def rule_triads(rule):
     """The triads of a rule that is not turned."""
     return drawn_lines(rule, 0, [0])[0][0]
-
-
-def naive_offset(triad, angle, offset):
-    """The shift along the twin's u, which may point the other way."""
-    return offset * round(triad[0] @ [-np.sin(angle), np.cos(angle), 0.0])
 
 
 def test_equal_steps_are_exact():

@@ -11,6 +11,9 @@ from tests.helpers.scanning import fabric, scan_triads, solids_of
 
 WINDOW, SPACING, CUTOFF = 3.0, 0.3, 0.4
 RULE = direction_rule("lebedev:9")
+# columns of numbers that depend on no unit, order or place
+SCALARS = ("grains", "rattlers", "contacts", "coordination", "lines", "segments", "alpha_c")
+SCALARS += ("solid_fraction", "alpha_vs", "alpha_vs_axial", "alpha_c_axial")
 LOOK = {"directions": "lebedev:9", "spacing": "0.3rmin", "cutoff": "0.8rmin"}
 
 
@@ -19,26 +22,14 @@ def spheres():
     return poisson_spheres(np.random.default_rng(5), 0.15, 5.0)
 
 
-def tensors(spheres, frames, variants="abcd", unit=1.0):
+def tensors(spheres, frames, variants="abcd"):
     """Tensor of each variant, one replicate with given frames; every third grain is removed."""
     removed = np.arange(len(spheres.radius)) % 3 == 0
     offsets = np.random.default_rng(1).random((len(frames), 2))
-    solids = solids_of(spheres, WINDOW * unit, removed)
-    sums = scan_triads(solids, frames, offsets, SPACING * unit, CUTOFF * unit, variants)
+    solids = solids_of(spheres, WINDOW, removed)
+    sums = scan_triads(solids, frames, offsets, SPACING, CUTOFF, variants)
     fabrics = [void_fabric(sums.axes, RULE.weights, *sums.kept(name)) for name in variants]
     return np.array([fabric.tensor.matrix for fabric in fabrics]), sums
-
-
-def scalars(table):
-    """Columns of numbers that do not depend on unit, order and place; NaN where there is none."""
-    names = ["grains", "rattlers", "contacts", "coordination", "lines", "segments", "alpha_c"]
-    names += ["solid_fraction", "alpha_vs", "alpha_vs_axial", "alpha_c_axial"]
-    return {name: table[name] for name in names}
-
-
-def assert_same(one, other, rel=1e-9):
-    for name in one:
-        assert other[name] == pytest.approx(one[name], rel=rel, abs=1e-12, nan_ok=True), name
 
 
 def test_packing_directions_and_offsets_turned_together(spheres):
@@ -65,49 +56,26 @@ def test_packing_turned_alone():
     assert np.all(np.abs(back.mean(axis=0) - before.tensor.matrix) < 4 * error)
 
 
-@pytest.mark.parametrize("unit", [1e-9, 50.0])
-def test_lengths_in_another_unit(spheres, unit):
-    frames = line_triads(RULE.axes)
-    before, sums = tensors(spheres, frames)
-    after, scaled = tensors(spheres.scaled(unit), frames, unit=unit)
-    assert np.array_equal(scaled.segments, sums.segments)
-    assert np.abs(after - before).max() < 1e-13
-    assert scaled.length == pytest.approx(sums.length * unit, rel=1e-10, abs=0)
+GRAINS = shaken_cubic(np.random.default_rng(0), 6)
+ORDER = np.random.default_rng(2).permutation(len(GRAINS.radius))
 
 
-@pytest.mark.parametrize("unit", [1e-9, 50.0])
-def test_table_in_another_unit(unit):
-    """Contacts, defaults of the RV and lengths relative to radii included."""
-    spheres = shaken_cubic(np.random.default_rng(0), 6)
-    before = compute(Packing(*spheres), **LOOK)
-    after = compute(Packing(*spheres.scaled(unit)), **LOOK)
-    assert_same(scalars(before), scalars(after))
+@pytest.mark.parametrize(
+    ("changed", "unit"),
+    [
+        (GRAINS.scaled(1e-9), 1e-9),
+        (GRAINS.scaled(50.0), 50.0),
+        (Spheres(*(part[ORDER] for part in GRAINS)), 1.0),
+        (GRAINS.moved([7.5, -3.25, 100.0]), 1.0),
+    ],
+    ids=["small unit", "large unit", "another order", "moved"],
+)
+def test_the_table_of_the_same_packing_in_another_unit_order_or_place(changed, unit):
+    """Contacts, defaults of the RV and lengths relative to radii included; the RV moves along."""
+    before, after = compute(Packing(*GRAINS), **LOOK), compute(Packing(*changed), **LOOK)
+    for name in SCALARS:
+        assert after[name] == pytest.approx(before[name], rel=1e-9, abs=1e-12, nan_ok=True), name
     assert after["mean_length"] == pytest.approx(before["mean_length"] * unit, rel=1e-9, abs=0)
-
-
-def test_grains_in_another_order(spheres):
-    frames = line_triads(RULE.axes)
-    before, sums = tensors(spheres, frames, "ac")
-    order = np.random.default_rng(2).permutation(len(spheres.radius))
-    after, shuffled = tensors(Spheres(*(part[order] for part in spheres)), frames, "ac")
-    assert np.array_equal(shuffled.segments, sums.segments)
-    assert np.abs(after - before).max() < 1e-13
-
-
-def test_table_with_grains_in_another_order():
-    spheres = shaken_cubic(np.random.default_rng(0), 6)
-    order = np.random.default_rng(2).permutation(len(spheres.radius))
-    shuffled = Packing(*(part[order] for part in spheres))
-    before, after = compute(Packing(*spheres), **LOOK), compute(shuffled, **LOOK)
-    assert_same(scalars(before), scalars(after))
-
-
-def test_packing_moved():
-    """The RV moves along; the lines of the whole do too, as far as rounding goes."""
-    spheres = shaken_cubic(np.random.default_rng(0), 6)
-    before = compute(Packing(*spheres), **LOOK)
-    after = compute(Packing(*spheres.moved([7.5, -3.25, 100.0])), **LOOK)
-    assert_same(scalars(before), scalars(after))
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -121,16 +89,10 @@ def test_packing_mirrored(spheres, axis):
     assert np.abs(after - mirror @ before @ mirror).max() < 1e-12
 
 
-def test_contact_fabric_turns_scales_moves_and_mirrors_with_the_packing():
-    spheres = shaken_cubic(np.random.default_rng(0), 6)
-
+def test_contact_fabric_turns_and_mirrors_with_the_packing():
     def tensor(spheres):
         return contact_fabric(find_contacts(Packing(*spheres)).contacts.normal).matrix
 
-    before = tensor(spheres)
-    turn = rotation(np.random.default_rng(1))
-    mirror = np.diag([1.0, 1.0, -1.0])
-    assert np.abs(tensor(spheres.turned(turn)) - turn @ before @ turn.T).max() < 1e-12
-    assert np.abs(tensor(spheres.turned(mirror)) - mirror @ before @ mirror).max() < 1e-12
-    assert np.abs(tensor(spheres.scaled(1e-9)) - before).max() < 1e-9
-    assert np.abs(tensor(spheres.moved([3.0, 4.0, 5.0])) - before).max() < 1e-12
+    before = tensor(GRAINS)
+    for change in (rotation(np.random.default_rng(1)), np.diag([1.0, 1.0, -1.0])):
+        assert np.abs(tensor(GRAINS.turned(change)) - change @ before @ change.T).max() < 1e-12

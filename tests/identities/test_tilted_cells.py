@@ -35,28 +35,16 @@ def assert_face_centred(packing):
     assert np.abs(tensor - np.eye(3) / 3).max() < 1e-9
 
 
-def test_a_primitive_cell_of_one_grain_has_six_contacts_with_its_images():
-    packing = find_contacts(Packing([[0.2, 0.3, 0.4]], NEARLY, cell=Cell(PRIMITIVE)), TOLERANCE)
-    assert_face_centred(packing)
-    assert np.all(packing.contacts.pairs == 0)
-
-
-def test_a_lattice_has_the_same_contacts_by_any_vectors():
-    random = np.random.default_rng(0)
-    for _ in range(30):
-        cell = Cell(unimodular(random) @ PRIMITIVE, origin=random.normal(size=3))
-        position = random.normal(size=(1, 3)) * 3
-        assert_face_centred(find_contacts(Packing(position, NEARLY, cell=cell), TOLERANCE))
-
-
-@pytest.mark.parametrize("count", [1, 2, 3])
-def test_cubes_in_sheared_cells_have_the_same_contacts(count):
-    random = np.random.default_rng(1)
-    for _ in range(5):
-        cell = Cell(unimodular(random) * float(count))
-        assert_face_centred(
-            find_contacts(Packing(*face_centred_cubic(count), cell=cell), TOLERANCE)
+@pytest.mark.parametrize("count", [0, 1, 2, 3])
+def test_a_lattice_has_the_same_contacts_by_any_vectors(count):
+    """By its primitive cell (0), whose one grain touches its images, or cubes of some edge."""
+    random = np.random.default_rng(count)
+    for matrix in [np.eye(3), *(unimodular(random) for _ in range(10))]:
+        cell = Cell(
+            matrix @ (count * np.eye(3) if count else PRIMITIVE), origin=random.normal(size=3)
         )
+        spheres = face_centred_cubic(count) if count else (random.normal(size=(1, 3)) * 3, NEARLY)
+        assert_face_centred(find_contacts(Packing(*spheres, cell=cell), TOLERANCE))
 
 
 def named(packing):
@@ -74,23 +62,16 @@ def sheared():
     return spheres, np.array([[5.0, 0, 0], [6.5, 5, 0], [-2.0, 7.1, 5]])
 
 
-def test_shifting_and_wrapping_again_leaves_the_contacts(sheared):
+def test_other_places_and_other_vectors_of_the_lattice_leave_the_contacts(sheared):
     spheres, vectors = sheared
     before = find_contacts(Packing(*spheres, cell=Cell(vectors)))
     assert len(before.contacts) > 150
     random = np.random.default_rng(3)
     for shift in random.normal(size=(5, 3)) * 20:
         moved = Packing(*spheres.moved(shift), cell=Cell(vectors, origin=random.normal(size=3)))
-        np.testing.assert_allclose(named(find_contacts(moved)), named(before), atol=1e-9)
-
-
-def test_other_vectors_of_the_lattice_leave_the_contacts(sheared):
-    spheres, vectors = sheared
-    before = find_contacts(Packing(*spheres, cell=Cell(vectors)))
-    random = np.random.default_rng(4)
-    for _ in range(5):
         other = Packing(*spheres, cell=Cell(unimodular(random) @ vectors))
-        np.testing.assert_allclose(named(find_contacts(other)), named(before), atol=1e-9)
+        for packing in (moved, other):
+            np.testing.assert_allclose(named(find_contacts(packing)), named(before), atol=1e-9)
 
 
 def test_a_list_without_images_has_those_that_geometry_finds(sheared):

@@ -5,7 +5,7 @@ import pytest
 
 from scanfab import Packing, ScanfabWarning, compute
 from tests.helpers.lattices import Spheres, separate_spheres, shaken_cubic
-from tests.helpers.scanning import Z, mean_lengths, scan_along, solids_of
+from tests.helpers.scanning import Z, scan_along, solids_of
 
 
 def joined(*parts):
@@ -77,19 +77,3 @@ def test_cutoff_that_ends_an_auto_scan():
     assert [row.segments for row in rows] == [0] * 4
     told = [w for w in caught if "no void segment reaches the cut-off 10" in str(w.message)]
     assert [str(w.message).split(":")[0] for w in told] == ["frame 0, variants a, b, c, d"]
-
-
-def test_cutoff_of_a_smaller_window_leaves_the_whole_alone():
-    packing = Packing(*shaken_cubic(np.random.default_rng(0), 6, jitter=0.3))
-    options = {"cutoff": 0.9, "spacing": 0.05, "directions": "lebedev:3", "rv_radius": 0.4}
-    with pytest.warns(ScanfabWarning, match="variant c: no void segment reaches"):
-        whole, window = compute(packing, variants="ac", **options)
-    assert whole.segments > 0
-    assert whole.mean_length > 0.9
-    assert window.mean_length is None
-
-
-def test_gap_of_the_window_never_exceeds_its_diameter():
-    grains = Spheres(np.array([[0.0, 0, 3.0], [0, 0, -3.0]]), np.ones(2))
-    mean = mean_lengths(scan_along(solids_of(grains, 1.0), Z, 0.05, 1.99), "c")
-    assert 1.99 <= mean.value[0] <= 2.0

@@ -45,7 +45,9 @@ def test_any_column_may_be_named_and_id_makes_each_sphere_a_grain(tmp_path):
 
 
 def test_a_column_that_is_not_there_is_an_error_that_names_those_that_are(tmp_path):
-    with pytest.raises(ReadError, match=r"dump.txt: there is no column 'body' .*are id, .*clump"):
+    with pytest.raises(
+        ReadError, match=r"dump.txt: `bodies`: there is no column 'body'; .*are id, .*clump"
+    ):
         dump(tmp_path, "clump", [1, 1, 2, 2], bodies="body")
 
 

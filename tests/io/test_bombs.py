@@ -80,7 +80,7 @@ def test_an_array_of_one_value_is_no_bomb(tmp_path):
 def test_what_does_not_fit_into_memory_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(files, "free_memory", lambda: 1_000)
     path = polydata(tmp_path / "a.vtp", 100, SOME_POINTS)
-    with pytest.raises(ReadError, match=r"needs about 0.0 GB of memory .*and 0.0 GB are free"):
+    with pytest.raises(ReadError, match=r"takes about 0.0 GB of memory, and 0.0 GB are free"):
         scanfab.read(path)
 
 
@@ -125,7 +125,7 @@ def test_a_folder_for_copies_that_cannot_be_used_is_named(tmp_path, monkeypatch)
     # made by this process, and removed by someone else since
     monkeypatch.setattr(files, "_folder", lambda process: str(gone / "scanfab-1"))
     monkeypatch.setattr(tempfile, "tempdir", str(gone))
-    told = rf"^dump: its content cannot be written to {gone}: No such file .* by TMPDIR"
+    told = rf"^dump: cannot be written to {gone}: No such file .* by TMPDIR"
     with pytest.raises(ReadError, match=told):
         files.plain(path)
 
@@ -137,6 +137,6 @@ def test_a_full_disk_of_temporary_files_is_named(tmp_path):
 
     path = tmp_path / "dump.gz"
     path.write_bytes(gzip.compress(b"x" * 4000))
-    told = pytest.raises(ReadError, match=r"^dump: its content cannot be written to .*File too")
+    told = pytest.raises(ReadError, match=r"^dump: cannot be written to .*File too")
     with files_up_to(1000), told:
         files.plain(path)

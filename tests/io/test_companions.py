@@ -124,13 +124,6 @@ def test_contacts_of_one_frame_of_a_series_that_are_lost_are_an_error_of_that_fr
     assert second.read().step == EVERYTHING.step
 
 
-def test_files_of_early_versions_without_counts_are_read(tmp_path):
-    path, frame = written(EVERYTHING, tmp_path, "csv"), tmp_path / "a.frame.csv"
-    rows = [line.rsplit(",", 2)[0] for line in frame.read_text().splitlines()]
-    frame.write_text("\n".join(rows) + "\n")
-    assert differences(EVERYTHING, scanfab.read(path)) == []
-
-
 def test_contacts_of_0_bytes_are_an_error_beside_any_file(tmp_path):
     write(tmp_path / "a.contacts.csv", "")
     with pytest.raises(scanfab.ReadError, match=r"expected the contacts of a\.dump"):

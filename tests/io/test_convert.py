@@ -196,28 +196,23 @@ def test_lammps_reads_the_data_file_and_the_dump(tmp_path, tilt):
     np.testing.assert_allclose(again.cell.vectors, cell.vectors, atol=1e-14)
 
 
-def left_out(source, out, **reading):
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        scanfab.convert(source, out, **reading)
-    return [str(one.message) for one in caught if "left out" in str(one.message)]
+def test_that_columns_of_contacts_have_no_place_is_told_once(tmp_path):
+    # of our own files nothing is lost
+    for source, told in (
+        (series(tmp_path / "dumps"), "pairs_*.txt: of contacts"),
+        (tmp_path / "out", ""),
+    ):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            scanfab.convert(source, tmp_path / "out", to="csv")
+        found = [str(one.message) for one in caught if "of contacts" in str(one.message)]
+        assert [one.endswith("only pairs, images and forces are written") for one in found] == [
+            True
+        ] * bool(told)
+        assert all(told in one for one in found)
 
 
-def test_columns_of_contacts_that_have_no_place_are_named_once(tmp_path):
-    for step in (1, 2):
-        write(tmp_path / f"g{step}.csv", "id,x,y,z,radius\n1,0,0,0,1\n2,1.9,0,0,1\n")
-        write(tmp_path / f"g{step}.contacts.csv", "id1,id2,fn,area,x,fn2\n1,2,3.5,7,8,1\n")
-    source = scanfab.read_series([tmp_path / f"g{step}.csv" for step in (1, 2)])
-    (told,) = left_out(source, tmp_path / "{step}.npz")
-    assert "*.contacts.csv" in told
-    assert told.endswith("left out: area, x, fn2")
-    assert scanfab.read(tmp_path / "2.npz").contacts.force_n == [3.5]
-    # a column that is used is not left out, nor is any column of contacts that are not read
-    named = {"contact_columns": "id1=id1,id2=id2,fn=fn2"}
-    (told,) = left_out(tmp_path / "g1.csv", tmp_path / "a.npz", **named)
-    assert told.endswith("left out: fn, area, x")
-    assert left_out(tmp_path / "g1.csv", tmp_path / "a.npz", contacts="geometric") == []
-    # of other formats it is told that there may be more; our own files have nothing else
-    (told,) = left_out(series(tmp_path / "dumps"), tmp_path / "out", to="csv")
-    assert "pairs_*.txt: contacts are kept" in told
-    assert left_out(tmp_path / "out", tmp_path / "again", to="npz") == []
+def test_a_device_without_a_suffix_is_no_folder(tmp_path):
+    source = series(tmp_path / "dumps")
+    (written,) = scanfab.convert(source, "/dev/null", to="csv", frames=0)
+    assert str(written) == "/dev/null"

@@ -32,6 +32,9 @@ def refuses(*args, match=None, **options):
 
 
 FAR = [(1, 1e30, 0.5, 0.5, 0.1)]
+FAR_CELL = (
+    '1\nLattice="1 0 0 0 1 0 0 0 1" Origin="1e30 0 0" Properties=pos:R:3:radius:R:1\n0 0 0 1\n'
+)
 LONG = ["9" * 5000 + "x", "9" * 5000 + ".5.5", "1" * 5000 + "e"]
 NEAR_ZERO = "".join(f"{k}e300 0 0 1e-300\n" for k in range(12))
 TEXTS = [
@@ -42,7 +45,9 @@ TEXTS = [
       for value in ("inf", "nan", "1e300")),
     (dump_text([(1, 1e200, 0.5, 0.5, 0.5)], RADII), "grain 1: .* cannot be a length"),
     (dump_text([(1, 0.5, 0.5, 0.5, 1e200)], RADII), "grain 1: .* cannot be a length"),
-    (dump_text(FAR, RADII, flags=" pp pp pp"), r"coordinate of 1e\+30"),
+    (dump_text(FAR, RADII, flags=" pp pp pp"), r"grain 1 lies 1e\+30 from the origin"),
+    (dump_text(box=((-1e30, 1 - 1e30), (0, 1), (0, 1)), flags=" pp pp pp"), "no volume"),
+    (FAR_CELL, r"grain 1 lies 1e\+30 from the origin"),
     *((dump_text([(id, 1, 0.5, 0.5, 0.5, 0.1)]), "ids must be whole numbers")
       for id in ("1e300", "nan", "inf", "0.5")),
     # a pattern that could cut the digits anywhere tried all places: 32 s for a table of these

@@ -11,7 +11,7 @@ from scanfab.io.reader import GrainTable, JoinedContacts, Snapshot, installed_re
 from scanfab.packing.contacts import ContactList
 from tests.helpers.dumps import dump_text, write
 from tests.helpers.plugins import offer
-from tests.helpers.truth import FLOOR, YADE
+from tests.helpers.truth import FLOOR
 
 
 class NumbersReader:
@@ -58,21 +58,6 @@ def test_a_name_that_does_not_exist_is_an_error_that_lists_those_that_do():
     assert installed_readers()["yade"].package == "scanfab"
     with pytest.raises(UnknownFormatError, match=r"called 'rocky'.* liggghts, .*, vtk, xyz, yade"):
         scanfab.read(FLOOR / "tutorial.txt", format="rocky")
-
-
-@pytest.mark.parametrize(
-    ("path", "name"),
-    [
-        (FLOOR / "tutorial.txt.gz", "liggghts"),
-        (FLOOR / "pairs_all.txt.gz", "liggghts"),
-        (FLOOR / "grains_30000.vtk", "liggghts"),
-        (FLOOR / "grains_30000.vtp", "vtk"),
-        (YADE / "noid-spheres-00000000.vtk.gz", "yade"),
-        (YADE / "text.txt", "yade"),
-    ],
-)
-def test_a_reader_is_found_by_the_content(path, name):
-    assert reader_for(path).name == name
 
 
 def test_the_name_of_a_file_does_not_matter(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
-from tests.helpers.dumps import PAIRS, ROWS, dump_text, pairs_text, write
+from tests.helpers.dumps import PAIRS, dump_text, pairs_text, write
 from tests.helpers.truth import FLOOR, id_pairs
 
 STEPS = (9, 10, 100)
@@ -78,7 +78,7 @@ def test_contacts_by_geometry_need_no_file(folder):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert frames_of(folder)[0].contacts is None
-    with pytest.raises(ReadError, match='`contacts="file"` was asked for, but there is no contact'):
+    with pytest.raises(ReadError, match='there is no contact file, which `contacts="file"` needs'):
         scanfab.read_series(folder, contacts="file")
 
 
@@ -121,18 +121,6 @@ def test_damaged_files_beside_the_series_are_passed_over(folder):
     (folder / "photo.vtu").write_bytes(b'<VTKFile type="UnstructuredGrid">')
     (folder / "log.gz").write_bytes(b"\x1f\x8b\x08broken")
     assert len(frames_of(folder)) == 3
-
-
-def test_points_without_a_radius_are_passed_over_beside_grains(folder):
-    write(folder / "tracers_9.txt", dump_text(names="id type x y z mass"))
-    with pytest.warns(ScanfabNote, match="skipped tracers_9.*without a radius .*`radius`"):
-        assert len(frames_of(folder)) == 3
-
-
-def test_the_number_of_grains_may_change(tmp_path):
-    texts = [dump_text(rows=ROWS[:count], step=step) for step, count in enumerate((0, 2, 3, 1))]
-    write(tmp_path / "dump.txt", "".join(texts))
-    assert [len(frame) for frame in frames_of(tmp_path)] == [0, 2, 3, 1]
 
 
 def test_a_series_is_named_as_the_user_named_it(folder, monkeypatch):

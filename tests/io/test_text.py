@@ -191,7 +191,7 @@ def test_a_text_that_looks_compressed_is_not_unpacked():
     [
         ("", "expected a table, found no row"),
         ("x,y,z,radius\n1,2,3,4\n1,2,3\n", "line 3: expected 4 columns, found 3"),
-        ("x,y,z,radius,q\n1,2,3,4\n", "the columns have 5 names, but 4 columns follow"),
+        ("x,y,z,radius,q\n1,2,3,4\n", "expected 5 columns as there are names, found 4"),
         ("x,y,z,radius\n-,m,m,m\n1,2,3,4\n", "line 2: expected a number in the column x"),
         ("x,y,z,radius\n1,2,3,4\x01\n", "line 2: expected text, found the byte 1"),
         ("x,y,z,radius\r1,2,3,4\r", "without a line end"),
@@ -220,7 +220,7 @@ def test_a_separator_at_the_end_of_each_row_is_no_column(tmp_path, behind):
 
 def test_signs_of_thousands_are_no_decimal_commas(tmp_path):
     content = "x\ty\tz\tradius\n120\t840\t1,080\t60\n240\t1,200\t10\t60\n"
-    with pytest.raises(ReadError, match="'1,080' may be a decimal sign or a sign of thous"):
+    with pytest.raises(ReadError, match="'1,080' may be a decimal sign or one of thous"):
         scanfab.read(write(tmp_path / "a.tsv", content))
     packing = scanfab.read(write(tmp_path / "b.tsv", content.replace("840", "0,840")))
     np.testing.assert_array_equal(packing.position, [[120, 0.84, 1.08], [240, 1.2, 10]])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from scanfab import Cell, ContactList, Packing
-from scanfab.packing.clump_volumes import own_shares
+from scanfab import Cell, ContactList, Packing, find_contacts
+from scanfab.packing.bodies import own_shares
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.pipeline.state import _rays, contact_forces, sample_state
 
@@ -108,8 +108,6 @@ def test_mechanical_coordination_is_of_bodies():
     position = np.vstack([inner, inner + np.array([0, 0, 1.0]), [[3.0, 0, 0], [4.5, 0, 0]]])
     number = [0, 1, 2, 0, 1, 2, 3, 3]
     packing = Packing(position, 1.0, bodies=number, cell=Cell([20.0] * 3), contacts=None)
-    from scanfab import find_contacts
-
     sample = Sample(find_contacts(packing), np.zeros(8, bool))
     state = sample_state(sample, VARIANTS["a"], None)
     assert state.coordination_mechanical == pytest.approx((3 + 2 + 2) / 3)

@@ -7,7 +7,7 @@ import pytest
 
 from scanfab.base.errors import PackingError, ScanfabWarning
 from scanfab.packing.cell import Cell
-from scanfab.packing.contacts import ContactList
+from scanfab.packing.contacts import ContactList, ListedWallForces
 from scanfab.packing.packing import Packing
 
 PAIR = np.array([[0.0, 0, 0], [1.9, 0, 0]])
@@ -77,15 +77,17 @@ def test_what_is_no_packing_is_told_by_grain_and_array(given, told):
         Packing(**{"position": ROW, "radius": 1.0, "id": [10, 20, 30], **given})
 
 
-def test_no_grains_are_a_packing():
-    packing = Packing(np.zeros((0, 3)), np.zeros(0), contacts=np.zeros((0, 2), int))
-    assert len(packing) == len(packing.contacts) == 0
-
-
-def test_columns_may_hold_vectors_and_words():
-    packing = Packing(ROW, 1.0, columns={"v": ROW, "element": ["Si", "O", "O"]})
+def test_what_a_packing_takes():
+    """No grains, numbers of any kind, columns of vectors and words."""
+    empty = Packing(np.zeros((0, 3)), np.zeros(0), contacts=np.zeros((0, 2), int))
+    assert len(empty) == len(empty.contacts) == 0
+    columns = {"v": ROW, "element": ["Si", "O", "O"]}
+    packing = Packing(ROW, 0.5, id=[1.0, 2.0, 5.0], columns=columns)
+    assert packing.id.tolist() == [1, 2, 5]
+    assert packing.radius.tolist() == [0.5, 0.5, 0.5]
     assert packing.columns["v"].shape == (3, 3)
     assert packing.columns["element"][0] == "Si"
+    assert Packing(ROW, 0.5).id.tolist() == [0, 1, 2]
 
 
 def test_the_arrays_are_copies_that_cannot_be_written():
@@ -161,34 +163,27 @@ def test_the_source_of_a_list_is_kept():
     )
 
 
-def test_other_contacts_keep_everything_else():
+@pytest.mark.parametrize(("walls", "expected"), [(None, [1, 0, 2]), ([0, 3, 1], [0, 3, 1])])
+def test_other_contacts_keep_everything_else(walls, expected):
+    """Also those with walls, unless others are named, whose forces are not known."""
+    forces = ListedWallForces([0], [[-1.0, 0, 0]], [[1.0, 0, 0]])
     packing = Packing(
-        ROW,
-        1.0,
-        id=[5, 6, 7],
-        columns={"type": [1, 2, 3]},
-        wall_contacts=[1, 0, 2],
-        step=4,
-        time=0.5,
-    )
-    other = packing.with_contacts(ContactList([[0, 1]]))
+        ROW, 1.0, id=[5, 6, 7], columns={"type": [1, 2, 3]}, step=4, time=0.5,
+        wall_contacts=[1, 0, 2], wall_forces=forces,
+    )  # fmt: skip
+    other = packing.with_contacts(ContactList([[0, 1]]), walls)
     np.testing.assert_array_equal(other.id, packing.id)
     np.testing.assert_array_equal(other.columns["type"], [1, 2, 3])
-    np.testing.assert_array_equal(other.wall_contacts, [1, 0, 2])
+    np.testing.assert_array_equal(other.wall_contacts, expected)
+    assert (other.wall_forces is None) == (walls is not None)
     assert (other.step, other.time, len(other.contacts)) == (4, 0.5, 1)
+    assert packing.contacts is None
 
 
 @pytest.mark.parametrize("x", [-1e-17, -1e-300, 5.7, 11.4, -5.7])
 def test_centres_are_wrapped_into_the_cell(x):
     packing = Packing([[x, 0, 0]], 1.0, cell=Cell([5.7, 9, 9]))
     assert 0 <= packing.position[0, 0] < 5.7
-
-
-def test_defaults_and_casts():
-    packing = Packing(ROW, 0.5, id=[1.0, 2.0, 5.0])
-    assert packing.id.tolist() == [1, 2, 5]
-    assert Packing(ROW, 0.5).id.tolist() == [0, 1, 2]
-    assert packing.radius.tolist() == [0.5, 0.5, 0.5]
 
 
 # forces
@@ -215,13 +210,11 @@ def test_through_a_periodic_face_the_normal_is_that_of_the_image():
 @pytest.mark.parametrize(
     ("given", "expected"), [([-4.0], -4.0), ([[-4.0, 0, 0]], -4.0), ([[0.0, 4, 0]], 0.0)]
 )
-def test_a_normal_force_alone_is_a_number_or_a_vector_on_the_second_grain(given, expected):
+def test_a_normal_force_is_a_number_or_a_vector_on_the_second_grain(given, expected):
+    """Where the whole force is known, the normal force follows from that."""
+    both = ContactList([[0, 1]], force=[PUSH], force_n=[7.0])
+    np.testing.assert_array_equal(Packing(PAIR, 1.0, contacts=both).contacts.force_n, [2.0])
     contacts = Packing(PAIR, 1.0, contacts=ContactList([[0, 1]], force_n=given)).contacts
     assert contacts.force is None
     np.testing.assert_array_equal(contacts.force_n, [expected])
     assert repr(contacts) == "Contacts: 1 contact from file with normal forces"
-
-
-def test_where_the_force_is_known_its_normal_part_follows():
-    listed = ContactList([[0, 1]], force=[PUSH], force_n=[7.0])
-    np.testing.assert_array_equal(Packing(PAIR, 1.0, contacts=listed).contacts.force_n, [2.0])

@@ -33,23 +33,6 @@ def test_rattlers_are_found_in_one_pass():
     assert not sample.removed(C).any()
 
 
-def test_contacts_with_walls_count_for_the_rattler_rule():
-    assert rows(row_of_grains(wall_contacts=[1, 0, 0, 0, 0, 0]).rattlers) == [5]
-    lonely = Sample(
-        Packing([[0, 0, 0], [9, 0, 0]], 1.0, contacts=np.zeros((0, 2)), wall_contacts=[2, 1]),
-        np.zeros(2, bool),
-    )
-    assert rows(lonely.rattlers) == [1]
-
-
-@pytest.mark.parametrize(
-    ("least", "expected"), [(0, []), (1, []), (2, [0, 5]), (3, [0, 1, 2, 3, 4, 5])]
-)
-def test_number_of_contacts_of_a_rattler_may_be_chosen(least, expected):
-    sample = row_of_grains()
-    assert rows(Sample(sample.packing, sample.boundary, least).rattlers) == expected
-
-
 def test_grain_held_by_its_own_images_is_no_rattler():
     packing = find_contacts(Packing([[1, 1, 1]], 0.6, cell=Cell([1.0, 4.0, 4.0])))
     sample = Sample(packing, np.zeros(1, bool))

@@ -1,4 +1,4 @@
-"""Contacts of lattices and chains, and contacts that are listed more than once."""
+"""Contacts by geometry: those of a slow twin in any cell, of lattices and chains; near pairs."""
 
 import itertools
 
@@ -9,7 +9,9 @@ from scanfab import (
     Cell,
     ContactList,
     Packing,
+    PackingError,
     Sample,
+    SettingsError,
     Window,
     compute,
     contact_fabric,
@@ -17,38 +19,157 @@ from scanfab import (
     sphere,
 )
 from scanfab.packing.sample import VARIANTS
-from scanfab.packing.search import near_pairs
+from scanfab.packing.search import near_pairs, overlapping_pairs
+from tests.helpers import naive
 from tests.helpers.lattices import face_centred_cubic, simple_cubic
+from tests.helpers.uncompiled import run_uncompiled
 
 TOLERANCE = 1e-4
 
 
-def periodic(spheres, edges, **cell):
-    return find_contacts(Packing(*spheres, cell=Cell(edges, **cell)), TOLERANCE)
+def canonical(contacts):
+    """Contacts as a set, each named as the slow twin does; none may be listed twice."""
+    named = set()
+    for (i, j), image in zip(contacts.pairs.tolist(), contacts.image.tolist(), strict=True):
+        if i > j or (i == j and image < [0, 0, 0]):
+            i, j, image = j, i, [-n for n in image]
+        assert (i, j, tuple(image)) not in named
+        named.add((i, j, tuple(image)))
+    return named
+
+
+def assert_those_of_the_slow_twin(position, radius, tolerance=0.0, **cell):
+    packing = Packing(position, radius, cell=Cell(**cell) if cell else None)
+    found = find_contacts(packing, tolerance).contacts
+    lattice = (cell["vectors"], cell["periodic"]) if cell else ()
+    expected = naive.contacts(packing.position, packing.radius, tolerance, *lattice)
+    assert canonical(found) == expected
+    assert sorted(found.pairs.tolist()) == found.pairs.tolist()
+
+
+def check_random_open(random):
+    count = random.integers(1, 40)
+    position = random.random((count, 3)) * random.choice([0.5, 2.0, 6.0], 3)
+    radius = np.exp(random.uniform(np.log(0.02), 0.0, count)) * 0.7
+    assert_those_of_the_slow_twin(position, radius, random.choice([0.0, 1e-4, 0.01]))
+
+
+def random_vectors(random):
+    """Thin cells, most of them tilted: upright, as LAMMPS writes them, or any three vectors."""
+    vectors = np.diag(random.uniform(0.8, 3.0, 3))
+    kind = random.integers(3)
+    if kind == 1:
+        vectors[[1, 2, 2], [0, 0, 1]] = random.uniform(-2.5, 2.5, 3) * vectors[0, 0]
+    while kind == 2:
+        vectors = random.normal(size=(3, 3)) * random.uniform(0.5, 2.0)
+        if abs(np.linalg.det(vectors)) > 0.3:
+            break
+    return vectors
+
+
+def check_random_periodic(random):
+    """Any mix of open vectors; grains from dust to some that touch their own images."""
+    vectors, count = random_vectors(random), random.integers(1, 7)
+    periodic, origin = tuple(random.random(3) < 0.7), random.uniform(-5, 5, 3)
+    position = origin + random.uniform(-1, 2, (count, 3)) @ vectors
+    radius = random.uniform(0.02, 1.0, count) * random.choice([0.1, 0.3, 0.7])
+    radius *= random.choice([1.0, 0.01], count)
+    cell = {"vectors": vectors, "periodic": periodic, "origin": origin}
+    assert_those_of_the_slow_twin(position, radius, **cell)
+
+
+@pytest.mark.parametrize(
+    ("check", "times"), [(check_random_open, 150), (check_random_periodic, 300)]
+)
+def test_contacts_are_those_of_the_slow_twin(check, times):
+    for seed in range(times):
+        check(np.random.default_rng(seed))
+
+
+def test_contacts_are_those_of_the_slow_twin_uncompiled():
+    run_uncompiled(
+        "import numpy as np\n"
+        "from scanfab.packing import kernels\n"
+        "from tests.packing import test_search as here\n"
+        "assert not hasattr(kernels.find_pairs, 'py_func')\n"
+        "for seed in range(20):\n"
+        "    here.check_random_open(np.random.default_rng(seed))\n"
+        "    here.check_random_periodic(np.random.default_rng(seed))\n"
+    )
+
+
+@pytest.mark.parametrize("edges", [(0.5, 0.5, 0.5), (0.7, 2.5, 8.0), (2.9, 2.9, 2.9)])
+def test_cells_thinner_than_a_grain(edges):
+    position = np.random.default_rng(3).random((4, 3)) * edges
+    cell = {"vectors": edges, "periodic": (True, True, True)}
+    assert_those_of_the_slow_twin(position, np.array([0.49, 0.3, 0.1, 0.48]), **cell)
+
+
+def test_a_grain_of_many_cells_is_a_mistake_of_units():
+    with pytest.raises(PackingError, match="spans 200 periodic cells: have the cell and the radii"):
+        find_contacts(Packing([[0.5, 0.5, 0.5]], 100.0, cell=Cell([1.0, 1.0, 1.0])))
+
+
+@pytest.mark.parametrize("tolerance", [-1e-9, np.inf, np.nan])
+def test_a_tolerance_is_a_number_from_0(tolerance):
+    with pytest.raises(SettingsError, match="contact_tolerance: expected a number >= 0, found"):
+        find_contacts(Packing([[0, 0, 0]], 1.0), tolerance)
+
+
+@pytest.mark.parametrize("far", [1e3, 1e9, 1e60])
+@pytest.mark.parametrize("cell", [None, Cell([1.0, 1.1, 5.0], (True, True, False))])
+def test_grains_that_flew_away_leave_the_bins_small(far, cell):
+    """In bins that span all, 20000² / 2 pairs would be looked at; the far ones touch each other."""
+    position = np.random.default_rng(4).random((20_000, 3))
+    position[::5000, 2] = far
+    position[1::5000] = position[::5000] + np.array([0.01, 0.0, 0.0])
+    pairs, _ = overlapping_pairs(position, np.full(20_000, 0.02), 1.0, cell)
+    is_near = position[:, 2] <= 1
+    among, _ = overlapping_pairs(position[is_near], np.full(is_near.sum(), 0.02), 1.0, cell)
+    assert is_near[pairs].all(axis=1).sum() == len(among)
+    found = {tuple(pair) for pair in pairs[~is_near[pairs].any(axis=1)].tolist()}
+    assert {(k, k + 1) for k in range(0, 20_000, 5000)} <= found
+
+
+def test_size_ratio_of_a_thousand_takes_little_memory_and_time():
+    """All dust in the bins of one boulder would be 20000² / 2 pairs to look at."""
+    position = np.random.default_rng(2).random((20_000, 3))
+    radius = np.full(20_000, 2e-4)
+    radius[:3] = 0.2
+    pairs, _ = overlapping_pairs(position, radius)
+    gaps = np.linalg.norm(position[:3, None] - position, axis=2) - (radius[:3, None] + radius)
+    with_boulders = {(min(i, j), max(i, j)) for i, j in np.argwhere(gaps < 0).tolist() if i != j}
+    assert with_boulders == {tuple(pair) for pair in pairs.tolist() if pair[0] < 3}
+
+
+@pytest.mark.parametrize("sizes", ["equal", "unlike"])
+def test_grains_on_top_of_one_another_are_refused_before_all_pairs_are_tried(sizes):
+    """The 5e9 pairs of 100,000 would take all memory; those of 900 are more than usual."""
+    random = np.random.default_rng(0)
+    radius = np.ones(100_000) if sizes == "equal" else np.exp(random.uniform(0, 7, 100_000))
+    position = random.uniform(-1e-3, 1e-3, (100_000, 3))
+    with pytest.raises(PackingError, match=r"more than 1000 contacts a grain.*100000.*units"):
+        find_contacts(Packing(position, radius))
+    few = find_contacts(Packing(position[:900], radius[:900])).contacts
+    assert len(few) == 900 * 899 // 2
+
+
+# lattices and chains
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 5])
-@pytest.mark.parametrize(
-    ("lattice", "contacts_of_a_cell"), [(simple_cubic, 3), (face_centred_cubic, 24)]
-)
-def test_cubic_lattices_have_the_isotropic_contact_fabric(lattice, contacts_of_a_cell, count):
+@pytest.mark.parametrize(("lattice", "each"), [(simple_cubic, 6), (face_centred_cubic, 12)])
+def test_cubic_lattices_have_their_coordination_and_the_isotropic_fabric(lattice, each, count):
     """A cell of one grain touches nothing but its own images."""
-    packing = periodic(lattice(count), [count] * 3)
-    assert len(packing.contacts) == contacts_of_a_cell * count**3
+    packing = find_contacts(Packing(*lattice(count), cell=Cell([count] * 3)), TOLERANCE)
+    assert len(packing.contacts) == each * len(packing) / 2
     tensor = contact_fabric(packing.contacts.normal)
     assert np.abs(tensor.matrix - np.eye(3) / 3).max() < 1e-9
     assert tensor.alpha < 1e-9
-
-
-@pytest.mark.parametrize(
-    ("lattice", "coordination"), [(simple_cubic, 6.0), (face_centred_cubic, 12.0)]
-)
-def test_cubic_lattices_have_their_coordination_number(lattice, coordination):
-    packing = periodic(lattice(4), [4, 4, 4])
-    row = compute(packing, variants="c", directions="lebedev:5", spacing=0.2, cutoff=0.1)[0]
-    assert row.coordination == coordination
-    assert row.rattlers == 0
-    assert row.alpha_c == pytest.approx(0, abs=1e-9)
+    if count == 5:
+        row = compute(packing, variants="c", directions="lebedev:5", spacing=0.2, cutoff=0.1)[0]
+        assert (row.coordination, row.rattlers) == (each, 0)
+        assert row.alpha_c == pytest.approx(0, abs=1e-9)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -61,36 +182,62 @@ def test_all_contacts_along_one_axis(axis):
     tensor = contact_fabric(packing.contacts.normal)
     assert len(packing.contacts) == 5
     assert tensor.matrix == pytest.approx(np.diag(np.eye(3)[axis]), abs=1e-12)
-    assert tensor.alpha == pytest.approx(1.0)
     assert tensor.axial(np.eye(3)[axis]) == pytest.approx(1.0)
 
 
-def test_periodic_contact_listed_twice_or_from_both_sides_counts_once():
-    """Through a face, and with an own image."""
-    packing = periodic(simple_cubic(2), [2, 2, 2])
+def through_many_images():
+    """Two grains of a cell that is thinner than they are along x and y."""
+    cell = Cell([0.6, 1.5, 9.0], (True, True, False))
+    return find_contacts(Packing([[0.1, 0.1, 4], [0.4, 1.3, 4]], 1.0, cell=cell))
+
+
+@pytest.mark.parametrize(
+    "packing",
+    [
+        find_contacts(Packing(*simple_cubic(2), cell=Cell([2, 2, 2])), TOLERANCE),
+        through_many_images(),
+    ],
+    ids=["lattice", "through several images"],
+)
+def test_contacts_listed_twice_or_from_both_sides_count_once(packing):
+    """Through a face, and with own images."""
     listed = packing.contacts
     both = ContactList(
         np.concatenate([listed.pairs, listed.pairs[:, ::-1], listed.pairs]),
         np.concatenate([listed.image, -listed.image, listed.image]),
     )
     again = packing.with_contacts(both).contacts
-    assert len(listed) == 24
     assert np.array_equal(again.pairs, listed.pairs)
     assert np.array_equal(again.image, listed.image)
 
 
-@pytest.mark.parametrize(("radius", "contacts"), [(0.5 * (1 + 1e-9), 54), (0.5 * (1 - 1e-9), 0)])
-def test_contact_without_a_tolerance_needs_an_overlap(radius, contacts):
-    """However small it is; touching exactly would be decided by rounding."""
-    packing = find_contacts(Packing(simple_cubic(3).position, radius))
+def test_a_pair_touches_through_each_image_that_is_near_enough():
+    steps = list(itertools.product(range(-9, 10), repeat=2))
+    near = [(i, j) for i, j in steps if np.hypot(0.3 + 0.6 * i, 1.2 + 1.5 * j) < 2.0]
+    own = [(i, j) for i, j in steps if (i, j) > (0, 0) and np.hypot(0.6 * i, 1.5 * j) < 2.0]
+    expected = {(0, 1, (i, j, 0)) for i, j in near}
+    expected |= {(row, row, (i, j, 0)) for row in (0, 1) for i, j in own}
+    assert canonical(through_many_images().contacts) == expected
+
+
+@pytest.mark.parametrize(
+    ("scale", "tolerance", "contacts"),
+    [
+        (1 - 1e-9, 0.0, 54),
+        (1 + 1e-9, 0.0, 0),
+        ((1 + 0.9e-4) * 1e-6, TOLERANCE, 54),
+        ((1 + 1.1e-4) * 1e-6, TOLERANCE, 0),
+    ],
+)
+def test_a_contact_needs_an_overlap_or_a_gap_below_the_relative_tolerance(
+    scale, tolerance, contacts
+):
+    radius = 0.5 if tolerance == 0.0 else 0.5e-6
+    packing = find_contacts(Packing(simple_cubic(3).position * scale, radius), tolerance)
     assert len(packing.contacts) == contacts
 
 
-@pytest.mark.parametrize(("gap", "contacts"), [(0.9e-4, 54), (1.1e-4, 0)])
-def test_tolerance_is_relative_to_the_sum_of_the_radii(gap, contacts):
-    lattice = simple_cubic(3)
-    packing = find_contacts(Packing(lattice.position * (1 + gap) * 1e-6, 0.5e-6), TOLERANCE)
-    assert len(packing.contacts) == contacts
+# near pairs
 
 
 @pytest.fixture(scope="module")
@@ -103,23 +250,21 @@ def sample():
 
 
 def every_pair(packing, chosen, gap):
-    """Normals, overlaps and middles of pairs of the chosen grains, one after the other."""
+    """Overlaps, normals and middles of pairs of the chosen grains, one after the other."""
     found = []
-    rows = np.flatnonzero(chosen)
     shifts = [
         np.array(one) @ packing.cell.vectors for one in itertools.product((-1, 0, 1), repeat=3)
     ]
-    for one, two in itertools.combinations(rows, 2):
-        for shift in shifts:
-            branch = packing.position[two] + shift - packing.position[one]
-            distance = np.linalg.norm(branch)
-            overlap = packing.radius[one] + packing.radius[two] - distance
-            if overlap > -gap:
-                middle = packing.position[one] + branch / distance * (
-                    packing.radius[one] - overlap / 2
-                )
-                found.append((overlap, *branch / distance, *middle))
-    return np.array(found)
+    pairs = itertools.combinations(np.flatnonzero(chosen), 2)
+    for (one, two), shift in itertools.product(pairs, shifts):
+        branch = packing.position[two] + shift - packing.position[one]
+        distance = np.linalg.norm(branch)
+        overlap = packing.radius[one] + packing.radius[two] - distance
+        if overlap > -gap:
+            normal = branch / distance
+            middle = packing.position[one] + normal * (packing.radius[one] - overlap / 2)
+            found.append((overlap, *normal, *middle))
+    return np.array(sorted(found))
 
 
 @pytest.mark.parametrize("variant", ["a", "b"])
@@ -129,7 +274,6 @@ def test_pairs_of_a_tilted_cell(sample, variant):
     found = near_pairs(sample, VARIANTS[variant], None, 0.25)
     assert len(expected) > 20
     order = np.argsort(found.overlap)
-    expected = expected[np.argsort(expected[:, 0])]
     np.testing.assert_allclose(found.overlap[order], expected[:, 0], atol=1e-12)
     turned = np.einsum("ci,ci->c", found.normal[order], expected[:, 1:4])
     np.testing.assert_allclose(np.abs(turned), 1.0, atol=1e-12)

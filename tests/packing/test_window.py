@@ -25,6 +25,15 @@ def test_points_in_the_window_are_nearer_than_its_radius():
     assert window.contains(points, four_grains()).tolist() == [True, True, False, True, False]
 
 
+def test_many_points_are_looked_at_some_at_a_time():
+    """The 300,000th as the first."""
+    window = Window(np.array([-0.5, 2.5, 3.5]), sphere(1.0))
+    points = np.array([[8.9, 2.5, 3.5], [4.5, 6.5, 6.5], [-0.5, 9.8, 3.5]])
+    packing, rows = Packing([[0, 3, 4]], 1.0, cell=CELL), np.arange(300_000) % 3
+    assert np.array_equal(window.contains(points[rows], packing), rows != 1)
+    assert np.array_equal(window.may_meet(points[rows], 0.1 * rows, packing), rows != 1)
+
+
 def test_distance_is_to_the_nearest_image():
     packing = Packing([[0, 3, 4]], 1.0, cell=CELL)
     window = Window(np.array([-0.5, 2.5, 3.5]), sphere(1.0))

@@ -128,19 +128,3 @@ def test_areas_and_stress_are_those_of_the_twin(sample, rows):
     assert (rows["a"].stress_zz, rows["a"].stress_xz) == (0.0, 0.0)
     assert rows["a"].p == pytest.approx(0.5 * np.trace(stress))
     assert rows["a"].q == pytest.approx(stress[1, 1] - stress[0, 0])
-
-
-def test_rattlers_are_void_to_the_last_disc(sample, rows):
-    """b and d are a and c of the packing without the discs of rattlers."""
-    packing, held = sample.packing, sample.pressing_neighbours(0.2) >= 2
-    left = Packing(
-        packing.position[held], packing.radius[held], bodies=sample.number[held],
-        cell=packing.cell, dim=2,
-    )  # fmt: skip
-    alone = compute(
-        find_contacts(left), variants="ac", edge="start", rv_shape="ellipsoid", rv_size=(3.5, 2.5),
-        cutoff=packing.radius.min(), rv_center=(*packing.cell.vectors[:2].sum(axis=0) / 2,), **FAST,
-    )  # fmt: skip
-    for mine, theirs in zip("bd", alone, strict=True):
-        assert rows[mine].segments == theirs.segments
-        assert rows[mine].alpha_vs_axial == pytest.approx(theirs.alpha_vs_axial, abs=1e-12)

@@ -29,15 +29,14 @@ def test_grains_contacts_and_rattlers_are_counted(tmp_path):
     assert report.contacts_from == "file"
 
 
-def test_boundary_particles_are_no_grains(tmp_path):
-    (report,) = reports(tmp_path, [dump_text()], boundary="type=2")
-    assert (report.grains, report.boundary) == (2, 1)
-
-
-def test_a_boundary_that_fits_nothing_in_any_frame_is_an_error(tmp_path):
+def test_a_boundary_that_fits_nothing_in_any_frame_is_an_error_or_the_rule_is_told(tmp_path):
     message = "boundary: no particle of any frame has type=9 or id>7: type is 1 or 2; id is 1 or 2"
     with pytest.raises(scanfab.SettingsError, match=message):
         reports(tmp_path, [dump_text(), dump_text(step=1)], boundary=["type=9", "id>7"])
+    with pytest.warns(ScanfabWarning, match="no particle of any frame has type=9: type is") as told:
+        (report,) = reports(tmp_path, [dump_text()], boundary=["type=2", "type=9"])
+    assert len(told) == 1
+    assert (report.grains, report.boundary, report.warnings) == (2, 1, [])
 
 
 def test_a_boundary_that_fits_nothing_in_one_frame_is_a_warning(tmp_path):
@@ -47,13 +46,6 @@ def test_a_boundary_that_fits_nothing_in_one_frame_is_a_warning(tmp_path):
     first, second = reports(tmp_path, texts, boundary="type=9")
     assert first.warnings == ["`boundary`: no particle has type=9: type is 1 or 2"]
     assert (first.boundary, second.boundary, second.warnings) == (0, 1, [])
-
-
-def test_of_several_boundaries_the_one_that_fits_nothing_is_named(tmp_path):
-    with pytest.warns(ScanfabWarning, match="no particle of any frame has type=9: type is") as told:
-        (report,) = reports(tmp_path, [dump_text()], boundary=["type=2", "type=9"])
-    assert len(told) == 1
-    assert (report.boundary, report.warnings) == (1, [])
 
 
 def test_a_format_without_a_cell_is_always_told(tmp_path):
@@ -86,15 +78,12 @@ def test_an_empty_frame_has_no_radii(tmp_path):
     assert full.grains == len(ROWS)
 
 
-def test_chosen_frames_keep_their_numbers(tmp_path):
-    texts = [dump_text(step=step) for step in range(5)]
-    assert [report.frame for report in reports(tmp_path, texts, frames="1:4:2")] == [1, 3]
-
-
 def test_a_part_of_a_series_is_reported_as_its_frames_among_all(tmp_path):
     texts = [dump_text(step=step) for step in range(4)]
     write(tmp_path / "dump.txt", "".join(texts))
     series = scanfab.read_series(tmp_path)
     every = list(inspect_series(series, Settings()))
+    assert [report.frame for report in every] == [0, 1, 2, 3]
+    assert list(inspect_series(series, Settings(frames="1:4:2"))) == every[1::2]
     assert list(inspect_series(series[1:3], Settings())) == every[1:3]
     assert list(inspect_series(series[1:], Settings(frames="-1"))) == every[3:]

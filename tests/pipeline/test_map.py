@@ -1,13 +1,26 @@
 """Maps: what a row holds, what is refused, and that layers are told apart."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import scanfab
-from scanfab import Cell, Packing, ScanfabWarning, SettingsError, compute, fabric_map
+from scanfab import (
+    Cell,
+    Packing,
+    ScanfabWarning,
+    SettingsError,
+    Window,
+    compute,
+    fabric_map,
+    sphere,
+)
+from scanfab.base.shapes import box, cylinder
+from scanfab.pipeline.maps.blocks import volumes_inside
 from scanfab.pipeline.maps.settings import MapSettings
+from scanfab.scan.blocks import Blocks
 from tests.helpers.lattices import shaken_cubic, simple_cubic
 
 LINES = {"directions": "lebedev:11", "spacing": 0.1}
@@ -112,8 +125,8 @@ def test_solid_fraction_is_that_of_a_lattice_and_empty_at_an_open_surface(kind):
     position, radius = simple_cubic(16)
     table, _ = mapped(Packing(position, radius * 0.98), contact_tolerance=0.05, **kind)
     outer = table["at_surface"] == 1
-    assert outer.any()
-    assert not outer.all()
+    # all but the middle ones
+    assert np.count_nonzero(~outer) == (8 if "grid" in kind else 3)
     assert np.isnan(table["solid_fraction"][outer]).all()
     expected = np.pi / 6 * 0.98**3
     # shells cut a lattice's cells, of which the innermost holds but 33
@@ -142,36 +155,6 @@ def test_a_frame_of_discs_among_spheres_is_refused():
         fabric_map(frames[1], grid=(2, 2, 1))
 
 
-def test_blocks_in_the_middle_of_an_open_sample_lose_no_segments():
-    """Overlapping spheres: their mean length is known, and lower where segments leave."""
-    random = np.random.default_rng(4)
-    count = random.poisson(0.25 * 24**3)
-    packing = Packing(random.uniform(0, 24, (count, 3)), random.uniform(0.5, 1.5, count))
-    table, _ = mapped(packing, spacing=0.4, grid=(5, 5, 5), cutoff=0.5)
-    outer = table["at_surface"] == 1
-    expected = mean_length_of_poisson(0.25)
-    inner = table["mean_length"][~outer]
-    assert len(inner) == 27
-    error = inner.std(ddof=1) / np.sqrt(27)
-    assert abs(inner.mean() - expected) < 4 * error
-
-
-def test_blocks_at_an_open_surface_lose_the_long_segments():
-    random = np.random.default_rng(4)
-    count = random.poisson(0.1 * 24**3)
-    packing = Packing(random.uniform(0, 24, (count, 3)), random.uniform(0.5, 1.5, count))
-    table, _ = mapped(packing, spacing=0.4, grid=(3, 3, 3), cutoff=0.5)
-    outer = table["mean_length"][table["at_surface"] == 1]
-    assert len(outer) == 26
-    error = outer.std(ddof=1) / np.sqrt(26)
-    assert outer.mean() < mean_length_of_poisson(0.1) - 4 * error
-
-
-def mean_length_of_poisson(density):
-    """Of freely overlapping spheres with radii from 0.5 to 1.5, at a cut-off of 0.5."""
-    return 0.5 + 1 / (density * np.pi * 13 / 12)
-
-
 def test_the_rv_and_its_rules(packing):
     """The window's blocks hold what the window holds, by each rule at its surface."""
     for edge in ("clip", "start", "ends"):
@@ -195,24 +178,24 @@ def test_the_median_block_meets_the_tolerance(packing):
     assert any("before the tolerance 1e-05 was met" in one for one in told)
 
 
-def test_blocks_follow_a_cell_that_deforms():
-    """Each holds the same grains, whose positions move with the cell."""
+@pytest.mark.parametrize(
+    ("cells", "squeeze", "z", "grains"),
+    [
+        # blocks follow a cell that deforms, and hold the same grains
+        (True, [1.05, 1.05, 0.9], [2.0, 6.0, 1.8, 5.4], [256] * 4),
+        # those of an open sample stay where they were
+        (False, [1.0, 1.0, 0.8], [2.0, 6.0, 2.0, 6.0], [256, 256, 320, 192]),
+    ],
+)
+def test_blocks_of_later_frames(cells, squeeze, z, grains):
     position, radius = simple_cubic(8)
     frames = [
-        Packing(position * squeeze, radius * 0.9, cell=Cell(8.0 * squeeze))
-        for squeeze in (np.ones(3), np.array([1.05, 1.05, 0.9]))
+        Packing(position * one, radius * 0.9, cell=Cell(8.0 * one) if cells else None)
+        for one in (np.ones(3), np.array(squeeze))
     ]
     table, _ = mapped(frames, slices=2, contact_tolerance=0.2)
-    assert table["grains"].tolist() == [256] * 4
-    assert table["z"].tolist() == pytest.approx([2.0, 6.0, 1.8, 5.4])
-
-
-def test_blocks_of_an_open_sample_stay_where_they_were():
-    position, radius = simple_cubic(8)
-    frames = [Packing(position, radius), Packing(position * [1, 1, 0.8], radius)]
-    table, _ = mapped(frames, slices=2, contact_tolerance=1e-4)
-    assert table["z"].tolist() == pytest.approx([2.0, 6.0] * 2)
-    assert table["grains"].tolist() == [256, 256, 320, 192]
+    assert table["grains"].tolist() == grains
+    assert table["z"].tolist() == pytest.approx(z, abs=0.06)
 
 
 def test_frames_without_grains_have_empty_rows():
@@ -273,3 +256,49 @@ def test_threads_and_the_same_seed_give_the_same_bytes(packing):
     with pytest.warns(ScanfabWarning):
         other = fabric_map(packing, grid=(2, 2, 1), seed=1, **LINES)
     assert other["alpha_vs_axial"][0] != one["alpha_vs_axial"][0]
+
+
+CENTER = np.array([1.0, -2.0, 0.5])
+
+
+def tiling(half, parts):
+    """A box about the centre in equal parts."""
+    half = np.asarray(half)
+    return Blocks(CENTER - half, np.diag(2 * half), parts)
+
+
+@pytest.mark.parametrize("parts", [(1, 1, 1), (2, 2, 2), (3, 2, 1), (4, 5, 6)])
+def test_a_grid_fills_its_window(parts):
+    for half, shape, volume in [
+        ([2.0, 2.0, 2.0], sphere(2.0), 32 / 3 * np.pi),
+        ([1.0, 1.0, 1.5], cylinder(1.0, 3.0), 3 * np.pi),
+        ([1.0, 2.0, 3.0], box([2.0, 4.0, 6.0]), 48.0),
+    ]:
+        blocks = tiling(half, parts)
+        found = volumes_inside(blocks, Window(CENTER, shape))
+        assert found.sum() == pytest.approx(volume, rel=1e-3)
+        assert np.all(found <= blocks.volumes[:, None] / 8 * (1 + 1e-12))
+        # blocks on opposite sides of the centre
+        np.testing.assert_allclose(found.sum(axis=1), found.sum(axis=1)[::-1], rtol=1e-9)
+
+
+def test_shells_end_at_the_surface_of_a_box():
+    """The ball of radius 1 in a cube of edge 2 is whole; beyond its corners there is nothing."""
+    reach = np.sqrt(3.0)
+    blocks = replace(tiling([reach] * 3, (1, 1, 1)), radius=reach, shells=4)
+    found = volumes_inside(blocks, Window(CENTER, box([2.0, 2.0, 2.0])))
+    assert found.sum() == pytest.approx(8.0, rel=1e-3)
+    within = 4 / 3 * np.pi * (reach * np.array([1, 2]) / 4) ** 3
+    np.testing.assert_allclose(found[:2].sum(axis=1), np.diff(within, prepend=0.0), rtol=1e-9)
+    np.testing.assert_allclose(found, found[:, :1].repeat(8, axis=1), rtol=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
+@pytest.mark.parametrize("kind", [{"slices": 5}, {"grid": (1, 1, 1)}, {"shells": 3}])
+def test_the_solid_in_all_blocks_of_an_rv_is_what_is_in_the_rv(packing, kind):
+    words = {"variants": "c", "rv": 0.8, "spacing": 0.1, "directions": "lebedev:11"}
+    table = fabric_map(packing, **words, **kind)
+    z = np.linspace(-1, 1, 6)
+    volumes = {"slices": np.diff(3 * z - z**3), "grid": [1], "shells": np.diff([0, 1, 8, 27])}
+    mean = np.average(table["solid_fraction"], weights=volumes[next(iter(kind))])
+    assert mean == pytest.approx(compute(packing, **words)[0].solid_fraction, abs=2e-3)

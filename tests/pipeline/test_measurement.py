@@ -5,14 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from scanfab import (
-    Cell,
-    Packing,
-    ScanfabWarning,
-    Settings,
-    compute,
-    find_contacts,
-)
+from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_contacts
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.pipeline.measurement import measure
 from scanfab.pipeline.plan import make_plan
@@ -53,12 +46,7 @@ def test_contacts_are_left_out_by_the_octant_of_their_point(packing, table):
         assert without(row, "alpha_c_axial") == pytest.approx(np.array(expected), abs=1e-12)
         scatter = sum((one - np.mean(expected)) ** 2 for one in expected)
         assert row.alpha_c_axial_sample_se == pytest.approx(math.sqrt(7 / 8 * scatter))
-
-
-def test_values_without_octants_scatter_about_the_whole(table):
-    for row in table:
         values = without(row, "alpha_vs_axial")
-        assert np.ptp(values) > 0
         assert abs(values.mean() - row.alpha_vs_axial) < np.ptp(values)
 
 
@@ -108,15 +96,6 @@ def test_cut_offs_whose_errors_are_above_the_tolerance_are_told(packing):
         table = compute(packing, **words, cutoffs="0.2,0.8")
     low, high = table
     assert low.alpha_vs_axial_se <= 2e-3 < high.alpha_vs_axial_se
-
-
-def test_two_grains_have_no_scatter():
-    pair = find_contacts(Packing([[0.0, 0, 0], [1.0, 0, 0]], [0.6, 0.6]))
-    with pytest.warns(match="in some direction no void segment is kept"):
-        row = compute(pair, **LINES, variants="a", cutoff=0.0)[0]
-    assert row.alpha_c_axial is not None
-    assert row.alpha_c_axial_sample_se is None
-    assert without(row, "alpha_c_axial").tolist() == [None] * 8
 
 
 def measured(packing, **words):

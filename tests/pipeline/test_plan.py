@@ -1,24 +1,14 @@
 """The plan: settings turned into lengths, lines and replicates by the first frame."""
 
 import math
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 
-from scanfab import (
-    Packing,
-    ScanfabWarning,
-    Settings,
-    SettingsError,
-    compute,
-    find_contacts,
-)
+from scanfab import Packing, ScanfabWarning, Settings, SettingsError, compute, find_contacts
 from scanfab.packing.sample import Sample
-from scanfab.pipeline.plan import (
-    FEWEST_LINES,
-    REPLICATES,
-    make_plan,
-)
+from scanfab.pipeline.plan import FEWEST_LINES, REPLICATES, make_plan
 from tests.helpers.lattices import shaken_cubic
 
 
@@ -41,9 +31,12 @@ def test_lengths_relative_to_radii_are_those_of_the_grains_without_the_boundary(
     packing = Packing([[0, 0, 0], [3, 0, 0], [6, 3, 3], [9, 0, 0]], [1.0, 0.5, 1.2, 0.1])
     boundary = [False, False, False, True]
     for text, length in [("2rmin", 1.0), ("1rmean", 0.9), ("0.5rmax", 0.6), ("0.25", 0.25)]:
-        plan = plan_of(packing, boundary, cutoff=text, spacing="0.1rmin", directions=20)
+        plan = plan_of(packing, boundary, cutoff=text, spacing="0.1rmin", directions=20, rv=0.9)
         assert plan.cutoff == pytest.approx(length)
     assert plan.spacing / math.sqrt(plan.replicates) == pytest.approx(0.05)
+    # surfaces from -1 to 7.2, 4.2 and 4.2
+    assert plan.window.radius == pytest.approx(0.9 * 5.2 / 2)
+    assert plan.window.center == pytest.approx([3.1, 1.6, 1.6])
 
 
 def test_fixed_scan_shares_its_lines_among_sixteen_replicates(packing):
@@ -77,52 +70,10 @@ def test_spacing_column_is_that_of_all_replicates_together(packing):
     assert rows[1].lines == pytest.approx(lines * 7, rel=0.06)
 
 
-def test_one_replicate_has_an_empty_standard_error(packing):
-    row = compute(packing, spacing=0.8, directions="lebedev:5", variants="c", cutoff=0.1)[0]
-    assert row.replicates == 1
-    assert row.alpha_vs_axial is not None
-    assert row.alpha_vs_axial_se is None
-
-
-def test_a_direction_without_any_kept_segment_leaves_no_fabric(packing):
-    """One replicate of few lines: some of its axes keep nothing, and the row says so."""
-    options = {"spacing": 0.9, "directions": "lebedev:17", "cutoff": 1.5, "variants": "c"}
-    with pytest.warns(ScanfabWarning, match="variant c: in some direction no void segment is kept"):
-        row = compute(packing, **options)[0]
-    assert row.segments > 0
-    assert row.mean_length is None
-    assert row.alpha_vs is None
-
-
-def test_filled_directions_of_a_replicate_are_warned_of(packing):
-    options = {"spacing": 0.2, "directions": "lebedev:17", "cutoff": 1.5, "variants": "c"}
-    with pytest.warns(ScanfabWarning, match=r"\d% of the directions keep no void segment in a rep"):
-        row = compute(packing, **options)[0]
-    assert row.mean_length > 1.5
-    assert row.alpha_vs_axial_se > 0
-
-
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-2])
 def test_auto_spacing_never_makes_too_few_lines(packing, tolerance):
     plan = plan_of(packing, tolerance=tolerance)
     assert math.pi * plan.window.radius**2 / plan.spacing**2 >= 4 * FEWEST_LINES * (1 - 1e-9)
-
-
-def test_default_window_is_a_fraction_of_half_the_smallest_extent_of_the_surfaces():
-    position = [[0, 0, 0], [10, 0, 0], [0, 8, 0], [0, 0, 9], [5, 4, 4]]
-    window = plan_of(Packing(position, [1.0, 0.5, 0.5, 0.5, 0.5]), rv=0.6).window
-    # surfaces from -1 to 10.5, 8.5 and 9.5
-    assert window.radius == pytest.approx(0.6 * 9.5 / 2)
-    assert window.center == pytest.approx([4.75, 3.75, 4.25])
-
-
-@pytest.mark.parametrize("variants", ["a", "cd"])
-def test_spacing_wider_than_the_sample_is_refused(packing, variants):
-    match = r"spacing: expected a length from .* found 100: .*1rmin \(0\.4"
-    with pytest.raises(SettingsError, match=match):
-        plan_of(packing, spacing=100.0, directions=20, variants=variants)
-    with pytest.raises(SettingsError, match=match):
-        plan_of(packing, spacing=100.0, variants=variants)
 
 
 @pytest.mark.parametrize(("tolerance", "warns"), [(0.08, False), (0.07, True)])
@@ -132,7 +83,31 @@ def test_bias_of_a_rule_counts_over_a_tenth_of_the_tolerance(packing, tolerance,
     assert any("isotropic" in note.text for note in notes) == warns
 
 
-def test_a_cutoff_of_hundreds_of_radii_asks_for_rmin(packing):
-    options = {"spacing": 0.8, "directions": 9, "variants": "c", "cutoff": 1000.0}
-    with pytest.warns(ScanfabWarning, match="no void segment reaches .*did you mean 1rmin?"):
-        compute(packing, **options)
+@pytest.mark.parametrize("variants", ["a", "cd"])
+@pytest.mark.parametrize("more", [{}, {"directions": 20}])
+def test_spacing_wider_than_the_sample_is_refused(packing, variants, more):
+    match = r"spacing: expected a length from .* found 100: .*1rmin \(0\.4"
+    with pytest.raises(SettingsError, match=match):
+        plan_of(packing, spacing=100.0, variants=variants, **more)
+
+
+@pytest.mark.parametrize(
+    ("options", "told", "values"),
+    [
+        # one replicate of few lines: no error, and some of its axes keep nothing
+        ({"spacing": 0.8, "directions": "lebedev:5", "cutoff": 0.1}, None, (True, False)),
+        ({"spacing": 0.9}, "variant c: in some direction no void segment is kept", (False, False)),
+        ({"spacing": 0.2}, r"\d% of the directions keep no void segment in a rep", (True, True)),
+        (
+            {"spacing": 0.8, "cutoff": 1000.0},
+            "no void segment reaches .*did you mean 1rmin?",
+            (False, False),
+        ),
+    ],
+)
+def test_few_lines_give_less_and_are_told(packing, options, told, values):
+    words = {"directions": "lebedev:17", "cutoff": 1.5, "variants": "c", **options}
+    with pytest.warns(ScanfabWarning, match=told) if told else nullcontext():
+        (row,) = compute(packing, **words)
+    assert (row.alpha_vs_axial is not None, row.alpha_vs_axial_se is not None) == values
+    assert (row.mean_length is not None) == values[0]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import Cell, Packing, PackingError, SettingsError, compute, find_contacts
+from scanfab import Cell, Packing, PackingError, SettingsError, compute
 from scanfab.base.space import SPACE, Space
 from tests.helpers.dumps import dump_text
 from tests.helpers.truth import SAMPLE_DATA
@@ -34,34 +34,27 @@ def series_of(tmp_path, *heights, **options):
     return scanfab.read_series(tmp_path, **options)
 
 
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
 @pytest.mark.parametrize(
-    ("count", "dim", "space"),
-    [(10, "auto", XY), (9, "auto", SPACE), (9, 2, XY), (10, 3, SPACE)],
+    ("heights", "dim", "found"),
+    [
+        ([[0.5] * 10], "auto", XY),
+        ([[0.5] * 9], "auto", SPACE),
+        ([[0.5] * 9], 2, XY),
+        ([[0.5] * 10], 3, SPACE),
+        # the first frame that has grains decides for all, whichever is read first
+        ([[], [0.5] * 12, [0.7] * 2], "auto", XY),
+        ([[0.5] * 16, [*[0.5] * 15, 0.6]], "auto", r"dump.1: .*z = 0.5 and at z = 0.6: `dim=3`"),
+        ([[*[0.5] * 15, 0.6]], 2, "do not lie in one coordinate plane"),
+    ],
 )
-def test_the_first_frame_decides(tmp_path, count, dim, space):
-    series = series_of(tmp_path, [0.5] * count, dim=dim)
-    assert series[0].read().space == space
-
-
-@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
-def test_one_frame_decides_for_all_whichever_is_read_first(tmp_path):
-    series = series_of(tmp_path, [], [0.5] * 12, [0.7] * 2)
-    assert series[2].read().space == XY
-    assert series[0].read().space == XY
-    assert len(series[0].read()) == 0
-
-
-@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
-def test_a_frame_that_leaves_the_plane_is_an_error(tmp_path):
-    series = series_of(tmp_path, [0.5] * 16, [*[0.5] * 15, 0.6])
-    with pytest.raises(PackingError, match=r"dump.1: .*z = 0.5 and at z = 0.6: `dim=3`"):
-        series[1].read()
-
-
-def test_discs_that_are_asked_for_must_lie_in_a_plane(tmp_path):
-    series = series_of(tmp_path, [*[0.5] * 15, 0.6], dim=2)
-    with pytest.raises(PackingError, match="do not lie in one coordinate plane"):
-        series[0].read()
+def test_the_first_frame_decides(tmp_path, heights, dim, found):
+    series = series_of(tmp_path, *heights, dim=dim)
+    if isinstance(found, str):
+        with pytest.raises(PackingError, match=found):
+            series[-1].read()
+    else:
+        assert series[-1].read().space == series[0].read().space == found
 
 
 def test_frames_of_mixed_dimension_are_an_error(discs):
@@ -83,6 +76,8 @@ def test_positions_with_two_coordinates_are_discs(discs):
         Packing(position, radius, dim=3)
     with pytest.raises(PackingError, match="dim: expected 2 or 3, found 4"):
         Packing(position, radius, dim=4)
+    with pytest.raises(PackingError, match="two of them in the plane"):
+        Packing(*discs, cell=Cell([[14.0, 0, 1.0], [0, 14, 0], [0, 0, 3]]))
 
 
 def test_the_period_across_the_plane_is_ignored(discs):
@@ -94,12 +89,6 @@ def test_the_period_across_the_plane_is_ignored(discs):
     ]
     assert [dict(row) for row in tables[1]] == [dict(row) for row in tables[0]]
     assert [dict(row) for row in tables[2]] == [dict(row) for row in tables[0]]
-
-
-def test_a_cell_whose_vectors_leave_the_plane_is_an_error(discs):
-    cell = Cell([[14.0, 0, 1.0], [0, 14, 0], [0, 0, 3]])
-    with pytest.raises(PackingError, match="two of them in the plane"):
-        Packing(*discs, cell=cell)
 
 
 @pytest.mark.parametrize(
@@ -131,17 +120,6 @@ def test_rv_sizes_and_solid_fraction(discs):
     assert other.grains == 24
     assert one.coordination == 4.0
     assert one.gc_xx == pytest.approx(0.5)
-
-
-def test_contact_anisotropy_and_its_error(discs):
-    """α = G1 - G2, axial 2 a·G·a - 1, its error that of 2(a·n)² - 1."""
-    packing = find_contacts(Packing(*discs))
-    (row,) = compute(packing, variants="a", axis="x", **FAST)
-    along = 2 * packing.contacts.normal[:, 0] ** 2 - 1
-    assert row.alpha_c_axial == pytest.approx(along.mean())
-    assert row.alpha_c_axial_se == pytest.approx(np.std(along, ddof=1) / np.sqrt(len(along)))
-    spread = np.hypot(row.gc_xx - row.gc_yy, 2 * row.gc_xy)
-    assert row.alpha_c == pytest.approx(spread)
 
 
 @pytest.mark.parametrize("follows", ["cell", "grains"])

@@ -9,13 +9,12 @@ import scanfab
 from scanfab import Settings, SettingsError
 from scanfab.packing import rattlers
 from scanfab.pipeline.inspection import inspect_series
-from scanfab.viz.frame_view import look_at
+from scanfab.viz.scene import look_at
 from tests.helpers.dumps import dump_text, write
 from tests.helpers.lattices import simple_cubic
 from tests.helpers.plugins import offer
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.1rmin", "variants": "ab"}
-WORDS = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.1rmin", "--variants", "ab"]
 RADIUS = 0.55
 
 
@@ -28,14 +27,9 @@ def block_with_a_tail():
 
 
 @pytest.fixture
-def dump(tmp_path):
+def series(tmp_path):
     rows = [(k, 1, *place, RADIUS) for k, place in enumerate(block_with_a_tail().tolist(), start=1)]
-    return write(tmp_path / "dump.txt", dump_text(rows, box=((-1, 7),) * 3))
-
-
-@pytest.fixture
-def series(dump):
-    return scanfab.read_series(dump)
+    return scanfab.read_series(write(tmp_path / "dump.txt", dump_text(rows, box=((-1, 7),) * 3)))
 
 
 def untouched(touching):
@@ -56,7 +50,7 @@ EXPECTED = [("count", 2), ("recursive", 3), ("untouched", 1)]
 
 @pytest.mark.usefixtures("made_up")
 @pytest.mark.parametrize(("rule", "expected"), EXPECTED)
-def test_tables_tell_the_rattlers_of_the_rule_and_b_leaves_them_out(series, rule, expected):
+def test_tables_inspect_and_views_tell_the_rattlers_of_the_rule(series, rule, expected):
     whole, without = scanfab.compute(series, rattlers=rule, **SCAN)
     assert whole.rattlers == without.rattlers == expected
     assert without.grains == whole.grains - expected == 67 - expected
@@ -66,13 +60,8 @@ def test_tables_tell_the_rattlers_of_the_rule_and_b_leaves_them_out(series, rule
     assert without.solid_fraction is None
     assert without.alpha_vs_axial is not None
 
-
-@pytest.mark.usefixtures("made_up")
-@pytest.mark.parametrize(("rule", "expected"), EXPECTED)
-def test_inspect_and_views_take_the_rule_too(series, rule, expected):
     settings = Settings(rattlers=rule, variants="c")
-    (report,) = inspect_series(series, settings)
-    assert report.rattlers == expected
+    assert next(inspect_series(series, settings)).rattlers == expected
     assert look_at(series, settings).scene.grains.rattler.sum() == expected
 
 

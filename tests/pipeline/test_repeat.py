@@ -9,8 +9,8 @@ import pytest
 
 from scanfab.base.errors import ReadError
 from scanfab.cli.main import run
-from scanfab.pipeline.record import asked_for, read_manifest
-from scanfab.pipeline.repeat import reopen, repeat_command, restored_settings
+from scanfab.pipeline.record import asked_for, read_manifest, restored_settings
+from scanfab.pipeline.repeat import reopen, repeat_command
 from scanfab.pipeline.settings import Settings
 from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import cubic_rows, dump_text, write
@@ -44,7 +44,7 @@ def asked_by(tmp_path, monkeypatch):
             found.update(asked_for(*given))
             raise ReadError("enough")
 
-        monkeypatch.setattr("scanfab.pipeline.job.asked_for", remember)
+        monkeypatch.setattr("scanfab.pipeline.record.asked_for", remember)
         assert run(["compute", *words]) == 1
         return json.loads(json.dumps(found))
 
@@ -68,16 +68,16 @@ def test_what_is_usual_is_not_repeated():
     assert repeat_command(json.loads(json.dumps(asked))) == "scanfab compute dumps"
 
 
-def test_settings_come_back():
+def test_all_settings_but_the_workers_are_named_and_come_back():
     settings = Settings(
         boundary=["type=2", "id>=9"], cutoff="0.3rmax", frames="1:9:2", axis="x", workers=1
     )
-    asked = json.loads(json.dumps(asked_for(["d"], {}, settings)))
-    restored = restored_settings(asked)
-    assert restored.boundary == settings.boundary
-    assert restored.cutoff == settings.cutoff
-    assert restored.frames == settings.frames
-    assert restored.axis == settings.axis
+    asked = asked_for(["d"], {"radius": 0.1}, settings)
+    assert (asked["sources"], asked["radius"], asked["cutoff"]) == (["d"], 0.1, "0.3rmax")
+    assert set(Settings.__dataclass_fields__) - set(asked) == {"workers"}
+    restored = restored_settings(json.loads(json.dumps(asked)))
+    for name in ("boundary", "cutoff", "frames", "axis"):
+        assert getattr(restored, name) == getattr(settings, name)
 
 
 def test_the_source_is_opened_as_it_was(monkeypatch):
@@ -90,23 +90,20 @@ def test_the_source_is_opened_as_it_was(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("source", "message"), [("-", "standard input"), ("gone/away", "gone/away is not there")]
+    ("source", "message"), [("-", "standard input"), ("gone/away", "gone/away: there is no such")]
 )
 def test_sources_that_are_gone_are_an_error(source, message):
     with pytest.raises(ReadError, match=message):
         reopen(asked_for([source], {}, Settings()))
 
 
-@pytest.mark.parametrize("text", ["{", "[]", "{}", '{"settings": 3}', '{"settings": {}}', "\udcff"])
+@pytest.mark.parametrize("text", ["{", "[]", "{}", '{"settings": {}}', "\udcff"])
 def test_what_is_no_manifest_is_an_error(tmp_path, text):
+    assert read_manifest(tmp_path / "t.csv") is None
     path = tmp_path / "t.csv.manifest.json"
     path.write_bytes(text.encode("utf-8", "surrogateescape"))
     with pytest.raises(ReadError, match=r"t\.csv\.manifest\.json: "):
         read_manifest(tmp_path / "t.csv")
-
-
-def test_no_manifest_is_none(tmp_path):
-    assert read_manifest(tmp_path / "t.csv") is None
 
 
 def test_columns_and_digits_are_repeated(tmp_path, monkeypatch):

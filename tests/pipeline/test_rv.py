@@ -50,19 +50,16 @@ def test_sizes_are_fractions_of_the_half_extents(flat):
         expected = np.full(3, 0.7 * half[across])
         expected["xyz".index(axis)] = 0.7 * half["xyz".index(axis)]
         assert window.shape.high == pytest.approx(expected)
+    # an oblique one fits into the box
+    random = np.random.default_rng(3)
+    for _ in range(50):
+        axis = tuple(rotation(random)[0])
+        high = window_of(flat, rv_shape="cylinder", rv_axis=axis, rv=0.9).shape.high
+        assert np.all(high <= 0.9 * half * (1 + 1e-9))
+        assert np.any(high > 0.7 * half)
     given = window_of(flat, rv_shape="box", rv_size="1,2,3", rv_center="4 4 2")
     assert given.shape.high.tolist() == [0.5, 1.0, 1.5]
     assert given.center.tolist() == [4.0, 4.0, 2.0]
-
-
-def test_an_oblique_cylinder_fits_into_the_box_that_it_is_a_fraction_of(flat):
-    half = 0.5 * SurfaceBox.of(flat.packing, flat.grains).extents
-    random = np.random.default_rng(3)
-    for _ in range(50):
-        axis = rotation(random)[0]
-        window = window_of(flat, rv_shape="cylinder", rv_axis=tuple(axis), rv=0.9)
-        assert np.all(window.shape.high <= 0.9 * half * (1 + 1e-9))
-        assert np.any(window.shape.high > 0.7 * half)
 
 
 def surface(path, corners):
@@ -79,38 +76,11 @@ def test_a_surface_lies_where_its_file_says_or_about_the_centre_that_is_asked_fo
     assert window.center == pytest.approx(center)
     assert window.shape.high == pytest.approx(half)
     assert window_of(flat, rv_shape=file, rv_center="5,4,2").center.tolist() == [5.0, 4.0, 2.0]
-
-
-def test_a_surface_that_is_no_convex_body_is_refused_by_its_file(flat, tmp_path):
-    corners = corners_of_a_box(np.ones(3))
-    corners[0] *= 0.3
-    file = surface(tmp_path / "notch.ply", corners)
+    notched = corners_of_a_box(np.ones(3)) * np.where(np.arange(8) == 0, 0.3, 1.0)[:, None]
+    file = surface(tmp_path / "notch.ply", notched)
     words = r"rv_shape: .*notch.ply: .* not convex: .*expected a closed convex surface"
     with pytest.raises(SettingsError, match=words):
         window_of(flat, rv_shape=file)
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"rv_shape": "box", "rv_size": "14,2,2"}, "beyond the sample, .*or a smaller `rv_size`"),
-        ({"rv_shape": "ellipsoid", "rv_size": "2,2,5"}, "beyond the sample"),
-        ({"rv_shape": "cylinder", "rv_size": "1,9"}, "beyond the sample"),
-        ({"rv_shape": "box", "rv": 2.0}, "beyond the sample"),
-        (
-            {"rv_shape": "ellipsoid", "rv_size": "1e-12,1,1"},
-            "rv: the ellipsoid .* is nothing beside the smallest grain",
-        ),
-        ({"rv_shape": "box", "rv_size": "2,2,1e-11"}, "is nothing beside"),
-        (
-            {"rv_shape": "box", "rv_size": "0.1,0.1,0.1", "rv_center": "10.8,8.8,5.8"},
-            r"holds no grain: choose another `rv_center` or a larger one \(`rv_radius`, `rv_size`",
-        ),
-    ],
-)
-def test_windows_that_say_nothing_of_the_sample_are_refused(flat, options, words):
-    with pytest.raises(SettingsError, match=words):
-        make_plan(Settings(**options), flat)
 
 
 TILTED = np.array([[6.0, 0.0, 0.0], [2.5, 6.0, 0.0], [-2.0, 1.5, 6.0]])
@@ -159,25 +129,34 @@ def test_a_window_across_periodic_faces_is_that_of_the_repeated_packing(tilted, 
     assert np.array_equal(window.may_meet(packing.position, packing.radius, packing), meets)
 
 
+BEYOND, NOTHING, IMAGE = "beyond the sample", "is nothing beside", "overlaps its own image"
+
+
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("sample", "shape", "options", "words"),
     [
-        ({"rv": 1.5}, "wider than the cell's shortest period"),
-        ({"rv_shape": "box", "rv_size": "6.1,1,1"}, r"overlaps its own image, \(.*\) away"),
-        ({"rv_shape": "ellipsoid", "rv_size": "3.1,1,1"}, "overlaps its own image"),
-        ({"rv_shape": "cylinder", "rv_size": "0.4,100"}, "overlaps its own image"),
-        ({"rv_shape": "box", "rv_size": "1e9,1e9,1e9"}, "more than 10 periods"),
+        ("flat", "box", {"rv_size": "14,2,2"}, "beyond the sample, .*or a smaller `rv_size`"),
+        ("flat", "ellipsoid", {"rv_size": "2,2,5"}, BEYOND),
+        ("flat", "cylinder", {"rv_size": "1,9"}, BEYOND),
+        ("flat", "box", {"rv": 2.0}, BEYOND),
+        ("flat", "ellipsoid", {"rv_size": "1e-12,1,1"}, f"rv: the ellipsoid .* {NOTHING}"),
+        ("flat", "box", {"rv_size": "2,2,1e-11"}, NOTHING),
+        (
+            "flat", "box", {"rv_size": "0.1,0.1,0.1", "rv_center": "10.8,8.8,5.8"},
+            r"holds no grain: choose another `rv_center` or a larger one \(`rv_radius`, `rv_size`",
+        ),
+        ("tilted", "sphere", {"rv": 1.5}, "wider than the cell's shortest period"),
+        ("tilted", "box", {"rv_size": "6.1,1,1"}, rf"{IMAGE}, \(.*\) away"),
+        ("tilted", "ellipsoid", {"rv_size": "3.1,1,1"}, IMAGE),
+        ("tilted", "cylinder", {"rv_size": "0.4,100"}, IMAGE),
+        ("tilted", "box", {"rv_size": "1e9,1e9,1e9"}, "more than 10 periods"),
     ],
-)
-def test_a_window_must_not_overlap_its_own_images(tilted, options, words):
+)  # fmt: skip
+def test_windows_that_say_nothing_or_overlap_themselves_are_refused(
+    request, sample, shape, options, words
+):
     with pytest.raises(SettingsError, match=words):
-        make_plan(Settings(**options), tilted)
-
-
-def sheared(sample, gradient):
-    packing = sample.packing
-    cell = Cell(packing.cell.vectors @ gradient.T, origin=[1.0, 2.0, 3.0])
-    return sample_of(Packing(packing.position @ gradient.T + [1, 2, 3], packing.radius, cell=cell))
+        make_plan(Settings(rv_shape=shape, **options), request.getfixturevalue(sample))
 
 
 def test_a_window_that_follows_the_cell_is_deformed_as_the_cell(tilted):
@@ -185,7 +164,9 @@ def test_a_window_that_follows_the_cell_is_deformed_as_the_cell(tilted):
     gradient = np.array([[0.9, 0.2, 0.0], [0.1, 1.1, 0.0], [0.0, 0.3, 0.95]])
     plan = make_plan(Settings(rv_shape="box", rv_follows="strain"), tilted)
     assert plan.in_frame(tilted).window is plan.window
-    after = sheared(tilted, gradient)
+    cell = Cell(TILTED @ gradient.T, origin=[1.0, 2.0, 3.0])
+    places = tilted.packing.position @ gradient.T + [1, 2, 3]
+    after = sample_of(Packing(places, tilted.packing.radius, cell=cell))
     window = plan.in_frame(after).window
     assert window.shape.volume == pytest.approx(plan.window.shape.volume * np.linalg.det(gradient))
     assert window.center == pytest.approx(gradient @ plan.window.center + [1, 2, 3])

@@ -166,8 +166,8 @@ def test_a_strain_file_must_exist(tmp_path):
         ({"edge": "ends", "moment": 2}, "moment: .* choose `edge=start`"),
         ({"rv_size": "1,2,3"}, "rv_size: the shape sphere takes none: choose `rv_radius`"),
         ({"rv_shape": "cylinder", "rv_size": "1,2,3"}, "rv_size: expected R,H.* found 1,2,3"),
-        ({"rv_shape": "ellipsoid", "rv_radius": 2.0}, "rv_radius: .* choose `rv_size`"),
-        ({"rv_shape": "box", "rv_axis": "x"}, "rv_axis: is that of a cylinder"),
+        ({"rv_shape": "ellipsoid", "rv_radius": 2.0}, "rv_radius: .* `rv_shape` is ellipsoid"),
+        ({"rv_shape": "box", "rv_axis": "x"}, "rv_axis: .* choose `rv_shape=.cylinder.`"),
         ({"rv": "0.4,0.5", "rv_radius": 1}, "rv_radius: .* `rv` asks for 2"),
     ],
 )

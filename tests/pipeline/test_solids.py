@@ -44,6 +44,10 @@ def test_a_scan_by_hand_is_that_of_compute(periodic, variants, lines):
     sample = Sample(one, one.columns["type"] == 2)
     window = None if variants == "b" else window_of(2.0, sample)
     solids = scanfab.solids_of(sample, window, variants=variants)
+    if not periodic and "a" in variants:
+        np.testing.assert_allclose(
+            solids.position + solids.origin, one.position[sample.grains], atol=1e-14
+        )
     replicates = table[0].replicates
     spacing = table[0].spacing * np.sqrt(replicates)
     sums = scanfab.scan_lines(
@@ -54,15 +58,6 @@ def test_a_scan_by_hand_is_that_of_compute(periodic, variants, lines):
         fabric = scanfab.void_fabric(sums.axes, RULE.weights, *sums.kept(row.variant))
         np.testing.assert_allclose(fabric.tensor.matrix, tensor, rtol=0, atol=1e-15)
         assert fabric.mean_length == pytest.approx(row.mean_length, rel=1e-14)
-
-
-def test_positions_are_told_from_an_origin():
-    one = packing()
-    sample = Sample(one, np.zeros(len(one), bool))
-    for window in (None, Window([2.0, 3.0, 3.0], scanfab.sphere(1.5))):
-        solids = scanfab.solids_of(sample, window)
-        np.testing.assert_allclose(solids.position + solids.origin, one.position, atol=1e-14)
-    np.testing.assert_array_equal(solids.origin, window.center)
 
 
 def test_a_window_wider_than_the_cell_is_refused():

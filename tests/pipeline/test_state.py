@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import warnings
 
 import numpy as np
 import pytest
@@ -158,11 +157,6 @@ def test_lenses_and_points_agree():
     assert points.sum() == pytest.approx(exact.sum(), rel=3e-4)
 
 
-def test_a_box_cuts_a_sphere_in_half():
-    found = cut_volumes(np.array([[1.0, 0, 0]]), np.array([0.5]), box((2.0, 2.0, 2.0)))
-    assert found[0] == pytest.approx(0.5 * np.pi / 6, rel=3e-3)
-
-
 # the programs' own numbers
 
 
@@ -187,31 +181,27 @@ def lammps():
 
 
 @pytest.mark.parametrize("frame", [0, 1])
-def test_fabric_and_forces_are_those_of_lammps_compute_fabric(lammps, frame):
-    found = table(lammps[frame])
-    told = np.loadtxt(LAMMPS / "fabric.txt")[frame, 1:].reshape(4, 6)
-    fabric = 7.5 * (found.tensor("gc")[0] - np.eye(3) / 3)
-    np.testing.assert_allclose(six(fabric), told[0], rtol=0, atol=1e-13)
-    np.testing.assert_allclose(six(found.tensor("bn")[0]), told[1], rtol=0, atol=1e-13)
-    np.testing.assert_allclose(six(found.tensor("fn")[0]), told[2], rtol=0, atol=1e-13)
-
-
-@pytest.mark.parametrize("frame", [0, 1])
-def test_stress_is_the_virial_of_lammps(lammps, frame):
+def test_fabric_forces_and_stress_are_those_of_lammps(lammps, frame):
     """
-    Within a thousandth of the kinetic part, which the forces' damping at another moment makes.
+    Its compute fabric, and its virial.
 
+    That within a thousandth of the kinetic part, which the forces' damping at another moment makes.
     Off the diagonal LAMMPS has one of the two components whose mean is taken here.
     """
+    packing, found = lammps[frame], table(lammps[frame])
+    told = np.loadtxt(LAMMPS / "fabric.txt")[frame, 1:].reshape(4, 6)
+    fabric = 7.5 * (found.tensor("gc")[0] - np.eye(3) / 3)
+    for one, theirs in zip(
+        (fabric, found.tensor("bn")[0], found.tensor("fn")[0]), told[:3], strict=True
+    ):
+        np.testing.assert_allclose(six(one), theirs, rtol=0, atol=1e-13)
     told = np.loadtxt(LAMMPS / "stress.txt")[frame, 1:]
-    stress = whole(lammps[frame]).stress
     kinetic = np.abs(told[6:9] - told[:3]).max()
-    assert np.all(np.abs(np.diag(stress) - told[:3]) < kinetic)
-    contacts, volume = lammps[frame].contacts, abs(np.linalg.det(lammps[frame].cell.vectors))
-    one, two = contacts.pairs.T
-    branch = lammps[frame].position[two] - lammps[frame].position[one]
-    branch += contacts.image @ lammps[frame].cell.vectors
-    product = branch.T @ contacts.force / volume
+    assert np.all(np.abs(np.diag(whole(packing).stress) - told[:3]) < kinetic)
+    one, two = packing.contacts.pairs.T
+    branch = packing.position[two] - packing.position[one]
+    branch += packing.contacts.image @ packing.cell.vectors
+    product = branch.T @ packing.contacts.force / abs(np.linalg.det(packing.cell.vectors))
     np.testing.assert_allclose(six(product), told[:6], atol=3e-6 * told[:3].mean())
 
 
@@ -249,39 +239,31 @@ def test_stress_and_strong_and_weak_contacts_are_those_of_yade():
     np.testing.assert_allclose(whole(exported).stress, expected, rtol=0, atol=2.0)
 
 
-def test_one_state_written_by_each_program_has_the_same_tensors():
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning", "ignore::scanfab.ScanfabNote")
+@pytest.mark.parametrize(
+    ("grains", "contacts", "tolerance"),
+    [
+        # its box has six digits
+        ("liggghts.1.txt.gz", "liggghts_contacts.1.txt.gz", 3e-6),
+        ("yade.xml.bz2", None, 1e-11),
+        ("yade-spheres-00000000.vtk.gz", "yade-intrs-00000000.vtk.gz", 1e-5),
+    ],
+)
+def test_one_state_written_by_each_program_has_the_same_tensors(grains, contacts, tolerance):
     columns = (
         "id1=c_ids[1],id2=c_ids[2],fx=c_pair[2],fy=c_pair[3],fz=c_pair[4],"
         "tx=c_pair[5],ty=c_pair[6],tz=c_pair[7]"
     )
-    lammps = scanfab.read(
-        SAME / "lammps.0.lammpstrj.gz",
-        contacts=SAME / "lammps.0.local.gz",
-        contact_columns=columns,
-    )
-    others = {
-        # its box has six digits
-        3e-6: scanfab.read(
-            SAME / "liggghts.1.txt.gz", contacts=SAME / "liggghts_contacts.1.txt.gz"
-        ),
-        1e-11: scanfab.read(SAME / "yade.xml.bz2"),
-        1e-5: scanfab.read(
-            SAME / "yade-spheres-00000000.vtk.gz", contacts=SAME / "yade-intrs-00000000.vtk.gz"
-        ),
-    }
-    with pytest.warns(scanfab.ScanfabWarning, match="no contact has a tangential force"):
-        expected = table(lammps)
-    for tolerance, packing in others.items():
-        with warnings.catch_warnings():
-            # of six digits something tangential is left
-            warnings.simplefilter("ignore", scanfab.ScanfabWarning)
-            found = table(packing)
-        assert found["contacts"][0] == 1819
-        for name in ("gc", "bn", "fn", "ft", "gc_strong", "gc_weak", "stress"):
-            one, two = expected.tensor(name)[0], found.tensor(name)[0]
-            scale = np.abs(one).max() if name == "stress" else 1.0
-            np.testing.assert_allclose(two, one, rtol=0, atol=tolerance * scale)
-        assert found["void_ratio"][0] == pytest.approx(expected["void_ratio"][0], rel=2e-5)
+    listed = {"contacts": SAME / "lammps.0.local.gz", "contact_columns": columns}
+    expected = table(scanfab.read(SAME / "lammps.0.lammpstrj.gz", **listed))
+    listed = {"contacts": SAME / contacts} if contacts else {}
+    found = table(scanfab.read(SAME / grains, **listed))
+    assert found["contacts"][0] == 1819
+    for name in ("gc", "bn", "fn", "ft", "gc_strong", "gc_weak", "stress"):
+        one, two = expected.tensor(name)[0], found.tensor(name)[0]
+        scale = np.abs(one).max() if name == "stress" else 1.0
+        np.testing.assert_allclose(two, one, rtol=0, atol=tolerance * scale)
+    assert found["void_ratio"][0] == pytest.approx(expected["void_ratio"][0], rel=2e-5)
 
 
 def test_stress_force_and_fabric_go_together(lammps):

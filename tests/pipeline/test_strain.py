@@ -1,13 +1,18 @@
-"""The axial strain in the table: what each mode measures, and strains from a file."""
+"""Axial strain by each mode or from a file, and shear of periodic cells, which may be flipped."""
 
 from __future__ import annotations
+
+import warnings
 
 import numpy as np
 import pytest
 
+import scanfab
 from scanfab import Cell, Packing, ReadError, SettingsError, compute
-from tests.helpers.dumps import write
-from tests.helpers.lattices import simple_cubic
+from scanfab.pipeline.strain import shear_strain
+from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.lattices import rotation, simple_cubic
+from tests.helpers.truth import SHEAR
 
 POSITION = simple_cubic(4).position
 PLATES = (POSITION[:, 2] == POSITION[:, 2].min()) | (POSITION[:, 2] == POSITION[:, 2].max())
@@ -109,3 +114,68 @@ def test_a_file_that_is_no_table_of_strains_is_an_error_by_its_line(tmp_path, te
     file = write(tmp_path / "s.csv", text)
     with pytest.raises(ReadError, match=rf"s\.csv(, |: ){message}.{{,100}}"):
         compute(frame(1.0, 1.0), strain=file, **SCAN)
+
+
+FIRST = Cell(np.array([[2.0, 0, 0], [0, 3, 0], [0.2, 0.1, 4]]))
+
+
+@pytest.mark.parametrize("gamma", [-0.3, 1e-6, 0.5, 4.0])
+def test_simple_shear_has_its_known_strain_from_wherever_it_is_seen(gamma):
+    """Principal logarithmic stretches ± asinh(γ/2), 0; F = I + γ x⊗y of all of space."""
+    vectors = FIRST.vectors @ (np.eye(3) + gamma * np.outer([0, 1, 0], [1, 0, 0]))
+    expected = pytest.approx(2 / np.sqrt(3) * np.arcsinh(abs(gamma) / 2), rel=1e-9)
+    assert shear_strain(Cell(vectors), FIRST) == expected
+    turn = rotation(np.random.default_rng(2))
+    assert shear_strain(Cell(vectors @ turn), Cell(FIRST.vectors @ turn)) == expected
+
+
+def test_triaxial_compression_has_its_known_strain():
+    """Stretches -e, e/2, e/2 give √(2/3 · 3/2) e; what the volume does does not count."""
+    gradient = 1.7 * np.diag(np.exp([0.05, 0.05, -0.1]))
+    assert shear_strain(Cell(FIRST.vectors @ gradient), FIRST) == pytest.approx(0.1, rel=1e-9)
+    turned = Cell(0.8 * FIRST.vectors @ rotation(np.random.default_rng(1)))
+    assert shear_strain(turned, FIRST) == pytest.approx(0, abs=1e-12)
+    assert shear_strain(FIRST, FIRST) == 0.0
+
+
+@pytest.mark.parametrize("cell", [None, Cell(FIRST.vectors, TWO)])
+def test_without_a_cell_that_repeats_in_all_directions_there_is_none(cell):
+    assert shear_strain(cell, FIRST) is shear_strain(FIRST, cell) is None
+
+
+def test_the_sample_has_the_strain_of_its_deck():
+    series = scanfab.read_series(sorted(SHEAR.glob("shear.*.lammpstrj.gz")))
+    table = compute(series, **SCAN, frames="::2")
+    # of erate 0.5 for 0, 0.8 and 1.6 s less the ten steps of rest before each frame
+    expected = 2 / np.sqrt(3) * np.arcsinh(np.array([0.0, 0.4, 0.8]) / 2)
+    assert table["shear_strain"] == pytest.approx(expected, rel=1e-3, abs=0)
+    assert set(table["strain"]) == {0.0}
+
+
+def tilted_series(folder, tilts, edge=4.0):
+    """Snapshots as LAMMPS writes them: the bounds are those of the box about the cell."""
+    texts = []
+    for step, tilt in enumerate(tilts):
+        lean = edge * tilt
+        box = ((min(0, lean), edge + max(0, lean), lean), (0, edge, 0), (0, edge, 0))
+        rows = cubic_rows(int(edge))
+        texts.append(dump_text(rows, step=step, box=box, flags=" xy xz yz pp pp pp"))
+    return scanfab.read_series(write(folder / "dump.txt", "".join(texts)))
+
+
+@pytest.mark.parametrize(
+    ("frames", "told"), [(":", "2 and 3"), ("::-1", "2 and 3"), ("1::2", "1 and 3"), (":3", None)]
+)
+def test_a_cell_that_is_flipped_under_way_is_a_warning(tmp_path, frames, told):
+    series = tilted_series(tmp_path, [0.0, 0.2, 0.45, -0.35, -0.2])
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        compute(series, **SCAN, frames=frames, workers=2)
+    flips = {str(one.message) for one in caught if "flipped" in str(one.message)}
+    assert len(flips) == (told is not None)
+    assert all(f"flipped between the frames {told}: " in one for one in flips)
+
+
+def test_a_cell_that_leans_ever_further_is_none(tmp_path):
+    table = compute(tilted_series(tmp_path, [0.0, 0.5, 1.0]), **SCAN)
+    assert table["shear_strain"][2] == pytest.approx(2 / np.sqrt(3) * np.arcsinh(0.5))

@@ -9,63 +9,45 @@ import pytest
 from scanfab.base.errors import ScanfabNote, ScanfabWarning, SkippedFrameWarning
 from scanfab.pipeline.told import recorded
 
-
-def tell() -> None:
-    for _ in range(2):
-        warnings.warn("choose another `rv`", ScanfabWarning, stacklevel=1)
-    warnings.warn("a note", ScanfabNote, stacklevel=1)
-    warnings.warn("frame 1 skipped", SkippedFrameWarning, stacklevel=1)
-    warnings.warn("frame 2 skipped", SkippedFrameWarning, stacklevel=1)
-    warnings.warn("of others", RuntimeWarning, stacklevel=1)
+ALL = ["choose another `rv`", "a note", "frame 1 skipped", "frame 2 skipped"]
 
 
-def test_each_text_is_kept_and_passed_on_once():
-    with warnings.catch_warnings(record=True) as shown:
-        warnings.simplefilter("always")
-        with recorded() as told:
-            tell()
-    skipped = ["frame 1 skipped", "frame 2 skipped"]
-    assert told.warnings == ["choose another --rv", *skipped]
-    assert told.notes == ["a note"]
-    assert told.skipped == 2
-    said = ["choose another `rv`", "a note", *skipped, "of others"]
-    assert [str(one.message) for one in shown] == said
-    assert shown[0].filename == __file__
+def told_in_a_function():
+    """As compute_file() does it: what is told is warned of where it is called."""
+    with recorded() as told:
+        for text in (ALL[0], ALL[0]):
+            warnings.warn(text, ScanfabWarning, stacklevel=1)
+        warnings.warn(ALL[1], ScanfabNote, stacklevel=1)
+        for text in ALL[2:]:
+            warnings.warn(text, SkippedFrameWarning, stacklevel=1)
+        warnings.warn("of others", RuntimeWarning, stacklevel=1)
+    return told
 
 
 @pytest.mark.parametrize(
-    ("choice", "shown"),
+    ("hidden", "shown"),
     [
-        ({"category": ScanfabWarning}, ["a note"]),
-        ({"category": ScanfabNote}, ["choose another `rv`", "frame 1 skipped", "frame 2 skipped"]),
-        ({"message": "frame 1"}, ["choose another `rv`", "a note", "frame 2 skipped"]),
+        ({"message": "nothing"}, ALL),
+        ({"category": ScanfabWarning}, [ALL[1]]),
+        ({"category": ScanfabNote}, [ALL[0], *ALL[2:]]),
         ({"module": __name__.replace(".", r"\.")}, []),
-        ({"module": "elsewhere"}, ["choose another `rv`", "a note", "frame 1 skipped", "frame 2 "]),
     ],
 )
-def test_what_filters_hide_is_kept_but_not_passed_on(choice, shown):
+def test_each_text_is_kept_and_what_filters_leave_is_passed_on_once(hidden, shown):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        warnings.filterwarnings("ignore", category=RuntimeWarning)
-        warnings.filterwarnings("ignore", **choice)
-        with recorded() as told:
-            tell()
-    texts = [str(one.message) for one in caught]
-    assert [text[: len(start)] for text, start in zip(texts, shown, strict=True)] == shown
-    assert len(told.warnings) == 3
+        warnings.filterwarnings("ignore", **hidden)
+        told = told_in_a_function()
+    assert told.warnings == ["choose another --rv", *ALL[2:]]
+    assert told.notes == ["a note"]
+    assert told.skipped == 2
+    others = ["of others"] if "module" not in hidden else []
+    assert [str(one.message) for one in caught] == [*others, *shown]
+    assert all(one.filename == __file__ for one in caught)
 
 
 def test_filters_may_make_errors_of_them():
     with warnings.catch_warnings():
         warnings.simplefilter("error", ScanfabWarning)
-        with recorded() as told, pytest.raises(ScanfabWarning, match="choose another"):
-            tell()
-    assert told.warnings == ["choose another --rv"]
-
-
-def test_filters_are_as_they_were_afterwards():
-    before, show = list(warnings.filters), warnings.showwarning
-    with recorded():
-        pass
-    assert warnings.filters == before
-    assert warnings.showwarning is show
+        with pytest.raises(ScanfabWarning, match="choose another"):
+            told_in_a_function()

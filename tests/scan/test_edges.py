@@ -178,11 +178,7 @@ def of_poisson(edge, cutoff, packings=120):
 
 @pytest.mark.parametrize("edge", EDGES)
 def test_poisson_spheres_have_their_mean_length_in_small_windows(edge):
-    """
-    ``start`` and ``ends`` c + 1/β, ``clip`` c + A1/(A0 + βA1).
-
-    tests/campaigns/edges.py repeats it with 3,000 packings, and for the anisotropy.
-    """
+    """``start`` and ``ends`` c + 1/β, ``clip`` c + A1/(A0 + βA1)."""
     cutoff, window, beta = 0.5, 9.0, 0.2 * np.pi * 13 / 12
     a0 = 1 - cutoff**2 / (4 * window**2)
     a1 = 4 * window / 3 - cutoff + cutoff**3 / (12 * window**2)

@@ -31,12 +31,6 @@ def test_each_curve_of_a_source_and_variant_is_divided_by_its_own_largest_absolu
     assert frames["alpha_c_axial_norm"] == pytest.approx(3 * [x / 0.1 for x in CONTACT])
 
 
-def test_several_rows_of_a_frame_are_refused():
-    """Those of several cut-offs would make one curve of many."""
-    with pytest.raises(SettingsError, match=r"one, variant c: several rows for frame 0: choose"):
-        compare_tables([*curve("one", "d"), *curve("one", "c"), *curve("one", "c", 2.0)])
-
-
 def test_slopes_are_those_of_least_squares():
     row = summary_of(curve())
     slope, intercept = np.polyfit(CONTACT, VOID, 1)
@@ -46,6 +40,7 @@ def test_slopes_are_those_of_least_squares():
     assert row.r2 == pytest.approx(1 - residual @ residual / (5 * np.var(VOID)), rel=1e-12)
     origin = np.linalg.lstsq(np.array(CONTACT)[:, None], np.array(VOID), rcond=None)[0][0]
     assert row.slope_origin == pytest.approx(origin, rel=1e-12)
+    assert (row.peak, row.peak_strain, row.final) == (-0.05, 0.02, -0.03)
 
 
 def with_octants(rows):
@@ -90,11 +85,6 @@ def test_without_octants_of_all_frames_the_slope_has_no_error(column):
     assert summary_of(with_octants(curve())[:2]).slope_se is None
 
 
-def test_the_peak_is_the_largest_absolute_value():
-    row = summary_of(curve())
-    assert (row.peak, row.peak_strain, row.final) == (-0.05, 0.02, -0.03)
-
-
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_under_three_frames_the_slope_is_empty(count):
     comparison = compare_tables(curve()[:count])
@@ -106,47 +96,60 @@ def test_under_three_frames_the_slope_is_empty(count):
 
 
 @pytest.mark.filterwarnings("error")
-def test_frames_beyond_the_largest_strain_are_out_of_the_fit_alone():
-    row = summary_of(curve(), strain_max=0.02)
-    assert row.frames == 3
-    assert row.slope == pytest.approx(np.polyfit(CONTACT[:3], VOID[:3], 1)[0], rel=1e-12)
-    assert row.final == VOID[-1]
-    assert len(compare_tables(curve(), strain_max=0.02).frames) == 5
-
-
-@pytest.mark.parametrize(("beyond", "frames"), [(0.0, 4), (2e-6, 4), (2e-5, 3)])
-def test_a_frame_at_the_largest_strain_belongs_to_the_fit_but_for_rounding(beyond, frames):
+@pytest.mark.parametrize(
+    ("beyond", "largest", "frames"),
+    [(0.0, 0.02, 3), (0.0, 0.03, 4), (2e-6, 0.03, 4), (2e-5, 0.03, 3)],
+)
+def test_frames_beyond_the_largest_strain_but_for_rounding_are_out_of_the_fit_alone(
+    beyond, largest, frames
+):
     """Boxes of six digits make 0.1200012 of 12 %."""
     rows = [{**row, "strain": row["strain"] + beyond} for row in curve()]
-    assert summary_of(rows, strain_max=0.03).frames == frames
+    row = summary_of(rows, strain_max=largest)
+    assert row.frames == frames
+    slope = np.polyfit(CONTACT[:frames], VOID[:frames], 1)[0]
+    assert row.slope == pytest.approx(slope, rel=1e-12)
+    assert row.final == VOID[-1]
+    assert len(compare_tables(rows, strain_max=largest).frames) == 5
 
 
-def test_frames_without_a_strain_are_out_of_a_fit_up_to_a_strain():
-    rows = [{**row, "strain": None} for row in curve()]
-    assert summary_of(rows).frames == 5
-    with pytest.warns(ScanfabWarning, match="`strain_max`: no frame has a strain"):
-        assert summary_of(rows, strain_max=1.0).frames == 0
+NO_STRAINS = [{**row, "strain": None} for row in curve()]
 
 
 @pytest.mark.parametrize(
-    ("largest", "frames", "kind", "message"),
+    ("rows", "largest", "frames", "kind", "message"),
     [
-        (5.0, 5, ScanfabWarning, r"5 leaves out no frame: .* fractions .* between 0 and 0.04"),
-        (0.5, 5, ScanfabNote, r"0.5 leaves out no frame: .* fractions .* between 0 and 0.04"),
-        (-1, 0, ScanfabWarning, "-1 leaves 0 of 5 frames of .* between 0 and 0.04"),
-        (0.01, 2, ScanfabWarning, "0.01 leaves 2 of 5 frames .* needs 3: .* above is 0.02;"),
+        (curve(), 5.0, 5, ScanfabWarning, "5 leaves out no frame: .* fractions .* 0 and 0.04"),
+        (curve(), 0.5, 5, ScanfabNote, "0.5 leaves out no frame: .* fractions .* 0 and 0.04"),
+        (curve(), -1, 0, ScanfabWarning, "-1 leaves 0 of 5 frames of .* between 0 and 0.04"),
+        (curve(), 0.01, 2, ScanfabWarning, "0.01 leaves 2 of 5 .* needs 3: .* above is 0.02;"),
+        (NO_STRAINS, 1.0, 0, ScanfabWarning, "no frame has a strain"),
     ],
 )
 def test_a_largest_strain_that_leaves_out_nothing_or_too_much_is_told(
-    largest, frames, kind, message
+    rows, largest, frames, kind, message
 ):
-    with pytest.warns(kind, match=f"strain_max: {message}"):
-        assert summary_of(curve(), strain_max=largest).frames == frames
+    assert summary_of(rows).frames == 5
+    with pytest.warns(kind, match=f"strain_max`?: {message}"):
+        assert summary_of(rows, strain_max=largest).frames == frames
 
 
-def test_a_largest_strain_that_is_no_number_is_refused():
-    with pytest.raises(SettingsError, match="strain_max: expected a number, found nan"):
-        summary_of(curve(), strain_max=math.nan)
+@pytest.mark.parametrize(
+    ("rows", "options", "message"),
+    [
+        (curve(), {"strain_max": math.nan}, "strain_max: expected a number, found nan"),
+        ([*curve(), {**curve()[2], "strain": "abc"}], {}, "row 6: strain: expected a number"),
+        # rows of several cut-offs would make one curve of many
+        (
+            [*curve("two"), *curve("one"), *curve("one", "c", 2.0)],
+            {},
+            "one, variant c: several rows",
+        ),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(rows, options, message):
+    with pytest.raises(SettingsError, match=message):
+        compare_tables(rows, **options)
 
 
 def test_a_sheared_cell_goes_by_its_shear_strain_and_its_turned_axes_are_told():
@@ -198,18 +201,9 @@ def test_differences_are_between_variants_of_a_frame():
     assert [row.difference for row in differences] == pytest.approx([2 * x for x in VOID])
     assert [row.strain for row in differences] == list(STRAIN)
     assert differences[0].difference_se == pytest.approx(math.sqrt(2) * 3e-4)
-
-
-def test_differences_without_standard_errors_have_none():
-    rows = [*curve("one", "c"), *curve("one", "d")]
     rows[0]["alpha_vs_axial_se"] = None
     rows[1].pop("alpha_vs_axial_se")
     assert [row.difference_se for row in compare_tables(rows).differences[:2]] == [None, None]
-
-
-def test_rows_of_no_fabric_table_are_refused():
-    with pytest.raises(SettingsError, match="row 6: strain: expected a number, found 'abc'"):
-        compare_tables([*curve(), {**curve()[2], "strain": "abc"}])
 
 
 def noisy_replicates(rows, random):

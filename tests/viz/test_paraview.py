@@ -11,7 +11,6 @@ from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
 from scanfab.table.columns import COLUMNS
 from scanfab.viz.paraview import VtkFolder
-from scanfab.viz.vtk_files import Collection
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.lattices import shaken_cubic
 
@@ -102,13 +101,6 @@ def test_the_surface_is_closed_and_looks_outward(computed):
     assert np.all(volume > 0)
 
 
-def test_tensors_are_points_with_nine_components(computed):
-    row = next(row for row in computed.rows if (row["frame"], row["variant"]) == (6, "c"))
-    mesh = pyvista.read(computed.vtk / "tensors-c_000006.vtp")
-    assert mesh["gvs"].reshape(3, 3) == pytest.approx(tensor(row, "gvs"))
-    assert mesh["gc"].reshape(3, 3) == pytest.approx(tensor(row, "gc"))
-
-
 def test_ellipsoids_have_the_principal_values_as_half_axes(computed):
     row = next(row for row in computed.rows if (row["frame"], row["variant"]) == (6, "c"))
     mesh = pyvista.read(computed.vtk / "ellipsoids-c_000006.vtp")
@@ -118,6 +110,9 @@ def test_ellipsoids_have_the_principal_values_as_half_axes(computed):
         distance = np.linalg.norm(points, axis=1)
         values = np.linalg.eigvalsh(tensor(row, name))
         assert distance.max() / distance.min() == pytest.approx(values[2] / values[0], rel=0.01)
+        # as they are for Tensor Glyph
+        matrix = pyvista.read(computed.vtk / "tensors-c_000006.vtp")[name]
+        assert matrix.reshape(3, 3) == pytest.approx(tensor(row, name))
 
 
 def test_grains_and_contacts_are_those_of_the_table(computed):
@@ -140,8 +135,7 @@ def test_spheres_of_clumps_have_the_number_of_their_body(tmp_path):
     number = np.where(np.arange(64) < 60, np.arange(64) // 2, -1)
     packing = scanfab.Packing(spheres.position, spheres.radius, bodies=number)
     settings = Settings(variants="c", directions=9, spacing="1rmin", contact_tolerance=0.02)
-    folder = VtkFolder(tmp_path, settings.axis)
-    (row,) = compute_rows(packing, settings, observe=folder)
+    (row,) = compute_rows(packing, settings, observe=VtkFolder(tmp_path))
     grains = pyvista.read(tmp_path / "grains_000000.vtp")
     assert grains["body"].tolist() == number.tolist()
     inside = number[grains["in_window"] == 1]
@@ -160,7 +154,7 @@ def test_pieces_of_lines_are_kept_from_the_cut_off_on(computed):
 
 def test_files_of_a_cut_off_that_nothing_reaches_have_no_distribution(tmp_path):
     spheres = shaken_cubic(np.random.default_rng(0), 5)
-    packing = scanfab.Packing(spheres.position, spheres.radius, step=7)
+    packing = scanfab.Packing(spheres.position, spheres.radius, step=7, contacts=[])
     settings = Settings(variants="c", cutoff=100.0, directions=9, spacing="1rmin")
     with pytest.warns(scanfab.ScanfabWarning, match="no void segment"):
         list(compute_rows(packing, settings, observe=VtkFolder(tmp_path)))
@@ -169,25 +163,19 @@ def test_files_of_a_cut_off_that_nothing_reaches_have_no_distribution(tmp_path):
     assert "distribution-c_000000.vtp" not in names
     mesh = pyvista.read(tmp_path / "lines-c_000000.vtp")
     assert np.isnan(mesh.field_data["alpha_vs"][0])
+    assert pyvista.read(tmp_path / "contacts_000000.vtp").n_cells == 0
     assert pyvista.get_reader(tmp_path / "grains.pvd").time_values == [7.0]
 
 
-def test_contacts_without_a_force_or_without_any(tmp_path):
-    packing = scanfab.Packing([[0.0, 0, 0], [5, 0, 0]], 1.0, contacts=[])
-    settings = Settings(variants="a", directions=3, spacing=0.2, cutoff=0.0)
-    with pytest.warns(scanfab.ScanfabWarning):
-        list(compute_rows(packing, settings, observe=VtkFolder(tmp_path)))
-    mesh = pyvista.read(tmp_path / "contacts_000000.vtp")
-    assert mesh.n_cells == 0
-
-
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 def test_a_resumed_collection_keeps_its_frames(tmp_path):
-    path = tmp_path / "grains.pvd"
-    Collection(path).add("a.vtp", 0.5)
-    Collection(path, go_on=True).add("b.vtp", 0.25)
-    assert list(Collection(path, go_on=True).entries.values()) == [0.25, 0.5]
-    Collection(path).add("c.vtp", 1.0)
-    assert list(Collection(path, go_on=True).entries) == ["c.vtp"]
+    for step in (3, 7):
+        write(tmp_path / f"dump_{step}.txt", dump_text(cubic_rows(), step=step))
+    series, scan = scanfab.read_series(tmp_path), {"directions": 9, "spacing": "0.5rmin"}
+    for frame, go_on, times in ((1, False, [7.0]), (0, True, [3.0, 7.0]), (1, False, [7.0])):
+        settings = Settings(variants="c", cutoff="0.2rmin", frames=frame, **scan)
+        list(compute_rows(series, settings, observe=VtkFolder(tmp_path, go_on)))
+        assert pyvista.get_reader(tmp_path / "grains.pvd").time_values == times
 
 
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")

@@ -1,4 +1,4 @@
-"""Scenes: what the sample knows of each grain and contact, and lines in a section."""
+"""Scenes and their view: what is known of each grain and contact, sections, and the camera."""
 
 from __future__ import annotations
 
@@ -9,14 +9,10 @@ import scanfab
 from scanfab.base.shapes import sphere
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import Window
-from scanfab.viz.scene import (
-    Scene,
-    about_window,
-    contact_lines,
-    grains_of,
-    scene_of,
-    section_lines,
-)
+from scanfab.viz.figures.style import rounded_down
+from scanfab.viz.meshes import contact_mesh
+from scanfab.viz.scene import Scene, about_window, grains_of, scene_of, section_lines
+from scanfab.viz.window3d import BOTTOM, SIZE, TOP, aim
 from tests.helpers.lattices import simple_cubic
 
 
@@ -43,17 +39,17 @@ def test_grains_are_told_apart(sample):
 
 
 def test_contacts_are_lines_between_centres(sample):
-    lines = contact_lines(sample, WINDOW)
-    assert lines.ends[:, :, 0].tolist() == [[0, 2], [2, 4], [4, 6]]
-    assert lines.boundary.tolist() == [False, False, True]
-    assert lines.in_window.tolist() == [True, True, False]
+    mesh = contact_mesh(sample, WINDOW)
+    assert mesh.points.reshape(-1, 2, 3)[:, :, 0].tolist() == [[0, 2], [2, 4], [4, 6]]
+    assert mesh["boundary"].tolist() == [False, False, True]
+    assert mesh["in_window"].tolist() == [True, True, False]
 
 
 def test_contacts_through_a_periodic_face_stay_short():
     cell = scanfab.Cell([10.0, 10.0, 10.0])
     packing = scanfab.Packing([[0.5, 5, 5], [9.5, 5, 5]], 0.5, contacts=[[0, 1]], cell=cell)
-    lines = contact_lines(Sample(packing, np.zeros(2, bool)), None)
-    assert np.linalg.norm(lines.ends[:, 1] - lines.ends[:, 0], axis=1) == pytest.approx([1.0])
+    one, two = contact_mesh(Sample(packing, np.zeros(2, bool)), None).points
+    assert np.linalg.norm(two - one) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("axis", [(0, 0, 1), (1, 0, 0), (0.6, 0.0, 0.8)])
@@ -84,7 +80,7 @@ def test_a_section_cuts_periodic_images_too():
 def test_a_section_without_window_or_grains_is_no_error(sample):
     assert section_lines(scene_of(sample), (0, 0, 1)).line.ndim == 1
     nothing = Sample(scanfab.Packing(np.zeros((0, 3)), 1.0, contacts=[]), np.zeros(0, bool))
-    empty = Scene(grains_of(nothing, None), np.zeros(3), None)
+    empty = Scene(grains_of(nothing, None), np.zeros(3))
     assert len(section_lines(empty, (0, 0, 1)).length) == 0
 
 
@@ -113,3 +109,38 @@ def test_a_clump_is_seen_whole_next_to_the_window():
     assert np.ptp(first[:, 0]) == pytest.approx(1.2)
     assert grains.in_window[grains.body == 8].all()
     assert not grains.in_window[grains.body == 3].any()
+
+
+class Camera:
+    """What the camera of a plotter is told."""
+
+    def __init__(self):
+        self.camera = self
+        self.enable_parallel_projection = self.reset_camera_clipping_range = lambda: None
+
+
+@pytest.mark.parametrize("shape", [(1, 1, 1), (9, 1, 1), (1, 1, 9), (1, 9, 1)])
+@pytest.mark.parametrize("size", [1e-4, 1.0, 1e5])
+def test_all_balls_are_in_the_picture_and_fill_it(shape, size):
+    rng = np.random.default_rng(0)
+    points = size * (rng.uniform(-1, 1, (300, 3)) * shape + [5, 6, 7])
+    camera, up, look = Camera(), np.array([0.0, 0.0, 1.0]), np.array([0.3, -1.0, 0.4])
+    aim(camera, points, np.full(300, 0.1 * size), up, look)
+    (place, middle, upright), half = camera.camera_position, camera.parallel_scale
+    toward = (place - middle) / np.linalg.norm(place - middle)
+    np.testing.assert_allclose(toward, look / np.linalg.norm(look))
+    high = (points - middle) @ upright / half
+    wide = (points - middle) @ np.cross(upright, toward) / half * SIZE[1] / SIZE[0]
+    reach = 0.1 * size / half
+    assert (high + reach).max() <= 1 - 2 * TOP + 1e-9
+    assert (high - reach).min() >= -1 + 2 * BOTTOM - 1e-9
+    assert wide.max() + wide.min() == pytest.approx(0, abs=1e-6)
+    fills_height = np.ptp(high) + 2 * reach > 2 * (1 - TOP - BOTTOM) - 1e-6
+    assert fills_height or np.ptp(wide) > 1.8
+
+
+@pytest.mark.parametrize(
+    ("value", "length"), [(0.0129, 0.01), (0.49, 0.2), (0.5, 0.5), (7.0, 5.0), (1e-9, 1e-9)]
+)
+def test_scales_are_round(value, length):
+    assert rounded_down(value) == pytest.approx(length)

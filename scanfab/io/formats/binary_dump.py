@@ -20,12 +20,11 @@ import numpy as np
 
 from scanfab.base.arrays import MOST, doubles
 from scanfab.base.errors import ReadError
-from scanfab.base.typing import FloatArray
+from scanfab.base.typing import Columns, FloatArray
 from scanfab.io.fence import fenced
 from scanfab.io.files import check_memory, first_bytes, leave_out_last, plain
 from scanfab.io.formats import shared
 from scanfab.io.reader import FileKind, Snapshot
-from scanfab.io.text import Columns
 from scanfab.packing.cell import Cell
 
 # minus the length of the word, the word, the number 1, and the revision of the layout
@@ -127,7 +126,7 @@ def _header(stream: IO[bytes]) -> Header:
             (time,) = _take(stream, "<d")
         names = _text(stream).split()
     (blocks,) = _take(stream, "<i")
-    # a file of the old layout is known by numbers that can be nothing else
+    # the old layout has no mark: it is recognised by the ranges of its numbers
     is_box = np.all(bounds[:, 0] <= bounds[:, 1]) and np.all(np.abs(bounds) <= MOST)
     is_sound = min(step, rows) >= 0 and tilted in (0, 1) and {*faces} <= {0, 1, 2, 3}
     if not (is_sound and is_box and 0 < width == len(names) <= MOST_COLUMNS and blocks > 0):
@@ -191,7 +190,7 @@ def read_in_worker(path: str, frame: int | None) -> tuple[Any, Any]:
     with netCDF4.Dataset(path, "r") as file:
         if getattr(file, "program", "") != "LAMMPS" or "time" not in file.variables:
             raise ValueError("expected what LAMMPS writes by dump netcdf")
-        # what was never written is masked
+        # values that were never written are masked
         file.set_auto_scale(False)
         if frame is None:
             # LAMMPS writes the step as time, and the length of a step as its scale

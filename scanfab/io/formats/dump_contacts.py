@@ -106,9 +106,8 @@ def _keyword_places(path: Path, told: str, width: int) -> Places:
     count = sum(sizes.values())
     if len(sizes) < len(asked) or "id" not in asked or count != width:
         raise ReadError(
-            f"{path}: `contact_columns`: expected id1=NAME,id2=NAME, or keywords of compute "
-            f"pair/gran/local, id among them ({', '.join(PAIR_VALUES)}), which make {width} "
-            f"columns; {told!r} makes {count}"
+            f"{path}: `contact_columns`: expected id1=NAME,id2=NAME, or keywords, id among them "
+            f"({', '.join(PAIR_VALUES)}), for {width} columns; {told!r} is for {count}"
         )
     starts = dict(zip(sizes, accumulate(sizes.values(), initial=0), strict=False))
     triple = {name: [start, start + 1, start + 2] for name, start in starts.items()}
@@ -170,10 +169,8 @@ def refuse_rounded_ids(path: Path, values: FloatArray, grains: GrainTable) -> No
     longer = longer[longer % digits != 0]
     large = np.any(values >= 1e6, axis=0) & np.all(values == np.rint(values), axis=0)
     if longer.size and large.any() and not np.isin(values[:, large], longer).any():
-        raise ReadError(
-            f"{path}: ids above 999999 are rounded to six digits, so contacts name wrong grains: "
-            f'write them with dump_modify ... format "%.0f ..."'
-        )
+        advice = 'write them with dump_modify ... format "%.0f ..."'
+        raise ReadError(f"{path}: its ids above 999999 are rounded to six digits: {advice}")
 
 
 def _gaps(grains: GrainTable, rows: IntArray) -> FloatArray:

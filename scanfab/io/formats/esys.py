@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError
+from scanfab.base.typing import Columns
 from scanfab.io.files import file_inside, first_bytes
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
 from scanfab.io.mesh import joined_arrays
 from scanfab.io.reader import Snapshot
-from scanfab.io.text import Columns, Layout, read_rows, spelt, text_of
+from scanfab.io.text import Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
 # version of the layout, 2 or 3; steps in all, length of a step, step; the box; names of files
@@ -69,13 +70,13 @@ class EsysReader(GrainsOnly):
         # the names are absolute where the run was: the files lie beside their header
         names = [word.decode("utf-8", "replace").replace("\\", "/") for word in head[8].split()]
         files = [file_inside(path, name.rpartition("/")[2]) for name in names]
-        # the program writes no line end behind the last name: a header may be cut at any of them
+        # the last name has no line end, so a header that was cut behind any name looks whole
         lost = {one.name for one in self.beside(path)} - {one.name for one in files}
         if lost or not files or len(set(files)) < len(files):
-            raise ReadError(
-                f"{path}: expected the name of each worker's file once, found {names}, and beside "
-                f"it {len(lost)} others: it was cut, or these are of another run"
+            told = (
+                f"found {names}, and beside it {len(lost)} others: it was cut, or is of another run"
             )
+            raise ReadError(f"{path}: expected the name of each worker's file once, {told}")
         columns = joined_arrays([_particles(file) for file in files])
         low, high = np.reshape(numbers(f"{path}: BoundingBox", head[3], 6), (2, 3))
         # a plane is not periodic across, whatever the header says

@@ -8,17 +8,15 @@ means, so a file without diameters has no radii.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
+from scanfab.base.typing import AnyArray, Columns
 from scanfab.io.fence import fenced
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbered_frames
 from scanfab.io.reader import Snapshot
-from scanfab.io.text import Columns
 from scanfab.packing.cell import Cell
 
 # the first eight bytes of a file
@@ -41,24 +39,23 @@ class GsdReader(GrainsOnly):
 
     def names(self, path: Path) -> list[str]:
         """Those of all frames: without diameters there are no radii."""
-        return [name.rpartition("/")[2] for name in _read(path, None)[1]]
+        return [name.rpartition("/")[2] for name in fenced(read_in_worker, path, None)[1]]
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """The frames with their steps; ``start`` of a snapshot is the number of its frame."""
-        return numbered_frames(path, ((step, None) for step in _read(path, None)[0]))
+        steps = fenced(read_in_worker, path, None)[0]
+        return numbered_frames(path, ((step, None) for step in steps))
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """What the frame, or else the first one, has of each particle."""
         path, where = snapshot.path, f"{snapshot.path}, frame {snapshot.start}"
-        arrays = _read(path, snapshot.start)[2]
+        arrays = fenced(read_in_worker, path, snapshot.start)[2]
         position = arrays.pop("particles/position", np.zeros((0, 3), np.float32))
         count = arrays.pop("particles/N", np.array([0])).tolist()
         box = arrays.get("configuration/box", np.zeros(0)).astype(np.float64).tolist()
         if position.shape != (*count, 3) or len(box) not in (0, 6):
-            raise ReadError(
-                f"{where}: expected positions of shape {(*count, 3)} and six numbers as box, found "
-                f"{position.shape} and {box}"
-            )
+            expected = f"positions of shape {(*count, 3)} and six numbers as box"
+            raise ReadError(f"{where}: expected {expected}, found {position.shape} and {box}")
         # the first frame may have had another number of particles; types are texts
         columns: Columns = {
             name.removeprefix("log/").removeprefix(PARTICLES): values
@@ -79,10 +76,6 @@ class GsdReader(GrainsOnly):
         return columns, cell_of(f"{where}: its box", vectors, (True, True, not flat), origin)
 
 
-def _read(path: Path, frame: int | None) -> tuple[list[int], list[str], Columns]:
-    return fenced(read_in_worker, path, frame)
-
-
 def read_in_worker(path: str, frame: int | None) -> tuple[list[int], list[str], Columns]:
     """
     The steps of all frames and the names of all arrays; the arrays of a frame if one is given.
@@ -96,7 +89,7 @@ def read_in_worker(path: str, frame: int | None) -> tuple[list[int], list[str], 
             raise ValueError(f"its schema is {file.schema!r}, expected 'hoomd'")
         names = [name for name in file.find_matching_chunk_names("") if name.startswith(GROUPS)]
 
-        def array(number: int, name: str) -> npt.NDArray[Any]:
+        def array(number: int, name: str) -> AnyArray:
             """What does not change is written in the first frame only; texts if not even there."""
             own = [one for one in (number, 0) if file.chunk_exists(frame=one, name=name)]
             return np.asarray(file.read_chunk(frame=own[0], name=name) if own else "")

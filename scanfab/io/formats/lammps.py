@@ -9,7 +9,7 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
-from scanfab.io.contacts import join_ids
+from scanfab.io.contacts import NotContactsError, OtherGrainsError, join_ids
 from scanfab.io.files import first_bytes
 from scanfab.io.formats import dump_contacts
 from scanfab.io.formats.binary_dump import BinaryDump, NetcdfDump
@@ -17,14 +17,7 @@ from scanfab.io.formats.lammps_data import DataFile
 from scanfab.io.formats.shared import GrainsOnly
 from scanfab.io.formats.text_dump import TextDump
 from scanfab.io.formats.vtk import FormsReader, VtkReader
-from scanfab.io.reader import (
-    GrainTable,
-    JoinedContacts,
-    NotContactsError,
-    OtherGrainsError,
-    ReadOptions,
-    Snapshot,
-)
+from scanfab.io.reader import GrainTable, JoinedContacts, ReadOptions, Snapshot
 
 # LIGGGHTS writes neither of these items, and its bounds with six digits
 LAMMPS_ITEMS = re.compile(
@@ -50,10 +43,8 @@ class DumpReader(FormsReader):
     def form(self, path: Path) -> GrainsOnly | VtkReader:
         """The reader of the form that a file has, by its first bytes; VTK's for all others."""
         if RESTART.match(first_bytes(path)):
-            raise ReadError(
-                f"{path}: a binary restart, which only the program that wrote it can read: let it "
-                f"read_restart, and write the grains with dump custom ... id type x y z radius"
-            )
+            advice = "let its program read it, and dump custom ... id type x y z radius"
+            raise ReadError(f"{path}: a binary restart, which only its program reads: {advice}")
         return super().form(path)
 
     def read_contacts(
@@ -80,11 +71,10 @@ class DumpReader(FormsReader):
             found = dump_contacts.named_places(path, told, list(columns))
         if found is None:
             may_be_ids = sum(map(dump_contacts.are_whole, values.T)) > 1
-            raise (OtherGrainsError if may_be_ids else NotContactsError)(
-                f"{path}: no two columns are surely the ids of grains of this step: name them (out "
-                f'of {", ".join(columns)}) by `contact_columns="id1=NAME,id2=NAME"`, or '
-                f'LIGGGHTS\' keywords: "pos id force ..."'
-            )
+            told = f"no two columns of {', '.join(columns)} are surely ids of these grains"
+            advice = '`contact_columns="id1=NAME,id2=NAME"` or LIGGGHTS\' keywords name them'
+            error = OtherGrainsError if may_be_ids else NotContactsError
+            raise error(f"{path}: {told}: {advice}")
         return dump_contacts.join_places(path, values, found, grains)
 
     def found(

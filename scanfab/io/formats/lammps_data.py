@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError
+from scanfab.base.typing import Columns
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.shared import GrainsOnly, box_cell, grains_of, numbered, numbers
 from scanfab.io.reader import Carries, FileKind, GrainTable, ReadOptions, Snapshot
-from scanfab.io.text import Columns, Layout, read_rows, text_of
+from scanfab.io.text import Layout, read_rows, text_of
 from scanfab.packing.cell import Cell
 
 # the first line is a comment; these two must stand below it
@@ -24,12 +25,12 @@ SECTION = re.compile(rb"\n[ \t]*([A-Z][A-Za-z ]*?)[ \t]*(?:#[ \t]*(\S+)[^\n]*)?\
 # the box in the header: bounds and perhaps a tilt, or vectors and their origin
 BOUNDS, TILT = (b"xlo xhi", b"ylo yhi", b"zlo zhi"), b"xy xz yz"
 VECTORS, ORIGIN = (b"avec", b"bvec", b"cvec"), b"abc origin"
-# orders of the columns; image flags, and of hybrid styles the columns of others, stand behind
+# order of the columns; image flags and the columns of other styles of a hybrid stand behind them
 PLAIN = ("id", "type", "diameter", "density", "x", "y", "z")
 HYBRID = ("id", "type", "x", "y", "z", "diameter", "density")
 STYLES = ("", "sphere", "granular", "hybrid")
 FLAGS = ("ix", "iy", "iz")
-# what atoms may be that are no spheres: their third column is a flag, not a diameter
+# atoms that are not spheres: their third column is a flag instead of a diameter
 NO_SPHERES = (b"ellipsoids", b"lines", b"triangles", b"bodies")
 # YADE writes this first line, and radii in the column of diameters
 OF_YADE = b"LIGGGHTS Description"
@@ -88,11 +89,9 @@ class DataFile(GrainsOnly):
             others += [f"'Atoms # {style}'"] if style not in STYLES else []
             others += ["YADE's radii in their place"] if data.startswith(OF_YADE) else []
             if others:
-                raise ReadError(
-                    f"{path}: expected diameters of spheres (atom_style sphere), found "
-                    f"{', '.join(others)}: write the grains with dump custom ... id type x y z "
-                    f'radius, or name the columns: `columns="id=1,radius=3,x=5,y=6,z=7"`'
-                )
+                told = f"expected diameters (atom_style sphere), found {', '.join(others)}"
+                advice = '`columns="id=1,radius=3,x=5,y=6,z=7"` names the columns'
+                raise ReadError(f"{path}: {told}: {advice}")
             columns = _named(path, style, columns, cell)
         return grains_of(snapshot, columns, cell, options)
 
@@ -138,17 +137,15 @@ def _named(path: Path, style: str, columns: Columns, cell: Cell | None) -> Colum
     named = dict(zip(order, values, strict=False))
     fits = more >= 0 if is_hybrid else more == 0
     if fits and not style:
-        # a grain may reach out of the box, and a periodic one lie there
+        # grains may reach out of the box, and lie outside of a periodic one
         centres = np.column_stack([named[axis] for axis in "xyz"])
         place = np.full_like(centres, np.nan) if cell is None else cell.fractional(centres)
         are_inside, are_whole = (place > -0.5) & (place < 1.5), named["type"] % 1 == 0
         are_sizes = (named["diameter"] > 0) & (named["density"] > 0)
         fits = bool(are_inside.all() and are_whole.all() and are_sizes.all())
     if not fits:
-        raise ReadError(
-            f"{path}: expected {' '.join(PLAIN)} of atom_style sphere (or a hybrid's "
-            f"{' '.join(HYBRID)}), found {len(columns)} columns below 'Atoms' that cannot be "
-            f'these: name them by their numbers, `columns="id=1,diameter=3,x=5,y=6,z=7"`'
-        )
+        told = f"are not {' '.join(PLAIN)} (or a hybrid's {' '.join(HYBRID)})"
+        advice = '`columns="id=1,diameter=3,x=5,y=6,z=7"` names them'
+        raise ReadError(f"{path}: the {len(columns)} columns below 'Atoms' {told}: {advice}")
     names = [*order, *["mol", *list(columns)[len(PLAIN) + 1 :]][:more], *flags]
     return dict(zip(names, values, strict=True))

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError, warn
+from scanfab.base.typing import Columns
 from scanfab.io.files import first_bytes
 from scanfab.io.formats import shared
 from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.io.text import Columns, Layout, read_rows, spelt, text_of
+from scanfab.io.text import Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
 # what a column holds, or a range of them
@@ -24,7 +25,7 @@ POSITION, PAIR = "position (x, y, z)", ("particle 1 label", "particle 2 label")
 NORMAL = "normal vector, oriented from particle 1 to particle 2"
 PUSH = "norm of the normal part of the contact force"
 TANGENTIAL = "tangential part of the contact force"
-# versions with this title write a push with its sign, whatever the title of the push says
+# versions that have this title write the push with its sign, although its own title says norm
 OF_SIGNED_PUSH = "normal part of the lubrication force"
 
 
@@ -86,10 +87,8 @@ class LfDemReader(shared.GrainsOnly):
             return shared.join_pairs(path, grains, ends, None)
         push = columns[PUSH][:, None]
         if len(push) and OF_SIGNED_PUSH not in columns and np.all(push >= 0):
-            warn(
-                f"{path}: LF_DEM since August 2016 writes normal contact forces without their "
-                f"sign: forces that pull two grains together are taken for pushes"
-            )
+            told = "LF_DEM writes no sign of normal contact forces since August 2016"
+            warn(f"{path}: {told}: all are taken for pushes")
         # in the program's source contact forces act on particle 1: a push against the normal,
         # which points to particle 2, and the tangential part as it is
         with np.errstate(over="ignore", invalid="ignore"):
@@ -115,10 +114,9 @@ def _columns(
     path, data, legend = snapshot.path, text_of(snapshot), _legend(snapshot.path)
     frame = FRAME.match(data)
     if frame is None or not legend.keys() >= {*needed}:
-        raise ReadError(
-            f"{path}: expected '# strain shear_disp rate' and the titles {', '.join(needed)}, "
-            f"found {spelt(data)} and the titles {', '.join(legend)}"
-        )
+        expected = f"'# strain shear_disp rate' and the titles {', '.join(needed)}"
+        found = f"{spelt(data)} and the titles {', '.join(legend)}"
+        raise ReadError(f"{path}: expected {expected}, found {found}")
     width = max(places.stop for places in legend.values())
     layout = Layout(tuple(shared.numbered(width)), line=2)
     rows = read_rows(snapshot, data[frame.end() :], layout, count=count, what="particles")

@@ -14,11 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError
+from scanfab.base.typing import Columns
 from scanfab.io.columns import grain_table
 from scanfab.io.files import bare_name, first_bytes
 from scanfab.io.formats import shared
 from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.io.text import Columns, Layout, read_rows, spelt, text_of
+from scanfab.io.text import Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
 # the columns of a frame in the plane and in space, by the number of words in the line above it

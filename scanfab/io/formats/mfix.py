@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError
+from scanfab.base.typing import Columns
 from scanfab.io.files import bare_name, first_bytes
 from scanfab.io.formats.shared import GrainsOnly, in_space, numbers
 from scanfab.io.reader import Carries, Snapshot
-from scanfab.io.text import Columns, Layout, read_rows, spelt, text_of
+from scanfab.io.text import Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
 VERSION = re.compile(rb"[ \t]*Version[ \t]+(\d+\.\d+)[ \t]*\r?\n", re.IGNORECASE)
@@ -55,8 +56,7 @@ class MfixReader(GrainsOnly):
         if version[1] != b"2.0" or not ANSWERS.fullmatch(answers):
             raise ReadError(
                 f"{path}: expected version 2.0 with 2 or 3, a number, T or F ... for "
-                f"{b', '.join(ASKED).decode()}, found {version[1].decode()} with {spelt(answers)}: "
-                f"else read it as a table: --format table --skip N --columns ..."
+                f"{b', '.join(ASKED).decode()}, found {version[1].decode()} with {spelt(answers)}"
             )
         dimension, count = (int(word) for word in answers.split()[:2])
         names = [*"xyz"[:dimension]]

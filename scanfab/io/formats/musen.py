@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError, note
+from scanfab.base.typing import Columns
 from scanfab.io.files import Stamp, first_bytes, stamp_of
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbered_frames, numbers
 from scanfab.io.reader import Snapshot
-from scanfab.io.text import Columns, Layout, read_rows, spelt, text_of
+from scanfab.io.text import Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
 # id, type, and its geometry: for a sphere radius and contact radius
@@ -54,10 +55,8 @@ class MusenReader(GrainsOnly):
             note("MUSEN's bonds are not read: grains that touch are found by geometry")
         time = columns[f"time {number}"]
         if np.any(time != snapshot.time):
-            raise ReadError(
-                f"{path}: a sphere has no state at the time {snapshot.time}: export all objects at "
-                f"the same times"
-            )
+            advice = "export all objects at the same times"
+            raise ReadError(f"{path}: a sphere has no state at time {snapshot.time}: {advice}")
         is_there = (columns.get("begin", -np.inf) <= time) & (time <= columns.get("end", np.inf))
         own = {"id": "id", "radius": "radius", **{axis: f"{axis} {number}" for axis in "xyz"}}
         return {name: columns[key][is_there] for name, key in own.items()}, cell
@@ -105,10 +104,9 @@ def _spheres(path: Path, rows: list[bytes]) -> Columns:
         names += [f"{key.decode()}_{len(names)}_{k}" for k in range(len(own), SIZES[key])]
     needed = {"id", "radius", *(f"{name} {k}" for k in range(states) for name in ("time", *"xyz"))}
     if len(names) != len(words) or not states or not needed <= {*names}:
-        raise ReadError(
-            f"{path}: expected properties 0 ID ... 5 RADIUS ... 2 TIME 12 X Y Z ... in the rows of "
-            f"spheres, found {spelt(b' '.join([*keys.values(), *words[len(names) :]]))}"
-        )
+        expected = "properties 0 ID ... 5 RADIUS ... 2 TIME 12 X Y Z ... in the rows of spheres"
+        found = spelt(b" ".join([*keys.values(), *words[len(names) :]]))
+        raise ReadError(f"{path}: expected {expected}, found {found}")
     read = [name for name in names if "_" not in name]
     layout = Layout(tuple(names), optional={*names} - {*read})
     columns = read_rows(Snapshot(path), b"\n".join([*rows, b""]), layout)

@@ -11,19 +11,11 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.io.binary_tables import IS_NPZ, npz_shapes, read_npz
-from scanfab.io.columns import grain_table
+from scanfab.io.columns import BODIES, WALLS, grain_table
 from scanfab.io.companions import companion_kind, read_contacts
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.shared import GrainsOnly
-from scanfab.io.reader import (
-    BODIES,
-    WALLS,
-    FileKind,
-    GrainTable,
-    JoinedContacts,
-    ReadOptions,
-    Snapshot,
-)
+from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.io.writer import Left, as_arrays, cell_of, contacts_of
 from scanfab.packing.packing import Packing
 
@@ -81,10 +73,6 @@ class NpzFormat(GrainsOnly):
             return grains
         return grains._replace(contacts=contacts_of(arrays["pairs"], arrays))
 
-    def left_out(self, path: Path) -> list[str]:
-        """Of what scanfab writes nothing is left out."""
-        return []
-
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
@@ -98,7 +86,7 @@ class NpzFormat(GrainsOnly):
         arrays |= found.grains | found.frame
         arrays |= {f"{COLUMN}{name}": values for name, values in found.own.items()}
         if packing.contacts is not None:
-            # they name the rows of grains
+            # pairs are rows of the grains here, not ids
             named = {"pairs": packing.contacts.pairs, **found.contacts}
             arrays |= {name: one for name, one in named.items() if name not in ("id1", "id2")}
         stream = io.BytesIO()

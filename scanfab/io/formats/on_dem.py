@@ -14,13 +14,13 @@ import numpy as np
 
 from scanfab.base.arrays import doubles
 from scanfab.base.errors import ReadError
-from scanfab.base.typing import FloatArray
+from scanfab.base.typing import Columns, FloatArray
 from scanfab.io.columns import grain_table, whole_numbers
 from scanfab.io.contacts import join_ids, rows_of_ids
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.shared import GrainsOnly
 from scanfab.io.hdf import HdfFile, is_hdf, read_hdf_file
-from scanfab.io.mesh import Arrays, joined_arrays
+from scanfab.io.mesh import joined_arrays
 from scanfab.io.reader import Carries, GrainTable, ReadOptions, Snapshot
 from scanfab.io.writer import cell_of
 from scanfab.io.writers.vtk import BODIES, INTERACTIONS, SCENE, SCENE_NAMES, STROKE, write_on_dem
@@ -30,7 +30,7 @@ SIGNS = {"0.1": 1.0, "0.2": -1.0}
 # the columns of interactions that matter, and the shapes of their values
 COLUMNS: dict[str, tuple[int, ...]] = {"id1": (), "id2": (), "virtual": (), "normal_force": ()}
 COLUMNS |= dict.fromkeys(("normal", "shear_force", "force", "image"), (3,))
-NONE: Arrays = {"id1": np.zeros(0), "id2": np.zeros(0)}
+NONE: Columns = {"id1": np.zeros(0), "id2": np.zeros(0)}
 
 
 class OnDemReader(GrainsOnly):
@@ -73,7 +73,7 @@ def _scene(path: Path) -> dict[str, Any]:
     return read_hdf_file(path, with_data=False).attributes.get(SCENE, {})
 
 
-def _spheres(path: Path, file: HdfFile) -> Arrays:
+def _spheres(path: Path, file: HdfFile) -> Columns:
     """The columns of the bodies that have a radius: no other body is a sphere."""
     parts = []
     for block in ["VTKHDF", *(f"VTKHDF/{name}" for name in file.groups("VTKHDF"))]:
@@ -125,7 +125,9 @@ def _joined(path: Path, file: HdfFile, grains: GrainTable) -> GrainTable:
     return grains._replace(contacts=joined.contacts, wall_contacts=walls)
 
 
-def _force(path: Path, file: HdfFile, table: Arrays) -> tuple[FloatArray | None, FloatArray | None]:
+def _force(
+    path: Path, file: HdfFile, table: Columns
+) -> tuple[FloatArray | None, FloatArray | None]:
     """The force on the second body, or else its normal part alone."""
     if "force" in table:  # as scanfab writes it
         return doubles(table["force"]), None
@@ -133,10 +135,9 @@ def _force(path: Path, file: HdfFile, table: Arrays) -> tuple[FloatArray | None,
         return None, None
     version = str(file.attributes.get("", {}).get("file_format_version", ""))
     if version[:3] not in SIGNS:
-        raise ReadError(
-            f"{path}: file_format_version is {version!r}, expected 0.1 or 0.2, which tell the sign "
-            f'of the normal force: use `contacts="geometric"`'
-        )
+        expected = "expected 0.1 or 0.2, which tell the sign of the normal force"
+        advice = 'use `contacts="geometric"`'
+        raise ReadError(f"{path}: file_format_version is {version!r}, {expected}: {advice}")
     normal = SIGNS[version[:3]] * table["normal_force"]
     if not {"normal", "shear_force"} <= table.keys():
         return None, normal

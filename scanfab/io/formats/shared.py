@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
-from scanfab.base.typing import FloatArray
+from scanfab.base.typing import Columns, FloatArray
 from scanfab.io.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.contacts import join_ids
 from scanfab.io.files import leave_out_last, plain
@@ -24,7 +24,7 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
-from scanfab.io.text import Columns, CutError, spelt, text_of
+from scanfab.io.text import CutError, spelt, text_of
 from scanfab.packing.cell import Cell
 
 # the header of a frame is shorter, even with thousands of columns
@@ -90,10 +90,8 @@ def grains_of(
 ) -> GrainTable:
     """The grains in the columns of a frame; ReadError if these have no names and users none."""
     if "1" in columns and not options.columns:
-        raise ReadError(
-            f"{snapshot.path}: this dump does not name its {len(columns)} columns: name them by "
-            f'their numbers, as the deck lists them: `columns="id=1,x=3,y=4,z=5,radius=6"`'
-        )
+        advice = 'number them as the deck lists them: `columns="id=1,x=3,y=4,z=5,radius=6"`'
+        raise ReadError(f"{snapshot.path}: the {len(columns)} columns have no names: {advice}")
     named = {key: f"{own}" for key, own in options.columns.items()}
     where = "" if snapshot.step is None else f", step {snapshot.step}"
     return grain_table(snapshot.path, columns, cell, replace(options, columns=named), where)
@@ -224,7 +222,7 @@ def marked_frames(
     starts: list[int] = []
     found: list[Snapshot] = []
     size = 0
-    # not mapped into memory: if a mapped file is cut meanwhile, the process dies
+    # the file is not mapped into memory: if it were cut meanwhile, the process would die
     with open(plain(path), "rb") as stream:
         # pieces of whole lines, so that no mark is cut in two
         while piece := stream.read(PIECE) + stream.readline():

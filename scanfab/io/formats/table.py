@@ -15,6 +15,7 @@ import numpy as np
 
 from scanfab.base.arrays import MOST, doubles
 from scanfab.base.errors import ReadError, SettingsError, note
+from scanfab.base.typing import Columns
 from scanfab.io.binary_tables import binary_names, is_xyzd, read_binary, xyzd_cell
 from scanfab.io.columns import grain_table
 from scanfab.io.contacts import join_table
@@ -23,7 +24,7 @@ from scanfab.io.formats.table_names import Names, find_columns, plain_name
 from scanfab.io.layout import TextTable, read_text, text_table
 from scanfab.io.options import parse_columns
 from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.io.text import Columns, Layout
+from scanfab.io.text import Layout
 
 # what must be a number in each row, and what a whole one
 WHOLE = ("id", "id1", "id2", "clump")
@@ -31,8 +32,8 @@ NUMBERS = ("x", "y", "z", "radius", "diameter", "volume", *WHOLE)
 MOST_COLUMNS = 4096
 CENTRES, SIZES = {"x", "y", "z"}, {"radius", "diameter", "volume"}
 OF_GRAINS = ("x", "y", "z", "radius", "diameter", "id", "clump")
-# first grains by which a table without names is judged, and the least median distance of a grain
-# from the nearest one, in its diameters: below it the radii are diameters, or these are frames
+# a table without names is judged by this many grains; if their median distance to the nearest grain
+# is below this many diameters, its radii are diameters, or it holds several frames
 LOOKED_AT, LEAST_DISTANCE = 2000, 0.75
 ASK = (
     'name them, for instance `columns="x=1,y=2,z=3,radius=4"` (or diameter=4; numbers of columns '
@@ -50,10 +51,8 @@ class TableReader:
     description = (
         "tables with a column each of x, y, z, radius: CSV, TSV, blanks, Parquet, NPZ, xyzd"
     )
-    extensions: ClassVar[tuple[str, ...]] = (
-        *(".csv", ".tsv", ".txt", ".dat"),
-        *(".parquet", ".npz", ".xyzd"),
-    )
+    extensions: ClassVar[tuple[str, ...]] = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".npz")
+    extensions += (".xyzd",)
     generic = True
     is_table = True
     names: ClassVar[Names] = table_names.TABLE
@@ -126,13 +125,6 @@ class TableReader:
         table_names.check_units(path, found, contacts=True)
         columns = _read(path, head, found)
         return join_table(path, grains, {what: columns[name] for what, name in found.items()})
-
-    def left_out(self, path: Path) -> list[str]:
-        """The columns of a table of contacts that no packing has a place for."""
-        head = table_head(path, self.options.skip)
-        kept = {"id1", "id2", *table_names.FORCES}
-        used = {own for what, own in self._pairs(path, head).items() if what in kept}
-        return [name for name in head.layout.names if head.is_named and name not in used]
 
     def _grains(self, path: Path, head: TextTable) -> dict[str, str]:
         """The columns of grains by what they are."""

@@ -10,14 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError
-from scanfab.io.columns import (
-    DIAMETER_NAMES,
-    ID_NAMES,
-    RADIUS_NAMES,
-    refuse_named_twice,
-)
+from scanfab.base.typing import Columns
+from scanfab.io.columns import DIAMETER_NAMES, ID_NAMES, RADIUS_NAMES, refuse_named_twice
 from scanfab.io.layout import TextTable
-from scanfab.io.text import Columns
 
 Names = Mapping[str, tuple[str, ...]]
 """The names that a column may have, by what it is; as :func:`plain_name` has them."""
@@ -37,21 +32,13 @@ END = (
 FORCE = "f{0} force.{0} f.{0} contact.force.global.{0} force.global.{0}"
 # of contacts: the force on either grain, the image of the second, the force on the first or second,
 # the normal and the tangential part
-FORCES: Names = {
-    what.format(axis): tuple(words.format(axis).split())
-    for axis in "xyz"
-    for what, words in (
-        ("f{0}", FORCE),
-        ("i{0}", "i{0} image.{0}"),
-        ("f{0}1", "f{0}1"),
-        ("f{0}2", "f{0}2"),
-        ("fn{0}", "fn{0} contact.normal.force.{0}"),
-        ("ft{0}", "ft{0} contact.tangential.force.{0}"),
-    )
-} | {
+ALONG = {"f{0}": FORCE, "i{0}": "i{0} image.{0}", "f{0}1": "f{0}1", "f{0}2": "f{0}2"}
+ALONG |= {"fn{0}": "fn{0} contact.normal.force.{0}", "ft{0}": "ft{0} contact.tangential.force.{0}"}
+FORCES: dict[str, tuple[str, ...]] = {
     "fn": ("fn", "force.n", "normal.force", "contact.force.normal", "force.normal"),
     "kind": ("contact.type", "kind"),
 }
+FORCES |= {k.format(x): tuple(v.format(x).split()) for x in "xyz" for k, v in ALONG.items()}
 TABLE: Names = {
     **{axis: tuple(CENTRE.format(axis, number).split()) for number, axis in enumerate("xyz")},
     "radius": (*RADIUS_NAMES, "f.radius", "ball.radius", "particle.radius"),
@@ -123,10 +110,8 @@ def find_columns(
             places = [place for place, name in enumerate(plain) if name == word]
         if len(places) > 1:
             listed = ", ".join(f"{names[place]!r} (column {place + 1})" for place in places)
-            raise ReadError(
-                f"{path}: several columns may be {standard}: {listed}: choose one by its number: "
-                f'`{option}={{"{standard}": {places[0] + 1}}}`'
-            )
+            advice = f'choose one by its number: `{option}={{"{standard}": {places[0] + 1}}}`'
+            raise ReadError(f"{path}: several columns may be {standard}: {listed}: {advice}")
         keys = [table.layout.names[place] for place in places]
         if standard in named or not {*keys} <= {*found.values()}:
             found[standard] = keys[0]
@@ -159,6 +144,5 @@ def refuse_frames(path: Path, columns: Columns) -> None:
     for name, values in columns.items():
         count = len(np.unique(values)) if is_frame_name(name) else 1
         if count > 1:
-            raise ReadError(
-                f"{path}: the column {name} has {count} values: expected one frame in a file"
-            )
+            expected = "expected one frame in a file"
+            raise ReadError(f"{path}: the column {name} has {count} values: {expected}")

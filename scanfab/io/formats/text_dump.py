@@ -15,11 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from scanfab.base.errors import ReadError
+from scanfab.base.typing import Columns
 from scanfab.io.columns import has_radius
 from scanfab.io.files import first_bytes
 from scanfab.io.formats import shared
 from scanfab.io.reader import FileKind, Snapshot
-from scanfab.io.text import Columns, CutError, Layout, read_rows, text_of
+from scanfab.io.text import CutError, Layout, read_rows, text_of
 from scanfab.packing.cell import Cell
 
 # a snapshot begins with the first of these lines
@@ -79,6 +80,8 @@ class TextDump(shared.GrainsOnly):
         """
         data, where = text_of(snapshot), f"{snapshot.path}, step {snapshot.step}"
         header, count = _whole_header(where, data)
+        # the rows of large dumps are not held twice
+        del data
         what, *names = header.words
         # LAMMPS called ids tags until 2008
         names = ["id" if name == "tag" else name for name in names]
@@ -107,10 +110,9 @@ def _whole_header(where: str, data: bytes) -> tuple[Header, int]:
     header = _header(data)
     number = header.sections.get(f"NUMBER OF {''.join(header.words[:1])}", "")
     if not re.fullmatch(r"\d{1,18}", number):
-        raise (ReadError if header.words else CutError)(
-            f"{where}: the header is incomplete: expected a whole number after ITEM: NUMBER OF "
-            f"ATOMS (or ENTRIES), and the names of the columns behind it"
-        )
+        expected = "a whole number after ITEM: NUMBER OF ATOMS (or ENTRIES), and names of columns"
+        error = ReadError if header.words else CutError
+        raise error(f"{where}: the header is incomplete: expected {expected}")
     return header, int(number)
 
 

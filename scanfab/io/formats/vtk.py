@@ -131,10 +131,7 @@ class VtkReader:
             return contacts
         names = [one for one in mesh.line_arrays if "force" in one.lower() and one != "force"]
         if names:
-            note(
-                f"left out of the contacts: {', '.join(names)}: a force is taken from an array "
-                f"`force` with three components"
-            )
+            note(f"left out of the contacts: {', '.join(names)}: only a vector `force` is read")
         if contacts.force is None:
             return contacts
         force = np.asarray(contacts.force, np.float64)
@@ -160,10 +157,8 @@ class VtkReader:
             if form_of(path) not in (*BLOCKS, "Collection"):
                 found.setdefault(self.kind(path), []).append(path)
         if len(found["grains"]) != 1 or len(found["contacts"]) > 1:
-            raise ReadError(
-                f"{index}: expected one file of grains and at most one of contacts, found "
-                f"{len(found['grains'])} and {len(found['contacts'])}: name one as the source"
-            )
+            counts = " and ".join(f"{len(found[kind])} of {kind}" for kind in found)
+            raise ReadError(f"{index}: expected one file of grains, one of contacts: {counts}")
         table = self.read_grains(Snapshot(found["grains"][0]), options)
         for path in found["contacts"]:
             joined = self.read_contacts(Snapshot(path), options, table)
@@ -185,15 +180,12 @@ class VtkReader:
                 continue
             other = frames.setdefault(entry.get("timestep"), {}).setdefault(part, path)
             if other is not path:
-                raise ReadError(
-                    f"{index}: {other.name} and {path.name} have the same timestep, part and group"
-                )
+                both = f"{other.name} and {path.name}"
+                raise ReadError(f"{index}: {both} have the same timestep, part and group")
         names = {kind: name for (name, _, _), kind in kinds.items()}
         if {"grains", "points"} <= names.keys():
-            raise ReadError(
-                f"{index}: {names['points']} are points without a radius beside the grains in "
-                f"{names['grains']}: take them out of the list, or name the files as the source"
-            )
+            points = f"points without a radius ({names['points']}) beside {names['grains']}"
+            raise ReadError(f"{index}: lists {points}: take them out, or name the files")
         return [_frame(index, time, *parts.values()) for time, parts in frames.items()]
 
 

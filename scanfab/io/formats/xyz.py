@@ -11,10 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from scanfab.base.errors import ReadError
+from scanfab.base.typing import Columns
 from scanfab.io.files import bare_name, first_bytes, leave_out_last, plain
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
 from scanfab.io.reader import Carries, Snapshot
-from scanfab.io.text import Columns, Layout, read_rows, spelt, text_of
+from scanfab.io.text import Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
 COUNT = re.compile(rb"(?:\xef\xbb\xbf)?[ \t]*([0-9]{1,15})[ \t]*\r?\n")
@@ -113,10 +114,8 @@ def _head(path: Path, text: bytes) -> Head:
     pairs = PAIR.findall(lines[1].decode("utf-8", "replace"))
     words = {key.lower(): quoted or bare for key, quoted, bare in pairs}
     if "properties" not in words:
-        raise ReadError(
-            f"{path}: this is plain XYZ, whose second line has no Properties=...: read it as a "
-            f'table, for instance `format="table", skip=2, columns="x=2,y=3,z=4,radius=5"`'
-        )
+        table = '`format="table"`, `skip=2` and `columns="x=2,y=3,z=4,radius=5"` read it'
+        raise ReadError(f"{path}: this is plain XYZ, without Properties=... in line 2: {table}")
     parts = words["properties"].split(":")
     if not PROPERTIES.fullmatch(words["properties"]) or len(set(parts[::3])) < len(parts) // 3:
         expected = "expected Properties=NAME:KIND:WIDTH:... (kinds S, I, R, L), each name once"

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError
-from scanfab.base.typing import FloatArray
+from scanfab.base.typing import Columns, FloatArray
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
 from scanfab.io.formats.vtk import FormsReader
 from scanfab.io.formats.yade_save import SavedScene
 from scanfab.io.mesh import Mesh
 from scanfab.io.reader import Carries, FileKind, Snapshot
-from scanfab.io.text import Columns, Layout, read_rows, text_of
+from scanfab.io.text import Layout, read_rows, text_of
 from scanfab.packing.cell import Cell
 
 # legacy VTK by VTKExporter: VTK itself writes no dot behind the version

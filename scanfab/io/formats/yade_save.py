@@ -62,10 +62,8 @@ class SavedScene(GrainsOnly):
     def kind(self, path: Path) -> FileKind:
         """Grains, in XML."""
         if b"<boost_serialization" not in first_bytes(path):
-            raise ReadError(
-                f"{path}: YADE's binary format can be read by the same build of YADE only: load it "
-                f"there, and save it as XML: O.save('name.xml.bz2')"
-            )
+            advice = "load it there, and save it as XML: O.save('name.xml.bz2')"
+            raise ReadError(f"{path}: only the same build of YADE can read its binary: {advice}")
         return "grains"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
@@ -90,7 +88,7 @@ def _read_save(path: Path, options: ReadOptions) -> GrainTable:
         with open(plain(path), "rb") as stream:
             parsed: Any = ElementTree.iterparse(stream)
             for _, element in parsed:
-                # a contact, which stands in the first body that has it, or a body that is there
+                # a contact stands in the first body that has it; bodies may also be references
                 if element.tag != "px":
                     continue
                 if element.find("iterMadeReal") is not None:
@@ -198,10 +196,8 @@ def cell_beside(path: Path, position: FloatArray) -> Cell | None:
     if file is None:
         exported = EXPORTED.fullmatch(bare_name(path))
         if exported and _numbered(path.parent, f"{exported[1]}-periCell-", stamp_of(path.parent)):
-            warn(
-                f"{path.parent / exported[1]}-periCell-*: not read, as there is not one cell for "
-                f'each file of spheres: name the cells with `cell="FILE.csv"`'
-            )
+            told = 'skipped, as not each file of spheres has one: name cells by `cell="FILE.csv"`'
+            warn(f"{path.parent / exported[1]}-periCell-*: {told}")
         return None
     if is_cell_file(file):
         corners = read_mesh(file).points
@@ -216,10 +212,9 @@ def cell_beside(path: Path, position: FloatArray) -> Cell | None:
     fractions = cell.fractional(position)
     outside = np.any((fractions < -ROUNDING) | (fractions > 1.0 + ROUNDING), axis=1)
     if outside.any():
-        raise ReadError(
-            f"{path}: {np.count_nonzero(outside)} grains lie outside the cell of {file}: name the "
-            f'right one with `cell=(LX, LY, LZ)` or `cell="FILE.csv"`'
-        )
+        told = f"{np.count_nonzero(outside)} grains lie outside the cell of {file}"
+        advice = 'name the right one with `cell=(LX, LY, LZ)` or `cell="FILE.csv"`'
+        raise ReadError(f"{path}: {told}: {advice}")
     pattern = re.sub(r"\d+", "*", file.name)
     note(f"the cell is read from {file.parent / pattern}, beside the grains")
     return cell
@@ -232,7 +227,7 @@ def cell_file(path: Path) -> Path | None:
         # its number counts files; that of a saved state is a step
         spheres = _numbered(folder, f"{exported[1]}-spheres-", stamp)
         cells = _numbered(folder, f"{exported[1]}-periCell-", stamp)
-        # behind the interactions of its frame a cell has the next number, before them the same one
+        # a cell that was exported after the interactions of its frame has the next number
         pairs = dict(zip(sorted(spheres), sorted(cells), strict=False))
         if len(spheres) != len(cells) or any(pairs[one] - one not in (0, 1) for one in pairs):
             return None

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from scanfab.base.typing import FloatArray
+from scanfab.base.typing import AnyArray, FloatArray
 from scanfab.io.writer import Left, csv_bytes, more_columns, table_columns
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
@@ -80,14 +78,14 @@ class LammpsDataWriter:
         return Left(contacts=True, frame=True, columns=left, notes=tuple(notes))
 
 
-def _is_dumped(name: str, values: npt.NDArray[Any]) -> bool:
+def _is_dumped(name: str, values: AnyArray) -> bool:
     """Whether a dump's reader gives a column back: numbers, under a name of one word."""
     if len(name.split()) != 1 or values.dtype.kind == "U" or name.lower() in ("element", "lattice"):
         return False
     return values.dtype.kind == "f" or bool(np.all(np.abs(values.astype(float)) < MOST_EXACT))
 
 
-def _is_data(name: str, values: npt.NDArray[Any]) -> bool:
+def _is_data(name: str, values: AnyArray) -> bool:
     """Whether LAMMPS takes a column as types (whole numbers from 1) or densities (positive)."""
     if values.dtype.kind not in "iuf" or not np.all(values > 0):
         return False

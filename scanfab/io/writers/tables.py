@@ -5,13 +5,12 @@ from __future__ import annotations
 import io
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from scanfab.base.typing import AnyArray, Columns
 from scanfab.io.formats.table_names import is_frame_name
-from scanfab.io.writer import Columns, Left, as_arrays, csv_bytes, flat, table_columns
+from scanfab.io.writer import Left, as_arrays, csv_bytes, flat, table_columns
 from scanfab.packing.packing import Packing
 
 # letters of extended XYZ by numpy's kinds
@@ -105,7 +104,7 @@ def _line(packing: Packing) -> str:
     return words + ("" if packing.time is None else f"Time={packing.time!r} ")
 
 
-def _is_xyz(name: str, values: npt.NDArray[Any]) -> bool:
+def _is_xyz(name: str, values: AnyArray) -> bool:
     """Whether extended XYZ has a place for a column: its name and its texts are single words."""
     if re.search(r"[\s:\"=]", name) or not name or int(np.prod(values.shape[1:])) > 99:
         return False

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 
 import numpy as np
-import numpy.typing as npt
 
+from scanfab.base.typing import AnyArray, Columns
 from scanfab.io.files import first_bytes
-from scanfab.io.writer import Columns, Left, as_arrays, cell_of, contacts_of
+from scanfab.io.writer import Left, as_arrays, cell_of, contacts_of
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList
 from scanfab.packing.packing import Packing
@@ -90,7 +90,7 @@ class VtpWriter:
         return Left(no_step=False, notes=tuple(arrays.notes))
 
 
-def _array(name: str, values: npt.NDArray[Any]) -> Any:
+def _array(name: str, values: AnyArray) -> Any:
     """An array of VTK, whose writer puts names between quotes as they are."""
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonCore import vtkStringArray

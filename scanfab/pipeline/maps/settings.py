@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from scanfab.base.errors import SettingsError
-from scanfab.base.option import changed, numbers, optional, sample, whole
+from scanfab.base.option import numbers, optional, sample, whole
 from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.values import parse_variants
 
 if TYPE_CHECKING:
     from scanfab.base.column import Column
@@ -52,7 +53,7 @@ class MapSettings(Settings):
     24
     """
 
-    variants: str = changed(Settings, "variants", default="a")
+    variants: str = sample(parse_variants, default="a", metavar="LETTERS", first=True)
     grid: tuple[int, int, int] | None = sample(optional(parse_grid), metavar="NX,NY,NZ", first=True)
     """So many blocks along x, y and z (along the edges of a periodic cell)."""
     slices: int | None = sample(optional(block_count), first=True)

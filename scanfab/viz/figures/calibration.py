@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import FigureBase
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray
 from scanfab.table.curves import short_names
-from scanfab.table.row import column_of, total_error
+from scanfab.table.row import column_of, number_of, total_error
 from scanfab.viz.figures.figure import Figure
-from scanfab.viz.figures.style import LOOKS, VOID_AXIAL, VOID_UNIT, WIDTH, band, plain
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Page
-    from matplotlib.figure import SubFigure
-
+from scanfab.viz.figures.style import LABELS, LOOKS, WIDTH, band, plain
 
 # ladder: label of the axis, whether it is logarithmic, and the paper's choice
 PANELS: dict[str, tuple[str, bool, float | None]] = {
@@ -51,6 +47,7 @@ class Ladders(Figure):
     kind = "calibration"
     order = 8
     lettered = True
+    size = (WIDTH, 5.2)
 
     def __init__(self, data: Sequence[Any], ladder: str = "spacing") -> None:
         super().__init__(data)
@@ -58,59 +55,52 @@ class Ladders(Figure):
             raise SettingsError(f"ladder: expected {', '.join(PANELS)}, found {ladder!r}")
         self.ladder = ladder
 
-    @property
-    def size(self) -> tuple[float, float]:
-        """Of two rows."""
-        return WIDTH, 5.2
-
     def draw(self, ax: Axes) -> None:
         """One of the ladders."""
-        _draw(ax, self._steps(self.ladder), self.ladder)
+        self._draw_ladder(ax, self.ladder)
         ax.legend()
 
-    def panels(self, part: Page | SubFigure) -> list[Axes]:
+    def panels(self, part: FigureBase) -> list[Axes]:
         """All four."""
         panels: list[Axes] = part.subplots(2, 2).ravel().tolist()
         for panel, ladder in zip(panels, PANELS, strict=True):
-            _draw(panel, self._steps(ladder), ladder)
-        handles, labels = panels[0].get_legend_handles_labels()
-        part.legend(handles, labels, loc="outside upper center", ncols=4, title=self._note())
-        return panels
-
-    def _note(self) -> str:
-        """What was scanned, and what bands, bars and dots are."""
+            self._draw_ladder(panel, ladder)
+        # what was scanned, and what bands, bars and dots are
         lines = ["bands: one total standard error, of scan and sample together"]
-        if np.isnan(_totals(self.data)).any():
+        if np.isnan(_totals(_known(self.data))).any():
             lines.append("no band where either part is not known")
         lines.append("bars: the scan's part; dotted: the choice of the 2017 paper")
         if self.data:
             source, frame = self.data[0].source, self.data[0].frame
             name = plain(short_names([source])[source])
             lines.insert(0, f"{f'{name}, ' if name else ''}frame {frame}")
-        return "\n".join(lines)
+        handles, labels = panels[0].get_legend_handles_labels()
+        above: dict[str, Any] = {"loc": "outside upper center", "title": "\n".join(lines)}
+        part.legend(handles, labels, ncols=4, **above)
+        return panels
 
-    def _steps(self, ladder: str) -> list[Any]:
-        return [row for row in self.data if row.ladder == ladder]
+    def _draw_ladder(self, panel: Axes, ladder: str) -> None:
+        """A curve for each variant."""
+        label, logarithmic, paper = PANELS[ladder]
+        rows = [row for row in self.data if row.ladder == ladder]
+        for variant in sorted({row.variant for row in rows}):
+            steps = _known([row for row in rows if row.variant == variant])
+            values, alphas = column_of(steps, "value"), 1e3 * column_of(steps, "alpha_vs_axial")
+            band(panel, values, alphas, 1e3 * _totals(steps), LOOKS[variant])
+            error = [1e3 * (number_of(row, "alpha_vs_axial_se") or 0.0) for row in steps]
+            panel.errorbar(values, alphas, error, label=f"variant {variant}", **LOOKS[variant])
+        if paper is not None:
+            panel.axvline(paper, color="0.6", linewidth=0.8, linestyle=":")
+        if logarithmic:
+            panel.set_xscale("log")
+        panel.set(xlabel=label, ylabel=LABELS["alpha_vs_axial"])
+
+
+def _known(rows: Sequence[Any]) -> list[Any]:
+    """The steps that have a void fabric."""
+    return [row for row in rows if row.alpha_vs_axial is not None]
 
 
 def _totals(rows: Sequence[Any]) -> FloatArray:
-    """Total errors of the steps that have a void fabric; NaN where they are not known."""
-    known = [row for row in rows if row.alpha_vs_axial is not None]
-    return column_of([{"total": total_error(row, "alpha_vs_axial")} for row in known], "total")
-
-
-def _draw(panel: Any, rows: Sequence[Any], ladder: str) -> None:
-    """One ladder: a curve for each variant."""
-    label, logarithmic, paper = PANELS[ladder]
-    for variant in sorted({row.variant for row in rows}):
-        steps = [r for r in rows if r.variant == variant and r.alpha_vs_axial is not None]
-        values = np.array([row.value for row in steps])
-        alphas = 1e3 * np.array([row.alpha_vs_axial for row in steps])
-        band(panel, values, alphas, 1e3 * _totals(steps), LOOKS[variant])
-        error = [1e3 * (row.alpha_vs_axial_se or 0.0) for row in steps]
-        panel.errorbar(values, alphas, error, label=f"variant {variant}", **LOOKS[variant])
-    if paper is not None:
-        panel.axvline(paper, color="0.6", linewidth=0.8, linestyle=":")
-    if logarithmic:
-        panel.set_xscale("log")
-    panel.set(xlabel=label, ylabel=VOID_UNIT + VOID_AXIAL)
+    """Their total errors; NaN where these are not known."""
+    return np.array([total_error(row, "alpha_vs_axial") for row in rows], np.float64)

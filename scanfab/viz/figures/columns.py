@@ -18,7 +18,6 @@ FIRST = (
     "alpha_bn_axial", "alpha_fn_axial", "alpha_ft_axial", "alpha_gc_strong_axial",
     "f_vs", "f_c", "vs_a4", "c_a4",
 )  # fmt: skip
-MOST_PANELS = 24
 
 
 class Columns(Curves):
@@ -98,10 +97,6 @@ def _named(data: Table, of: str | Sequence[str] | None) -> list[str]:
             raise SettingsError(f"figure columns: {no_column(name, data.names)}")
         if not any(isinstance(one[name], int | float) for one in data):
             raise SettingsError(f"figure columns: the column {name} holds no numbers")
-    if len(names) > MOST_PANELS:
-        raise SettingsError(
-            f"figure columns: expected at most {MOST_PANELS} columns, found {len(names)}"
-        )
     return names
 
 

@@ -2,74 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import FigureBase
+from matplotlib.lines import Line2D
 
 from scanfab.base.typing import FloatArray
 from scanfab.table.compare import Comparison, compare_tables
 from scanfab.table.curves import is_turned
 from scanfab.table.row import number_of
 from scanfab.table.table import Table
-from scanfab.viz.figures.curves import ROW
+from scanfab.viz.figures.curves import ROW, Drawn, Group, group_of, groups_of
 from scanfab.viz.figures.figure import Figure
-from scanfab.viz.figures.groups import Drawn, Group, group_of, groups_of
-from scanfab.viz.figures.style import (
-    CONTACT,
-    CONTACT_AXIAL,
-    CONTACT_INTENSITY,
-    CONTACT_UNIT,
-    VOID,
-    VOID_AXIAL,
-    VOID_INTENSITY,
-    VOID_UNIT,
-    WIDTH,
-    widen,
-)
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Page
-    from matplotlib.figure import SubFigure
-
+from scanfab.viz.figures.style import CONTACT, LABELS, VOID, WIDTH, widen
 
 # as the 2017 paper prints them, of spheres and of discs
 PAPER_SLOPE, PAPER_SLOPE_2D = 0.096, 0.231
 # heights in inches: a legend without curves, and the two lines of each curve
 LEGEND, ENTRY = 1.0, 0.32
-
-
-@dataclass(frozen=True)
-class Fit:
-    """The line of one source and variant, as the comparison has it; dimensionless."""
-
-    slope: float
-    slope_se: float | None
-    r2: float | None
-    contact: FloatArray
-    """Smallest and largest contact anisotropy of the fitted frames, shape (2,)."""
-    void: FloatArray
-    """The line's void anisotropy there; it goes through the mean of both, shape (2,)."""
-
-    def __str__(self) -> str:
-        error = "" if self.slope_se is None else rf" $\pm$ {self.slope_se:.3f}"
-        r2 = "" if self.r2 is None else f", $R^2$ = {self.r2:.3f}"
-        return f"{self.slope:.3f}{error}{r2}"
-
-
-def fits_of(comparison: Comparison) -> list[Fit | None]:
-    """The line of each source and variant as the comparison's summary has it; None without one."""
-    found: list[Fit | None] = []
-    for one, points in zip(comparison.summary, comparison.points, strict=True):
-        if one.slope is None:
-            found.append(None)
-            continue
-        ends = np.array([points[:, 0].min(), points[:, 0].max()])
-        contact, void = points.mean(axis=0)
-        line = void + one.slope * (ends - contact)
-        found.append(Fit(one.slope, one.slope_se, one.r2, ends, line))
-    return found
 
 
 class Correlation(Figure):
@@ -104,7 +57,9 @@ class Correlation(Figure):
         self.in_plane = any(
             number_of(row, f"gvs_{axis}") == 0.0 for row in data for axis in ("xx", "yy", "zz")
         )
-        self.fits = fits_of(compare_tables(data) if comparison is None else comparison)
+        made = compare_tables(data) if comparison is None else comparison
+        self.fits = list(zip(made.summary, made.points, strict=True))
+        """Of each curve its line, and contact and void anisotropy of the fitted frames."""
 
     @property
     def size(self) -> tuple[float, float]:
@@ -117,44 +72,40 @@ class Correlation(Figure):
     def caption(self) -> str:
         """With which lines there are."""
         what = "intensity" if self.turned else "anisotropy along the loading axis"
-        fits = [] if self.turned else [fit for fit in self.fits if fit is not None]
-        lines = ["fitted lines"] * bool(fits)
-        lines += ["the paper's slope"] * any(fit.contact[1] > 0 for fit in fits)
-        drawn = f"with {' and '.join(lines)}" if lines else "without a line"
-        return f"Void against contact {what}, {drawn}."
+        drawn = [group.drawn for group in self.groups if not self.turned]
+        fitted = [self.fits[one.place][0].slope is not None for group in drawn for one in group]
+        lines = ["fitted lines"] * any(fitted)
+        lines += ["the paper's slope"] * any(self._reach(group) > 0 for group in drawn)
+        which = f"with {' and '.join(lines)}" if lines else "without a line"
+        return f"Void against contact {what}, {which}."
 
     def draw(self, ax: Axes) -> None:
         """With the legend in the panel."""
-        handles, labels = self._draw_group(ax, group_of(self.groups))
-        ax.legend(handles, labels, title=self._title)
+        self._draw_group(ax, ax, group_of(self.groups))
 
-    def panels(self, part: Page | SubFigure) -> list[Axes]:
+    def panels(self, part: FigureBase) -> list[Axes]:
         """A panel for each group, beside it the legend, which has the numbers."""
         panels = part.subplots(len(self.groups), 2, squeeze=False, width_ratios=(3, 2))
         for group, (axes, margin) in zip(self.groups, panels, strict=True):
-            handles, labels = self._draw_group(axes, group)
-            axes.set_title(group.title, loc="left")
             margin.set_axis_off()
             place: dict[str, Any] = {"loc": "center left", "borderaxespad": 0, "handlelength": 2.5}
-            margin.legend(handles, labels, title=self._title, **place)
+            self._draw_group(axes, margin, group, **place)
+            axes.set_title(group.title, loc="left")
         return [axes for axes, _ in panels]
 
-    @property
-    def _title(self) -> str:
-        return "intensities" if self.turned else f"slope of {VOID} on {CONTACT}, axial"
-
-    def _draw_group(self, axes: Axes, group: Group) -> tuple[list[Any], list[str]]:
-        """The points and lines of one panel; handles and labels of its legend."""
+    def _draw_group(self, axes: Axes, margin: Axes, group: Group, **place: Any) -> None:
+        """The points and lines of one panel, and its legend in the margin."""
         entries = [self._draw_curve(axes, one) for one in group.drawn]
-        if not self.turned:
-            entries += [*self._draw_paper(axes, group), *_errors_entry(group)]
-        contact, void = CONTACT_AXIAL, VOID_AXIAL
+        title, part = f"slope of {VOID} on {CONTACT}, axial", "_axial"
         if self.turned:
-            contact, void = CONTACT_INTENSITY, VOID_INTENSITY
-        axes.set(xlabel=CONTACT_UNIT + contact, ylabel=VOID_UNIT + void)
+            title, part = "intensities", ""
+        else:
+            entries += [*self._draw_paper(axes, group), *_errors_entry(group)]
+        axes.set(xlabel=LABELS[f"alpha_c{part}"], ylabel=LABELS[f"alpha_vs{part}"])
         axes.axhline(0, color="0.6", lw=0.6, zorder=0)
         widen(axes, 1.0)
-        return [handle for handle, _ in entries], [label for _, label in entries]
+        handles, labels = zip(*entries, strict=True)
+        margin.legend(handles, labels, title=title, **place)
 
     def _draw_curve(self, axes: Axes, one: Drawn) -> tuple[Any, str]:
         """The frames of a curve, with their total errors, and its line."""
@@ -169,17 +120,25 @@ class Correlation(Figure):
         points = axes.errorbar(1e2 * x, 1e3 * y, xerr=xerr, yerr=yerr, **style)
         for bars in points.lines[2]:
             bars.set_alpha(0.4)
-        fit = self.fits[one.place]
-        if fit is None:
+        fit, frames = self.fits[one.place]
+        if fit.slope is None:
             return points, f"{one.name}:\nno line"
-        line = {"color": look["color"], "ls": one.look["ls"], "gid": "fit"}
-        (drawn,) = axes.plot(1e2 * fit.contact, 1e3 * fit.void, **line)
-        return (drawn, points), f"{one.name}:\n{fit}"
+        contact, void = frames.mean(axis=0)
+        ends = np.array([frames[:, 0].min(), frames[:, 0].max()])
+        style = {"color": look["color"], "ls": one.look["ls"], "gid": "fit"}
+        (line,) = axes.plot(1e2 * ends, 1e3 * (void + fit.slope * (ends - contact)), **style)
+        error = "" if fit.slope_se is None else rf" $\pm$ {fit.slope_se:.3f}"
+        r2 = "" if fit.r2 is None else f", $R^2$ = {fit.r2:.3f}"
+        return (line, points), f"{one.name}:\n{fit.slope:.3f}{error}{r2}"
+
+    def _reach(self, drawn: Sequence[Drawn]) -> float:
+        """The largest contact anisotropy of the fitted frames of some curves."""
+        fits = [self.fits[one.place] for one in drawn]
+        return max((frames[:, 0].max() for fit, frames in fits if fit.slope is not None), default=0)
 
     def _draw_paper(self, axes: Axes, group: Group) -> list[tuple[Any, str]]:
         """The slope that the paper prints, through the origin, as far as there are contacts."""
-        fits = [fit for one in group.drawn if (fit := self.fits[one.place]) is not None]
-        reach = max((float(fit.contact[1]) for fit in fits), default=0.0)
+        reach = self._reach(group.drawn)
         if reach <= 0:
             return []
         slope, of = (PAPER_SLOPE_2D, ", 2D") if self.in_plane else (PAPER_SLOPE, "")
@@ -193,8 +152,6 @@ def _bars(error: FloatArray) -> FloatArray | None:
 
 def _errors_entry(group: Group) -> list[tuple[Any, str]]:
     """What the bars are: drawn as a cross, as a line alone would look like the axis."""
-    from matplotlib.lines import Line2D
-
     curves = [one.curve for one in group.drawn]
     void, contact = (
         any(np.isfinite(curve.total_errors(name)).any() for curve in curves)

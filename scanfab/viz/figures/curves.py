@@ -1,33 +1,117 @@
-"""Curves over the strain: what the figures evolution, normalised and columns share."""
+"""The figures evolution and normalised, and what figures of curves over the strain share."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import FigureBase
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
+from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray
-from scanfab.table.curves import Curve, abscissa_label
+from scanfab.table.curves import Curve, abscissa_label, abscissa_words, curves_of, is_turned
 from scanfab.table.table import Table
-from scanfab.viz.figures.figure import Figure
-from scanfab.viz.figures.groups import Drawn, group_of, groups_of
-from scanfab.viz.figures.style import band, widen
+from scanfab.viz.figures.figure import Figure, one_of
+from scanfab.viz.figures.style import (
+    COLOURS,
+    CONTACT,
+    LABELS,
+    LOOKS,
+    NAMES,
+    VOID,
+    WIDTH,
+    band,
+    plain,
+    widen,
+)
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Page
-    from matplotlib.figure import SubFigure
+Look = dict[str, Any]
 
-
+COLOURS_OF_MANY = ("blue", "vermilion", "green", "purple", "orange", "sky", "black")
+LINES = ("-", "--", "-.", ":")
+# of curves that are told apart by their sources, or by the sizes of their RVs, and of as many more
+MANY_LOOKS: tuple[Look, ...] = tuple(
+    {"color": COLOURS[colour], "marker": marker, "ls": LINES[(place + turn) % 4], **more}
+    for turn, more in enumerate(({}, {"mfc": "white", "ms": 5.5}))
+    for place, (colour, marker) in enumerate(zip(COLOURS_OF_MANY, "o^DsvPX", strict=True))
+)
+OTHER: Look = {"color": "0.3", "marker": "v", "ls": "-"}
+MEANINGS = {"a": "whole", "b": "whole, rattlers void", "c": "RV", "d": "RV, rattlers void"}
 # height of each further row of panels, inches
 ROW = 2.1
 MOST_MARKERS = 25
 
 
-@dataclass(frozen=True)
-class Quantity:
+class Drawn(NamedTuple):
+    """A curve, its place among all of the table, its look and its name in the legend."""
+
+    curve: Curve
+    place: int
+    look: Look
+    name: str
+
+
+class Group(NamedTuple):
+    """The curves of one panel; the title is empty if there is one group alone."""
+
+    title: str
+    drawn: list[Drawn]
+
+
+def groups_of(rows: Sequence[Mapping[str, Any]]) -> list[Group]:
+    """
+    The curves of a table by source, or by variant: whichever makes fewer panels.
+
+    Several curves of several sources in one panel could not be told apart.
+
+    Raises
+    ------
+    SettingsError
+        If the table has nothing to draw.
+    """
+    curves = curves_of(rows)
+    if not any(np.isfinite(curve.values("alpha_vs_axial")).any() for curve in curves):
+        raise SettingsError("there is nothing to draw: no row of the table has a void fabric")
+    sources = list(dict.fromkeys(curve.source for curve in curves))
+    variants = sorted({curve.variant for curve in curves})
+    by_source = len(sources) == 1 or 1 < len(variants) >= len(sources)
+    # several RVs of a variant cannot all have the one look of the variant
+    several_rvs = len({variant[0] for variant in variants}) < len(variants)
+    panels: dict[str, list[Drawn]] = {one: [] for one in (sources if by_source else variants)}
+    for place, curve in enumerate(curves):
+        source, variant = curve.source, curve.variant
+        number = variants.index(variant) if by_source else sources.index(source)
+        look = MANY_LOOKS[number % len(MANY_LOOKS)]
+        if by_source:
+            name = _spelt(variant) if len(sources) == 1 else f"variant {variant}"
+            look = look if several_rvs else LOOKS.get(variant, OTHER)
+        else:
+            name = f"variant {variant}, " * (len(variants) == 1) + plain(source)
+        panels[source if by_source else variant].append(Drawn(curve, place, look, name))
+    titles = {one: plain(one) if by_source else _spelt(one) for one in panels}
+    return [Group(titles[one] * (len(panels) > 1), drawn) for one, drawn in panels.items()]
+
+
+def group_of(groups: Sequence[Group]) -> Group:
+    """The only group; SettingsError if there are several, which one Axes cannot hold."""
+    if len(groups) > 1:
+        raise SettingsError(
+            "several variants of several sources are too many for one Axes: choose some, "
+            'for instance by table.select(variant="c")'
+        )
+    return groups[0]
+
+
+def _spelt(variant: str) -> str:
+    meaning = MEANINGS.get(variant)
+    return f"variant {variant}" if meaning is None else f"variant {variant}: {meaning}"
+
+
+class Quantity(NamedTuple):
     """What a panel shows: a column of the table, and how its axis is made."""
 
     column: str
@@ -48,12 +132,15 @@ class Quantity:
         return found if self.errors else np.full_like(found, np.nan)
 
 
+ANGLE = Quantity("coaxiality_deg", "coaxiality, degrees")
+
+
 class Curves(Figure):
     """
     Quantities of a table over the strain, or over the frames.
 
-    Each group of curves (:func:`scanfab.viz.figures.groups.grouped`) has a panel for each
-    quantity. One Axes holds one group and its first quantity.
+    Each group of curves (:func:`groups_of`) has a panel for each quantity. One Axes holds one group
+    and its first quantity.
     """
 
     lettered = True
@@ -93,7 +180,7 @@ class Curves(Figure):
             ax.plot([], [], label=name, **look)
         ax.legend()
 
-    def panels(self, part: Page | SubFigure) -> list[Axes]:
+    def panels(self, part: FigureBase) -> list[Axes]:
         """Some rows of panels for each group, and the legend above, so that it covers no data."""
         across = min(self.across, len(self.quantities))
         shape, one_row = (self.rows * len(self.groups), across), self.rows == 1
@@ -110,7 +197,10 @@ class Curves(Figure):
         for axes in found[-across:]:
             self._set_abscissa(axes)
             axes.xaxis.set_tick_params(labelbottom=True)
-        self._legend_above(part)
+        handles = [Line2D([], [], **look) for look in self.looks.values()]
+        columns = 2 if max(map(len, self.looks)) > 12 else 4
+        above: dict[str, Any] = {"loc": "outside upper center", "title": self.note or None}
+        part.legend(handles, list(self.looks), ncols=min(len(handles), columns), **above)
         return found
 
     def _draw_panel(self, axes: Axes, drawn: Sequence[Drawn], quantity: Quantity) -> None:
@@ -134,8 +224,6 @@ class Curves(Figure):
 
     def _set_abscissa(self, axes: Axes) -> None:
         """Label and scale of what the curves are drawn over."""
-        from matplotlib.ticker import MaxNLocator
-
         label = abscissa_label(self.data)
         axes.set_xlabel(label)
         places = np.concatenate([curve.x for curve in self.curves])
@@ -146,12 +234,125 @@ class Curves(Figure):
         if label == "frame":
             axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
-    def _legend_above(self, part: Page | SubFigure) -> None:
-        from matplotlib.lines import Line2D
 
-        handles: list[Any] = [Line2D([], [], **look) for look in self.looks.values()]
-        columns = 2 if max(map(len, self.looks)) > 12 else 4
-        part.legend(
-            handles, list(self.looks), loc="outside upper center",
-            ncols=min(len(handles), columns), title=self.note or None,
-        )  # fmt: skip
+class Evolution(Curves):
+    """
+    Void and contact anisotropy over the strain, or over the frames.
+
+    Bands are total standard errors, bars the scan's part. Where the principal axes are not the
+    loading axis, as in simple shear, intensities are drawn, and the angle between both major axes.
+
+    Parameters
+    ----------
+    data : Table
+        A fabric table; on one Axes of one source, or of one variant.
+    of : str, optional
+        ``"voids"`` or ``"contacts"``, to draw these alone; on one Axes voids by default.
+
+    Raises
+    ------
+    SettingsError
+        If there is nothing to draw, or too much for one Axes.
+
+    Examples
+    --------
+    >>> import scanfab
+    >>> from matplotlib.figure import Figure
+    >>> table = scanfab.load("sample_data/yade_triaxial/engine.csv")
+    >>> table = scanfab.Table(
+    ...     dict(row, source="s", variant="c", alpha_vs_axial=0.001 * k, alpha_c_axial=0.01 * k)
+    ...     for k, row in enumerate(table)
+    ... )
+    >>> ax = Figure().subplots()
+    >>> table.plot.evolution(ax=ax, of="contacts") is ax
+    True
+    """
+
+    order = 1
+    columns = ("variant", "alpha_vs_axial", "strain", "alpha_c_axial")
+    height: ClassVar[float] = 2.9
+    """Of a single row of panels, inches."""
+
+    def __init__(self, data: Table, of: str | None = None) -> None:
+        self.turned = is_turned(data)
+        self.of = one_of(of, ("voids", "contacts"))
+        chosen = [self._quantity(name) for name in self.of]
+        self.has_angle = self.turned and not self.share and of is None
+        super().__init__(data, [*chosen, ANGLE] if self.has_angle else chosen)
+
+    def _quantity(self, name: str) -> Quantity:
+        """Along the loading axis; where the principal axes are turned, the intensity."""
+        voids = name == "voids"
+        column = ("alpha_vs" if voids else "alpha_c") + ("" if self.turned else "_axial")
+        label, factor = LABELS[column], 1e3 if voids else 1e2
+        if self.share:
+            label, factor = f"{NAMES[column]} / largest", 1.0
+        bars = voids and not self.turned and not self.share
+        return Quantity(column, label, factor, "" if self.turned else "total", bars)
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """A row of panels for each group, and as many lines of legend."""
+        lines = -(-len(self.looks) // 2)
+        return WIDTH, self.height + ROW * (len(self.groups) - 1) + 0.15 * max(lines - 2, 0)
+
+    @property
+    def caption(self) -> str:
+        """With the abscissa, and with what has errors."""
+        what = f"{' and '.join(one.removesuffix('s') for one in self.of)} anisotropy"
+        drawn = f"{what.capitalize()} along the loading axis"
+        if self.turned:
+            angle = ", and the angle between their major axes" if self.has_angle else ""
+            drawn = f"Intensity of {what}{angle}"
+        divided = ", each curve divided by its own largest absolute value" if self.share else ""
+        banded = [
+            name
+            for name, one in zip(self.of, self.quantities, strict=False)
+            if one.errors and self._has_errors(one.column)
+        ]
+        errors = f"with total standard errors of {' and '.join(banded)}"
+        return (
+            f"{drawn}, over {abscissa_words(self.data)}{divided}; "
+            f"{errors if banded else 'without total errors'}."
+        )
+
+    @property
+    def note(self) -> str:
+        """What bands and bars are."""
+        if self.turned:
+            return "without errors: the table has those of the axial values only"
+        alone = any(curve.contact_alone for curve in self.curves)
+        which = "contacts taken as independent" if alone else "the sample's"
+        parts = [f"of {VOID} scan and sample together"] * self._has_errors("alpha_vs_axial")
+        parts += [f"of {CONTACT} {which}"] * self._has_errors("alpha_c_axial")
+        lines = [f"bands: one total standard error, {', '.join(parts)}"] if parts else []
+        scan = np.concatenate([curve.errors("alpha_vs_axial_se") for curve in self.curves])
+        if np.isfinite(scan).any() and not self.share:
+            largest = f"{1e3 * np.nanmax(scan):.2g}"
+            lines.append(rf"bars: the scan's part, at most ${largest}\times10^{{-3}}$")
+        return "\n".join(lines)
+
+    def _has_errors(self, column: str) -> bool:
+        return any(np.isfinite(curve.total_errors(column)).any() for curve in self.curves)
+
+
+class Normalised(Evolution):
+    """
+    Void and contact anisotropy over the strain, each curve divided by its own largest value.
+
+    Parameters
+    ----------
+    data : Table
+        A fabric table; on one Axes of one source, or of one variant.
+    of : str, optional
+        ``"voids"`` or ``"contacts"``, to draw these alone; on one Axes voids by default.
+
+    Raises
+    ------
+    SettingsError
+        If there is nothing to draw, or too much for one Axes.
+    """
+
+    order = 2
+    height = 2.7
+    share = True

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
+import numpy as np
+
 from scanfab.base.errors import SettingsError
-from scanfab.viz.figures.style import COLUMN, STYLE, letter
+from scanfab.viz.figures.style import COLUMN, DIRECTIONAL, STYLE, letter
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Page
-    from matplotlib.figure import SubFigure
+    from matplotlib.figure import FigureBase
 
     from scanfab.viz.scanned_frames import ScannedFrame, ScannedFrames
 
@@ -86,7 +88,7 @@ class Figure:
         """Draw on one Axes; of several panels the one that says most, or that is chosen."""
         raise NotImplementedError
 
-    def panels(self, part: Page | SubFigure) -> list[Axes]:
+    def panels(self, part: FigureBase) -> list[Axes]:
         """Draw on an empty Figure or SubFigure; the panels, to be lettered before their titles."""
         axes = part.subplots(subplot_kw={"projection": self.projection})
         self.draw(axes)
@@ -141,10 +143,18 @@ class FrameFigure(Figure):
 
     kind = "frames"
     columns = ("variant", "alpha_vs_axial")
+    drawn: ClassVar[str] = ""
+    """What is drawn: the caption goes on with the variant and the source, and ``more``."""
+    more: ClassVar[str] = ""
 
     def __init__(self, data: ScannedFrames, frame: int | None = None) -> None:
         super().__init__(data)
         self.frame = frame
+
+    @property
+    def caption(self) -> str:
+        """With the variant and the source; without ``drawn`` as in other figures."""
+        return f"{self.drawn}, {self.data.name}{self.more}." if self.drawn else super().caption
 
     def chosen(self, frames: list[ScannedFrame]) -> list[ScannedFrame]:
         """All of the frames, or the one that is asked for."""
@@ -155,29 +165,59 @@ class FrameFigure(Figure):
         return found
 
 
-class OnePanel(FrameFigure):
-    """A figure of frames in one panel, which needs ``paint``; on a page its legend is above it."""
+class DirectionalFigure(FrameFigure):
+    """
+    Void lengths and contact normals of frames over all directions; needs ``draw_column``.
 
-    @property
-    def note(self) -> str:
-        """What stands above the legend."""
-        return ""
+    Parameters
+    ----------
+    data : ScannedFrames
+        Of :func:`scanfab.scan_frames`.
+    frame : int, optional
+        The number of a frame, to draw that one alone; on one Axes the last by default.
+    of : str, optional
+        ``"voids"`` or ``"contacts"``, to draw these alone; on one Axes voids by default.
+    """
 
-    def paint(self, ax: Axes) -> None:
-        """Draw on one Axes, without the legend."""
+    lettered = True
+
+    def __init__(
+        self, data: ScannedFrames, frame: int | None = None, of: str | None = None
+    ) -> None:
+        super().__init__(data, frame)
+        self.of = one_of(of, tuple(DIRECTIONAL))
+
+    @cached_property
+    def frames(self) -> list[ScannedFrame]:
+        """The frames that are drawn."""
+        return self.chosen(self.data.frames)
+
+    def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> Any:
+        """Draw voids or contacts of frames on panels with one scale; gives back that scale."""
         raise NotImplementedError
 
-    def draw(self, ax: Axes) -> None:
-        """With the legend in the panel."""
-        self.paint(ax)
-        ax.legend(title=self.note or None)
+    def add_legend(self, place: Any, scales: dict[str, Any]) -> None:
+        """Add what all panels of the Axes or the Figure share; ``scales`` are those of columns."""
 
-    def panels(self, part: Page | SubFigure) -> list[Axes]:
-        """One panel, with the legend above it."""
-        axes = part.subplots()
-        self.paint(axes)
-        part.legend(loc="outside upper left", title=self.note or None)
-        return [axes]
+    def draw(self, ax: Axes) -> None:
+        """Of the last frame, unless another one is asked for."""
+        self.add_legend(ax, self._draw_grid(np.array([[ax]]), "center"))
+
+    def panels(self, part: FigureBase) -> list[Axes]:
+        """A row for each frame, a column for each of both."""
+        polar = {"projection": self.projection}
+        shape = len(self.frames), len(self.of)
+        panels = part.subplots(*shape, squeeze=False, subplot_kw=polar)
+        self.add_legend(part, self._draw_grid(panels, "left"))
+        return list(panels.ravel())
+
+    def _draw_grid(self, panels: Any, loc: Any) -> dict[str, Any]:
+        frames, scales = self.frames[-len(panels) :], {}
+        for kind, column in zip(self.of, panels.T, strict=False):
+            scales[kind] = self.draw_column(list(column), frames, kind)
+            for axes, one in zip(column, frames, strict=True):
+                axes.set_title(f"{DIRECTIONAL[kind]}\n{one.title}", loc=loc)
+        return scales
 
 
 def one_of(which: str | None, known: tuple[str, ...]) -> tuple[str, ...]:

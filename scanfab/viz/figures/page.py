@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.files import whole_file
 from scanfab.table.plots import figures_of
 from scanfab.table.table import Table
 from scanfab.viz.figures.figure import Figure
-from scanfab.viz.figures.style import DPI, check_plot_file, letter, new_figure, save_figure
+from scanfab.viz.figures.style import DPI, check_plot_file, figure_bytes, letter, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Page
@@ -75,27 +76,22 @@ def make_figures(data: Any, kind: str, text: str | None = None, **offered: Any) 
     """
     if kind == "table" and not isinstance(data, Table):
         data = Table(data)
+    chosen: list[Any] = [(one, {}) for one in figures_of(kind).values()]
     if text is not None:
-        figure, options = find_figure(text, kind)
-        lacking = _lacking(figure, data)
-        if lacking:
+        chosen = [find_figure(text, kind)]
+    found = []
+    for figure, options in chosen:
+        names = data.names if isinstance(data, Table) else figure.columns
+        lacking = [name for name in figure.columns if name not in names]
+        if lacking and text is not None:
             raise SettingsError(
                 f"figure: {text} needs {', '.join(lacking)}, which the table does not have"
             )
-        return [_made(figure, data, {**offered, **options})]
-    found = [
-        one for one in figures_of(kind).values() if not _lacking(one, data) and one.suits(data)
-    ]
-    return [_made(one, data, offered) for one in found]
-
-
-def _lacking(figure: type[Figure], data: Any) -> list[str]:
-    return [name for name in figure.columns if isinstance(data, Table) and name not in data.names]
-
-
-def _made(figure: type[Figure], data: Any, offered: dict[str, Any]) -> Figure:
-    taken = signature(figure).parameters
-    return figure(data, **{name: one for name, one in offered.items() if name in taken})
+        if text is not None or (not lacking and figure.suits(data)):
+            taken = signature(figure).parameters
+            more = {**offered, **options}
+            found.append(figure(data, **{name: more[name] for name in more if name in taken}))
+    return found
 
 
 def save_figures(path: Path, figures: Sequence[Figure], dpi: int = DPI) -> None:
@@ -117,8 +113,11 @@ def save_figures(path: Path, figures: Sequence[Figure], dpi: int = DPI) -> None:
         If the file's name ends otherwise.
     """
     check_plot_file(path)
+    # in memory first: where the disk is full, the writer of PDF fails with an error of another kind
     with drawn_page(figures) as page:
-        save_figure(page, path, dpi)
+        drawn = figure_bytes(page, path.suffix.lower().lstrip("."), dpi)
+    with whole_file(path) as part:
+        part.write_bytes(drawn)
 
 
 @contextmanager

@@ -2,31 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
-from scanfab.base.space import Space
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
-from scanfab.viz.figures.figure import FrameFigure, one_of
-from scanfab.viz.figures.hemisphere import Hemisphere, disk, half_circle, hemisphere_of
-from scanfab.viz.figures.lobe_noise import noise_notes
-from scanfab.viz.figures.style import COLOURS, DIRECTIONAL, WIDTH
+from scanfab.fabric.distribution import (
+    HIGHEST_DEGREE,
+    direction_points,
+    harmonics_of,
+    mean_length_function,
+)
+from scanfab.table.row import number_of, total_error
+from scanfab.viz.figures.figure import DirectionalFigure
+from scanfab.viz.figures.style import COLOURS, WIDTH
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Page
-    from matplotlib.figure import SubFigure
+    from scanfab.viz.scanned_frames import ScannedFrame
 
-    from scanfab.viz.scanned_frames import ScannedFrames
+# rings and rays of the disk that a hemisphere is projected on
+DISK = (41, 121)
+# of the kernel exp(k (n·m)²) that smooths contact normals: half its height at 19 degrees
+CONCENTRATION = 6.5
+# where nothing but noise is, the largest lobe of a picture is 2 to 3 times its standard error
+CHANCE = 3.0
 
 
-DEVIATION = "deviation from the mean in %"
-
-
-class Projection(FrameFigure):
+class Projection(DirectionalFigure):
     """
     Mean void length and contact normals over all directions, on an equal-area disk.
 
@@ -48,89 +55,57 @@ class Projection(FrameFigure):
     """
 
     order = 5
-    lettered = True
-
-    def __init__(
-        self, data: ScannedFrames, frame: int | None = None, of: str | None = None
-    ) -> None:
-        super().__init__(data, frame)
-        self.of = one_of(of, tuple(DIRECTIONAL))
+    drawn = "Mean void length and contact normals over all directions"
 
     @cached_property
-    def hemispheres(self) -> list[Hemisphere]:
+    def deviations(self) -> list[dict[str, FloatArray | None]]:
         """What is drawn of each frame."""
-        return [hemisphere_of(one) for one in self.chosen(self.data.frames)]
-
-    @property
-    def plane(self) -> Space | None:
-        """That of the discs, if they are some."""
-        space = self.chosen(self.data.frames)[0].space
-        return space if space.is_plane else None
+        return [deviations_of(one) for one in self.frames]
 
     @property
     def size(self) -> tuple[float, float]:
         """A row for each frame."""
-        return WIDTH, 2.5 * len(self.hemispheres) + 0.2
+        return WIDTH, 2.5 * len(self.frames) + 0.2
 
     @property
     def caption(self) -> str:
         """With how large the lobes are by chance alone."""
-        drawn = f"Mean void length and contact normals over all directions, {self.data.name}."
-        noise = noise_notes(self.chosen(self.data.frames), self.hemispheres)
-        return " ".join(filter(None, [drawn, noise, self.data.note]))
+        noise = map(noise_note, self.frames, self.deviations)
+        return " ".join(filter(None, [super().caption, *noise, self.data.note]))
 
-    def draw(self, ax: Axes) -> None:
-        """Of the last frame, unless another one is asked for."""
-        one, kind = self.hemispheres[-1], self.of[0]
-        value = getattr(one, kind)
-        if self.plane is not None:
-            _curve(ax, value, self.plane, _largest([value]))
-            ax.set_title(f"{DIRECTIONAL[kind]}\n{one.title}")
-            return
-        drawn = _disk(ax, value, _largest([value]))
+    def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> None:
+        """Disks with one scale of colours, which stands beside them; of discs curves."""
+        values = [one[kind] for one in self.deviations[-len(frames) :]]
+        known = [float(np.abs(value).max()) for value in values if value is not None]
+        # the scale ends at the largest deviation, and at least at a tenth of a per cent
+        largest = max(max(known, default=1.0), 0.1)
+        drawn = None
+        for axes, frame, value in zip(column, frames, values, strict=True):
+            if frame.space.is_plane:
+                _draw_curve(axes, value, frame.space, largest)
+            else:
+                drawn = _draw_disk(axes, value, largest) or drawn
         if drawn is not None:
-            ax.figure.colorbar(drawn, ax=ax, shrink=0.8).set_label(DEVIATION)
-        ax.set_title(f"{DIRECTIONAL[kind]}\n{one.title}")
-
-    def panels(self, part: Page | SubFigure) -> list[Axes]:
-        """A row for each frame, a column with its scale for each of both."""
-        frames = self.hemispheres
-        panels = part.subplots(len(frames), len(self.of), squeeze=False)
-        for column, kind in zip(panels.T, self.of, strict=True):
-            values = [getattr(one, kind) for one in frames]
-            drawn = None
-            for axes, one, value in zip(column, frames, values, strict=True):
-                if self.plane is not None:
-                    _curve(axes, value, self.plane, _largest(values))
-                else:
-                    drawn = _disk(axes, value, _largest(values)) or drawn
-                axes.set_title(f"{DIRECTIONAL[kind]}\n{one.title}", loc="left")
-            if drawn is not None:
-                bar = part.colorbar(drawn, ax=column, shrink=0.8, pad=0.03, aspect=30)
-                bar.set_label(DEVIATION)
-        found: list[Axes] = panels.ravel().tolist()
-        return found
+            page = column[0].figure
+            bar = page.colorbar(drawn, ax=column, shrink=0.8, pad=0.03, aspect=30)
+            bar.set_label("deviation from the mean in %")
 
 
-def _largest(values: Sequence[FloatArray | None]) -> float:
-    """The end of the scale: the largest deviation, and at least a tenth of a per cent."""
-    known = [float(np.abs(value).max()) for value in values if value is not None]
-    return max(max(known, default=1.0), 0.1)
-
-
-def _curve(axes: Axes, value: FloatArray | None, plane: Space, largest: float) -> None:
+def _draw_curve(axes: Axes, value: FloatArray | None, plane: Space, largest: float) -> None:
     """Over the directions of a plane."""
     first, second = ("xyz"[k] for k in sorted(plane.along))
-    axes.set(xlim=(0, 180), ylim=(-1.1 * largest, 1.1 * largest), ylabel=DEVIATION)
+    axes.set(
+        xlim=(0, 180), ylim=(-1.1 * largest, 1.1 * largest), ylabel="deviation from the mean in %"
+    )
     axes.set(xlabel=f"direction, degrees from {first} to {second}", xticks=range(0, 181, 45))
     axes.axhline(0, color="0.6", lw=0.6, zorder=0)
     if value is None:
         axes.text(90, 0, "no contacts", ha="center")
     else:
-        axes.plot(half_circle(plane)[0], value, color=COLOURS["blue"])
+        axes.plot(places_of(plane)[0], value, color=COLOURS["blue"])
 
 
-def _disk(axes: Axes, value: FloatArray | None, largest: float) -> Any:
+def _draw_disk(axes: Axes, value: FloatArray | None, largest: float) -> Any:
     axes.set(aspect="equal", xlim=(-1.25, 1.25), ylim=(-1.25, 1.25))
     axes.set_axis_off()
     around = np.linspace(0, 2 * np.pi, 181)
@@ -145,10 +120,9 @@ def _disk(axes: Axes, value: FloatArray | None, largest: float) -> Any:
     if value is None:
         axes.text(0, -0.3, "no contacts", ha="center")
         return None
-    places, _ = disk()
+    places, _ = places_of(SPACE)
     return axes.pcolormesh(
-        places[..., 0],
-        places[..., 1],
+        *np.moveaxis(places, -1, 0),
         value,
         cmap="PuOr_r",
         vmin=-largest,
@@ -157,3 +131,105 @@ def _disk(axes: Axes, value: FloatArray | None, largest: float) -> Any:
         rasterized=True,
         zorder=0,
     )
+
+
+def places_of(space: Space) -> tuple[FloatArray, FloatArray]:
+    """
+    Where directions are drawn: the upper hemisphere by the equal-area (Lambert) projection.
+
+    Returns
+    -------
+    ndarray, shape (41, 121, 2)
+        Places on the disk of radius 1: z in the middle, x to the right, y up. Of discs, shape
+        (181,), angles from the first coordinate of their plane to the second, degrees.
+    ndarray, shape (41, 121, 3) or (181, 3)
+        The unit vectors that belong there; all others are their opposites.
+    """
+    if space.is_plane:
+        angle = np.arange(181.0)
+        first, second = (np.eye(3)[k] for k in sorted(space.along))
+        turn = np.radians(angle)[:, None]
+        return angle, np.cos(turn) * first + np.sin(turn) * second
+    rho, theta = np.meshgrid(
+        np.linspace(0, 1, DISK[0]), np.linspace(0, 2 * np.pi, DISK[1]), indexing="ij"
+    )
+    polar = 2 * np.arcsin(rho / np.sqrt(2))
+    along = np.stack([np.cos(theta), np.sin(theta)], axis=-1)
+    directions = np.concatenate(
+        [np.sin(polar)[..., None] * along, np.cos(polar)[..., None]], axis=-1
+    )
+    return rho[..., None] * along, directions
+
+
+def deviations_of(frame: ScannedFrame) -> dict[str, FloatArray | None]:
+    """Deviations from the mean over all directions at :func:`places_of` a frame, per cent."""
+    measured, space, normals = frame.measurement, frame.space, frame.normals
+    _, directions = places_of(space)
+    mean_length = mean_length_function(measured.sums.axes, *measured.kept(frame.variant), space)
+    assert mean_length is not None
+    points, weights = direction_points(space)
+    mean = float(weights @ mean_length(points))
+    contacts = None
+    if len(normals):
+        contacts = 100 * (smoothed_density(normals, directions, space) - 1)
+    return {"voids": 100 * (mean_length(directions) / mean - 1), "contacts": contacts}
+
+
+def smoothed_density(
+    normals: FloatArray, directions: FloatArray, space: Space = SPACE
+) -> FloatArray:
+    """Density of the normals (n or -n) about each direction, over that of isotropic ones."""
+    points, weights = direction_points(space)
+    isotropic = float(weights @ np.exp(CONCENTRATION * points[:, max(space.along)] ** 2))
+    flat = directions.reshape(-1, 3)
+    density: FloatArray = np.array(
+        [np.exp(CONCENTRATION * (normals @ one) ** 2).mean() for one in flat]
+    )
+    return density.reshape(directions.shape[:-1]) / isotropic
+
+
+def noise_note(frame: ScannedFrame, deviations: Mapping[str, FloatArray | None]) -> str:
+    """
+    What chance alone makes of the lobes of a frame, in words.
+
+    The error of a lobe is of scan and sample together, as if it were the same in all directions.
+    """
+    known = []
+    for what, error, deviation in (
+        ("void lengths", void_noise(frame.row, frame.space), deviations["voids"]),
+        ("contact normals", contact_noise(frame.row, frame.space), deviations["contacts"]),
+    ):
+        if error is not None and deviation is not None:
+            largest = float(np.abs(deviation).max())
+            text = f"lobes of {what} reach {largest:.2g} %, one standard error is {error:.2g} %"
+            known.append(f"{text}, so they are noise" if largest < CHANCE * error else text)
+    return f"Frame {frame.number}: {'; '.join(known)}." if known else ""
+
+
+def void_noise(row: Mapping[str, Any], space: Space = SPACE) -> float | None:
+    """
+    Standard error of a lobe of the mean void length, per cent of the mean.
+
+    A lobe is a sum of harmonics, each with √5 times the error of the axial anisotropy α, in a plane
+    √2 times: of the sample those of the second degree, five or two, as it hardly differs in finer
+    ones; of the scan all that are fitted, as lines of different directions are independent.
+    """
+    scan, sample = (number_of(row, f"alpha_vs_axial_{part}") for part in ("se", "sample_se"))
+    if sample is None:
+        return None
+    second = harmonics_of(2, space)
+    fitted = sum(harmonics_of(degree, space) for degree in range(2, HIGHEST_DEGREE + 1, 2))
+    parts = math.sqrt(fitted) * (scan or 0.0), math.sqrt(second) * sample
+    return 100.0 * math.sqrt(second) * math.hypot(*parts)
+
+
+def contact_noise(row: Mapping[str, Any], space: Space = SPACE) -> float | None:
+    """Standard error of the smoothed density of contact normals, per cent of the mean."""
+    alone, error = number_of(row, "alpha_c_axial_se"), total_error(row, "alpha_c_axial")
+    if not alone or error is None:
+        return None
+    points, weights = direction_points(space)
+    kernel = np.exp(CONCENTRATION * points[:, max(space.along)] ** 2)
+    spread = float(weights @ kernel**2) / float(weights @ kernel) ** 2 - 1.0
+    # neighbouring contacts are not independent: by how much is known of the anisotropy
+    return 100.0 * math.sqrt(spread / row["contacts"]) * error / alone

@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
-from functools import cached_property
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import FigureBase
+from matplotlib.lines import Line2D
 
 from scanfab.base.errors import SettingsError
-from scanfab.base.space import Space
-from scanfab.viz.figures.figure import FrameFigure, one_of
-from scanfab.viz.figures.rings import Ring, Rings, rings_of
-from scanfab.viz.figures.style import COLOURS, DIRECTIONAL, WIDTH, rounded_down
+from scanfab.base.space import SPACE, Space
+from scanfab.base.typing import FloatArray
+from scanfab.fabric.contact import contact_fabric
+from scanfab.fabric.invariants import fabric_deviator
+from scanfab.viz.figures.figure import DirectionalFigure
+from scanfab.viz.figures.style import COLOURS, WIDTH, rounded_down
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Page
-    from matplotlib.figure import SubFigure
+    from scanfab.viz.scanned_frames import ScannedFrame, ScannedFrames
 
-    from scanfab.viz.scanned_frames import ScannedFrames
-
-
+REPLICATES = 16
+# segments for each direction: mean lengths to about half a per cent
+SEGMENTS = 20_000
+# between azimuths of void lengths, and of the sectors that contacts are counted in, degrees
+THETA_STEP = 15.0
+CONTACT_STEP = 30.0
 POLAR_ANGLES = (90.0, 60.0, 30.0)
 EQUATOR = (90.0,)
 LOOKS: tuple[dict[str, Any], ...] = (
@@ -39,7 +44,29 @@ AROUND = np.linspace(0, 360, 181)
 BARS = {"voids": "of the scan", "contacts": "of a count of contacts"}
 
 
-class Rose(FrameFigure):
+@dataclass(frozen=True, eq=False)
+class Ring:
+    """Values around one polar angle, relative to the mean over all directions."""
+
+    phi: float
+    """Polar angle, degrees."""
+    theta: FloatArray
+    """Azimuths, degrees."""
+    value: FloatArray
+    error: FloatArray
+    """Standard error."""
+    curve: Callable[[FloatArray], FloatArray] | None = None
+    """A smooth curve beside them: value at azimuths in degrees."""
+
+    @property
+    def reach(self) -> float:
+        """How far the values, with their errors, and the curve are from 1; at least 0.02."""
+        far = np.abs(self.value - 1.0) + np.nan_to_num(self.error)
+        curve = np.ones(1) if self.curve is None else self.curve(AROUND)
+        return max(0.02, float(np.nanmax(far, initial=0.0)), float(np.abs(curve - 1.0).max()))
+
+
+class Rose(DirectionalFigure):
     """
     Mean void length and contact normals over the azimuth, at a few polar angles from z.
 
@@ -75,9 +102,9 @@ class Rose(FrameFigure):
     """
 
     order = 4
-    lettered = True
     slow = True
     projection = "polar"
+    drawn = "Mean void length and contact normals over the azimuth, relative to isotropy"
 
     def __init__(
         self,
@@ -86,37 +113,29 @@ class Rose(FrameFigure):
         frame: int | None = None,
         of: str | None = None,
     ) -> None:
-        super().__init__(data, frame)
-        self.angles = _checked_angles(angles, "angles", f"{POLAR_ANGLES}, found {angles!r}")
-        self.of = one_of(of, tuple(DIRECTIONAL))
+        super().__init__(data, frame, of)
+        self.angles = _checked_angles(angles, angles)
 
     @classmethod
     def parse(cls, argument: str) -> dict[str, Any]:
         """Polar angles such as ``30,60,90``."""
-        words = argument.split(",")
-        are_numbers = all(re.fullmatch(r"\d+(\.\d+)?", word) for word in words)
-        angles = [float(word) for word in words] if are_numbers else []
-        example = f"rose:30,60,90, found {f'rose:{argument}'!r}"
-        return {"angles": _checked_angles(angles, "figure", example)}
-
-    @cached_property
-    def rings(self) -> list[Rings]:
-        """What is drawn of each frame."""
-        found = []
-        for frame in self.chosen(self.data.frames):
-            if frame.space.is_plane and self.angles not in (POLAR_ANGLES, EQUATOR):
-                angles = ",".join(f"{one:g}" for one in self.angles)
-                raise SettingsError(
-                    f"figure: discs in {frame.space} have no polar angles, found {angles}: choose "
-                    f"`figure=rose`"
-                )
-            found.append(rings_of(frame, EQUATOR if frame.space.is_plane else self.angles))
-        return found
+        try:
+            angles = [float(word) for word in argument.split(",")]
+        except ValueError:
+            angles = []
+        return {"angles": _checked_angles(angles, f"rose:{argument}")}
 
     @property
     def space(self) -> Space:
-        """The plane of the frames, if their grains are discs."""
-        return self.rings[0].space
+        """The plane of the frames, if their grains are discs; it has no polar angles."""
+        space = self.frames[0].space
+        if space.is_plane and self.angles not in (POLAR_ANGLES, EQUATOR):
+            angles = ",".join(f"{one:g}" for one in self.angles)
+            raise SettingsError(
+                f"figure: discs in {space} have no polar angles, found {angles}: choose "
+                f"`figure=rose`"
+            )
+        return space
 
     @property
     def looks(self) -> dict[float, dict[str, Any]]:
@@ -130,91 +149,51 @@ class Rose(FrameFigure):
     def size(self) -> tuple[float, float]:
         """A row for each frame, and the legend."""
         entries = -(-len(self.looks) // MOST_COLUMNS)
-        return WIDTH, 3.0 * len(self.rings) + 0.7 + 0.2 * entries
+        return WIDTH, 3.0 * len(self.frames) + 0.7 + 0.2 * entries
 
-    @property
-    def caption(self) -> str:
-        """With the variant and the source."""
-        return (
-            f"Mean void length and contact normals over the azimuth, relative to isotropy, "
-            f"{self.data.name}."
-        )
-
-    def draw(self, ax: Axes) -> None:
-        """Of the last frame, unless another one is asked for."""
-        reach = self._draw_column([ax], self.rings[-1:], self.of[0], "center")
-        handles, labels = self._entries()
-        below: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.08)}
-        ax.legend(handles, labels, title=self._note({self.of[0]: reach}), **below)
-
-    def panels(self, part: Page | SubFigure) -> list[Axes]:
-        """A row for each frame, a column for each of both, and the legend below."""
-        shape, polar = (len(self.rings), len(self.of)), {"projection": "polar"}
-        panels = part.subplots(*shape, squeeze=False, subplot_kw=polar)
-        reaches = {
-            kind: self._draw_column(column, self.rings, kind, "left")
-            for kind, column in zip(self.of, panels.T, strict=True)
-        }
-        handles, labels = self._entries()
-        columns, note = min(len(labels), MOST_COLUMNS), self._note(reaches)
-        part.legend(handles, labels, ncols=columns, title=note, loc="outside lower center")
-        found: list[Axes] = panels.ravel().tolist()
-        return found
-
-    def _draw_column(
-        self, column: Sequence[Axes], frames: Sequence[Rings], kind: str, loc: Any
-    ) -> float:
-        """Panels with one scale; how far it reaches from 1."""
-        reach = max((_reach(ring) for one in frames for ring in getattr(one, kind)), default=0.02)
-        for axes, one in zip(column, frames, strict=True):
-            _draw_rings(axes, getattr(one, kind), reach, self.looks)
-            axes.set_title(f"{DIRECTIONAL[kind]}\n{one.title}", loc=loc)
+    def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> float:
+        """Rings about 1 at the polar angles; how far the scale reaches from 1."""
+        looks = self.looks
+        rings_of = void_rings if kind == "voids" else contact_rings
+        every = [rings_of(one, list(looks)) for one in frames]
+        reach = max((ring.reach for rings in every for ring in rings), default=0.02)
+        for axes, rings in zip(column, every, strict=True):
+            _draw_rings(axes, rings, reach, looks)
         return reach
 
-    def _entries(self) -> tuple[list[Any], list[str]]:
-        """Handles and labels of the legend."""
-        from matplotlib.lines import Line2D
-
+    def add_legend(self, place: Any, scales: dict[str, Any]) -> None:
+        """The legend below, with what the angle of the panels is, and what circles and bars are."""
         handles = [Line2D([], [], **look) for look in self.looks.values()]
-        if self.space.is_plane:
-            return handles, [f"in {self.space}"]
-        return handles, [rf"polar angle $\varphi={phi:g}^\circ$" for phi in self.looks]
-
-    def _note(self, reaches: Mapping[str, float]) -> str:
-        """What the angle of the panels is, and what circles and bars are."""
+        labels = [rf"polar angle $\varphi={phi:g}^\circ$" for phi in self.looks]
         over = "over the azimuth $\\theta$ from x"
         if self.space.is_plane:
             first, second = ("xyz"[k] for k in sorted(self.space.along))
             over = f"over the angle from {first} towards {second}"
-        sides = dict(zip(reaches, (" (left)", " (right)"), strict=False))
-        if len(reaches) == 1:
-            sides = dict.fromkeys(reaches, "")
-        circles = []
-        for kind, reach in reaches.items():
+            labels = [f"in {self.space}"]
+        circles, bars = [], []
+        sides = (" (left)", " (right)") if len(scales) > 1 else ("",)
+        for side, (kind, reach) in zip(sides, scales.items(), strict=True):
             middle, values = _scale(reach)
             named = ", ".join(f"{one:g}" for one in values)
-            circles.append(f"{named} about {middle:.3g}{sides[kind]}")
-        errors = ", ".join(f"{BARS[kind]}{sides[kind]}" for kind in reaches)
-        return (
+            circles.append(f"{named} about {middle:.3g}{side}")
+            bars.append(f"{BARS[kind]}{side}")
+        note = (
             f"{over}, relative to isotropy\ncircles: {', '.join(circles)}\n"
-            f"bars: one standard error, {errors}"
+            f"bars: one standard error, {', '.join(bars)}"
         )
+        where: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.08)}
+        if isinstance(place, FigureBase):
+            where = {"loc": "outside lower center", "ncols": min(len(labels), MOST_COLUMNS)}
+        place.legend(handles, labels, title=note, **where)
 
 
-def _checked_angles(angles: Sequence[float], where: str, example: str) -> tuple[float, ...]:
+def _checked_angles(angles: Sequence[float], found: object) -> tuple[float, ...]:
     if not 0 < len(angles) <= len(LOOKS) or not all(0 < angle <= 90 for angle in angles):
         raise SettingsError(
-            f"{where}: expected one to four polar angles above 0 and up to 90 degrees, such as "
-            f"{example}"
+            f"figure: expected one to four polar angles above 0 and up to 90 degrees, such as "
+            f"rose:30,60,90, found {found!r}"
         )
     return tuple(angles)
-
-
-def _reach(ring: Ring) -> float:
-    """How far the values, with their errors, and the curve are from 1; at least 0.02."""
-    far = np.abs(ring.value - 1.0) + np.nan_to_num(ring.error)
-    curve = np.ones(1) if ring.curve is None else ring.curve(AROUND)
-    return max(0.02, float(np.nanmax(far, initial=0.0)), float(np.abs(curve - 1.0).max()))
 
 
 def _draw_rings(
@@ -245,3 +224,92 @@ def _scale(reach: float) -> tuple[float, list[float]]:
     """The value in the middle of a rose, and those of its circles."""
     middle, step = max(0.0, 1.0 - 2.0 * reach), rounded_down(reach)
     return middle, [one for one in (1.0 - step, 1.0, 1.0 + step) if one > middle]
+
+
+def void_rings(frame: ScannedFrame, angles: Sequence[float]) -> list[Ring]:
+    """Mean void lengths of a frame, at some polar angles in degrees."""
+    # compiled kernels, which those who draw something else do without
+    from scanfab.scan.directions import DirectionRule
+    from scanfab.scan.gaps import scan_gaps
+
+    measured, variant, plan = frame.measurement, frame.variant, frame.measurement.plan
+    # at the equator θ and θ + 180° are one line
+    thetas = [np.arange(0.0, 180.0 if phi == 90 else 360.0, THETA_STEP) for phi in angles]
+    each = zip(thetas, angles, strict=True)
+    axes = np.concatenate([_vectors(theta, phi, frame.space) for theta, phi in each])
+    # as many lines as give the wanted number of segments
+    segments = measured.sums.kept(variant)[1].mean()
+    spacing = plan.spacing * plan.space.apart(segments * REPLICATES / SEGMENTS)
+    weights = np.full(len(axes), 1 / len(axes))
+    rose = scan_gaps(
+        measured.solids,
+        DirectionRule("rose", axes, weights, None, turned=False, space=plan.space),
+        spacing=float(spacing),
+        cutoffs=[plan.cutoff],
+        blocks=measured.blocks,
+        variants=variant,
+        replicates=range(REPLICATES),
+        seed=plan.seed,
+        workers=plan.workers,
+        most_steps=plan.max_chords,
+    )
+    sums_of, numbers = rose.kept(variant, 0, plan.moment)
+    every, counts = measured.kept(variant)
+    mean = every.sum() / counts.sum()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        value = sums_of.sum(axis=0) / numbers.sum(axis=0) / mean
+        scatter = np.nanstd(sums_of / numbers, axis=0, ddof=1) / mean / np.sqrt(REPLICATES)
+    found, end = [], 0
+    for phi, theta in zip(angles, thetas, strict=True):
+        start, end = end, end + len(theta)
+        turns = 2 if phi == 90 else 1
+        around = np.concatenate([theta + 180.0 * turn for turn in range(turns)])
+        own, error = np.tile(value[start:end], turns), np.tile(scatter[start:end], turns)
+        found.append(Ring(phi, around, own, error))
+    return found
+
+
+def _vectors(theta: FloatArray, phi: float, space: Space) -> FloatArray:
+    """Unit vectors; in a plane angles are counted from the first of its coordinates."""
+    azimuth, polar = np.radians(theta), np.radians(phi)
+    flat, basis = np.sin(polar), np.eye(3)[sorted(space.along)]
+    parts = [flat * np.cos(azimuth), flat * np.sin(azimuth), np.full(len(theta), np.cos(polar))]
+    return np.column_stack(parts[: len(basis)]) @ basis
+
+
+def contact_rings(frame: ScannedFrame, angles: Sequence[float]) -> list[Ring]:
+    """Contact normals of a frame at some polar angles; none without contacts."""
+    normals = frame.normals
+    return [contact_ring(normals, phi, frame.space) for phi in angles if len(normals)]
+
+
+def contact_ring(normals: FloatArray, phi: float, space: Space = SPACE) -> Ring:
+    """
+    Contact normals near a polar angle by azimuth, over what isotropy would give.
+
+    The curve beside them is the second-order density of the contact fabric, after Kanatani (1984).
+    """
+    both = np.concatenate([normals, -normals])
+    # the share of all directions that is counted
+    share = 1.0
+    first, second = sorted(space.along)[:2]
+    if not space.is_plane:
+        polar = np.degrees(np.arccos(np.clip(both[:, 2], -1, 1)))
+        low, high = max(phi - 15.0, 0.0), phi + 15.0
+        both = both[(polar >= low) & (polar < high)]
+        share = 0.5 * (np.cos(np.radians(low)) - np.cos(np.radians(high)))
+    azimuth = np.degrees(np.arctan2(both[:, second], both[:, first])) % 360.0
+    edges = np.arange(0.0, 361.0, CONTACT_STEP)
+    count, _ = np.histogram(azimuth, edges)
+    expected = 2 * len(normals) * share * CONTACT_STEP / 360.0
+    tensor = contact_fabric(normals, space)
+    assert tensor is not None
+    deviator = fabric_deviator(tensor.matrix, space)
+
+    def density(theta: FloatArray) -> FloatArray:
+        directions = _vectors(theta, phi, space)
+        values: FloatArray = 1 + np.einsum("ni,ij,nj->n", directions, deviator, directions)
+        return values
+
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    return Ring(phi, middle, count / expected, np.sqrt(count) / expected, density)

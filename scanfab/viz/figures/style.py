@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scanfab.base.errors import SettingsError
-from scanfab.base.files import check_folder, whole_file
+from scanfab.base.files import check_folder
 from scanfab.base.typing import FloatArray
 
 if TYPE_CHECKING:
@@ -56,11 +56,18 @@ FRAME_LOOKS: tuple[dict[str, Any], ...] = (
 # of panels of directional distributions
 DIRECTIONAL = {"voids": "mean void length", "contacts": "contact normals"}
 
-# the same words in every figure; the columns are alpha_vs_axial, alpha_c_axial, alpha_vs, alpha_c
+# the same words in every figure, by the columns of the table
 VOID, CONTACT = r"$\alpha_{vs}$", r"$\alpha_{c}$"
-VOID_AXIAL, CONTACT_AXIAL = f"{VOID}, axial", f"{CONTACT}, axial"
-VOID_INTENSITY, CONTACT_INTENSITY = f"{VOID}, intensity", f"{CONTACT}, intensity"
-VOID_UNIT, CONTACT_UNIT = r"void  $10^3\,$", r"contacts  $10^2\,$"
+NAMES = {
+    "alpha_vs_axial": f"{VOID}, axial",
+    "alpha_c_axial": f"{CONTACT}, axial",
+    "alpha_vs": f"{VOID}, intensity",
+    "alpha_c": f"{CONTACT}, intensity",
+}
+LABELS = {
+    column: (r"void  $10^3\,$" if VOID in name else r"contacts  $10^2\,$") + name
+    for column, name in NAMES.items()
+}
 
 # figures of one panel are as wide as a column of a journal, others as one and a half, so that
 # their words are still read on the screen of a phone
@@ -112,18 +119,11 @@ def new_figure(width: float, height: float) -> Iterator[Figure]:
 
 def figure_bytes(figure: Figure, kind: str, dpi: int = DPI) -> bytes:
     """A figure as ``png``, ``svg`` or ``pdf``; no file is made."""
+    # the same input gives the same bytes: no file has a date
     dates = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
     drawn = BytesIO()
     figure.savefig(drawn, format=kind, dpi=dpi, metadata=dates[kind])
     return drawn.getvalue()
-
-
-def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> None:
-    """Write PNG, SVG or PDF, by the suffix; the file is complete or untouched."""
-    # in memory first: where the disk is full, the writer of PDF fails with an error of another kind
-    drawn = figure_bytes(figure, path.suffix.lower().lstrip("."), dpi)
-    with whole_file(path) as part:
-        part.write_bytes(drawn)
 
 
 def rounded_down(value: float) -> float:

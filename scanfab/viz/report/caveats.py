@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 from scanfab.base.errors import SettingsError
@@ -30,7 +31,7 @@ def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, A
     asked : iterable of mapping
         The settings of their manifests.
     """
-    found = [_bias(str(one["directions"])) for one in asked if one.get("directions")]
+    found = [*_biases(asked)]
     filled = [row for row in rows if row[VOID] is not None]
     if len(filled) < len(rows):
         found.append(
@@ -43,20 +44,21 @@ def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, A
         found.append(
             "There are fewer than three frames: no line is fitted to void against contact fabric."
         )
-    return [text for text in dict.fromkeys(found) if text]
+    return list(dict.fromkeys(found))
 
 
-def _bias(name: str) -> str:
-    try:
-        bias = direction_rule(name).bias
-    except SettingsError:
-        return ""
-    if bias < SOME_BIAS:
-        return ""
-    return (
-        f"The scan directions ({name}) are not spread evenly: a sample without any anisotropy "
-        f"would get α = {bias:.2g}. Changes of α between frames mean more than its value."
-    )
+def _biases(asked: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """Rules of directions that would see anisotropy where there is none."""
+    for one in asked:
+        with suppress(SettingsError):
+            name = str(one.get("directions") or "")
+            bias = direction_rule(name).bias if name else 0.0
+            if bias >= SOME_BIAS:
+                yield (
+                    f"The scan directions ({name}) are not spread evenly: a sample without any "
+                    f"anisotropy would get α = {bias:.2g}. Changes of α between frames mean more "
+                    f"than its value."
+                )
 
 
 def _unknown_errors(groups: Groups) -> Iterator[str]:

@@ -2,35 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import base64
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
-from scanfab.base.files import check_folder, whole_file
+from scanfab.base.files import check_folder
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
-from scanfab.viz.figures.style import COLOURS
+from scanfab.viz.figures.figure import Figure
+from scanfab.viz.figures.page import drawn_page
+from scanfab.viz.figures.style import COLOURS, figure_bytes
 from scanfab.viz.scene import SHADES, Scene, towards_viewer
 
 # spheres that a browser turns without effort
 MOST_GRAINS = 4_000
 # of balls in the RV, outside, and of rattlers, and paler where a plane cuts them
-KIND_COLOURS = (
-    (COLOURS["sky"], "#B4DDF5"),
-    ("#C9CED3", "#E8EAEC"),
-    (COLOURS["orange"], "#F5DB9F"),
-)
+KIND_COLOURS = ((COLOURS["sky"], "#B4DDF5"), ("#C9CED3", "#E8EAEC"), (COLOURS["orange"], "#F5DB9F"))
 
 
-@dataclass(frozen=True)
-class Picture:
+# CSS pixels an inch, and those of pictures that are pixels
+PIXELS, DPI = 96, 130
+KINDS = {"svg": "image/svg+xml", "png": "image/png"}
+
+
+class Picture(NamedTuple):
     """A figure inside the page."""
 
     url: str
@@ -40,14 +41,12 @@ class Picture:
     """At which its letters are as large as those of the page, CSS pixels."""
 
 
-@dataclass(frozen=True)
-class Part:
-    """A table to be shown."""
-
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    note: str = ""
-    title: str = ""
+def picture_of(figure: Figure, kind: Literal["svg", "png"]) -> Picture:
+    """A figure with its caption, as lines or as pixels."""
+    with drawn_page([figure]) as page:
+        data = base64.b64encode(figure_bytes(page, kind, DPI)).decode("ascii")
+    url = f"data:{KINDS[kind]};base64,{data}"
+    return Picture(url, figure.caption, round(PIXELS * figure.size[0]))
 
 
 def check_page_file(path: Path) -> None:
@@ -55,12 +54,6 @@ def check_page_file(path: Path) -> None:
     if path.suffix.lower() not in (".html", ".htm"):
         raise SettingsError(f"{path}: reports are HTML: name a file that ends in .html")
     check_folder(path)
-
-
-def save_page(path: Path, page: str) -> None:
-    """Write a page; the file is complete or untouched."""
-    with whole_file(path) as part:
-        part.write_text(page, encoding="utf-8", errors="backslashreplace")
 
 
 def render_page(**content: Any) -> str:
@@ -87,11 +80,8 @@ def _symbols(text: str) -> Any:
     """A text, escaped, with the indices of α set low."""
     from markupsafe import Markup, escape
 
-    low = {"α_vs": "α<sub>vs</sub>", "α_c": "α<sub>c</sub>"}
-    marked = str(escape(text))
-    for plain, markup in low.items():
-        marked = marked.replace(plain, markup)
-    return Markup(marked)
+    marked = str(escape(text)).replace("α_vs", "α<sub>vs</sub>")
+    return Markup(marked.replace("α_c", "α<sub>c</sub>"))
 
 
 def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
@@ -154,14 +144,9 @@ def _window_data(window: Convex, turn: FloatArray, scale: float) -> dict[str, An
 
 def _upright(axis: FloatArray, space: Space) -> FloatArray:
     """The rotation (rows) after which the axis is z; keeps x, y and z where it can."""
-    if space.is_plane:
-        # y leads away from the viewer
-        away = -towards_viewer(axis, space)
-        return np.stack([np.cross(away, axis), away, axis])
-    across = np.eye(3)[np.argmin(np.abs(axis))]
-    first = across - (across @ axis) * axis
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(axis, first), axis])
+    # y leads away from the viewer
+    away = -towards_viewer(axis, space)
+    return np.stack([np.cross(away, axis), away, axis])
 
 
 def _axes(up: FloatArray, turn: FloatArray) -> list[list[Any]]:

@@ -4,23 +4,33 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
-from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning, SettingsError
+from scanfab.base.files import whole_file
 from scanfab.io.families import PathLike
+from scanfab.io.series import Series
+from scanfab.packing.cell import Cell
+from scanfab.packing.sample import Sample
+from scanfab.packing.window import SurfaceBox
 from scanfab.pipeline.options import as_options
-from scanfab.pipeline.repeat import repeat_command
+from scanfab.pipeline.record import read_manifest, restored_settings
+from scanfab.pipeline.repeat import reopen, repeat_command
+from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.values import Length
 from scanfab.table.compare import Comparison, compare_tables
+from scanfab.table.curves import spelt_strain, strain_column
+from scanfab.table.formats import read_rows
+from scanfab.table.row import numbers_of
+from scanfab.table.selection import choose_rows
 from scanfab.viz.figures.page import make_figures
 from scanfab.viz.report.caveats import caveats_of
-from scanfab.viz.report.frames import picture_of, show_frames
-from scanfab.viz.report.inputs import Input, read_inputs
-from scanfab.viz.report.page import Picture, check_page_file, render_page, save_page
+from scanfab.viz.report.page import Picture, check_page_file, picture_of, render_page, view_data
 from scanfab.viz.report.tables import (
     frame_table,
     input_table,
@@ -28,6 +38,24 @@ from scanfab.viz.report.tables import (
     results_tables,
     settings_table,
 )
+from scanfab.viz.scanned_frames import ScannedFrames
+from scanfab.viz.scene import Look, look_at
+
+# segments of a scan that takes about half a minute: pictures that would need more are rougher
+MOST_SEGMENTS = 3e8
+
+Told = dict[type[Warning], list[str]]
+"""What was told, warnings and notes apart."""
+
+
+class Input(NamedTuple):
+    """One table, its rows, and the manifest beside it."""
+
+    path: Path
+    rows: list[dict[str, Any]]
+    manifest: dict[str, Any] | None
+    cutoff: float | None
+    """The cut-off whose rows were chosen from several."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +99,8 @@ class Report:
             If it has another suffix, or the folder does not exist.
         """
         check_page_file(Path(path))
-        save_page(Path(path), self.page)
+        with whole_file(Path(path)) as part:
+            part.write_text(self.page, encoding="utf-8", errors="backslashreplace")
 
 
 def make_report(
@@ -128,30 +157,74 @@ def make_report(
             "expected files of tables, beside which manifests say what made them: save a table, or "
             "compute it by scanfab.compute_file, and name its file"
         )
-    with _Listening() as heard:
+    told: Told = {ScanfabWarning: [], ScanfabNote: []}
+    with _listening(told) as caught:
         inputs = read_inputs([Path(one) for one in named], cutoff, labels)
         rows = [row for one in inputs for row in one.rows]
         comparison = compare_tables(rows)
         pictures = _table_pictures(rows, comparison)
-    for one in heard.caught:
+    for one in caught:
         warnings.warn(one.message, one.category, stacklevel=2)
-    sections = [_section(one, heard) for one in inputs]
-    shown = [one["shown"]["pictures"] for one in sections if one["shown"]]
+    sections = [_section(one, told) for one in inputs]
+    for section in sections:
+        pictures += section["shown"]["pictures"] if section["shown"] else []
     asked = [one.manifest["settings"] for one in inputs if one.manifest is not None]
-    doubts = [*heard.warnings, *map(as_options, caveats_of(rows, asked))]
+    doubts = [*told[ScanfabWarning], *map(as_options, caveats_of(rows, asked))]
     page = render_page(
         title=title or _usual_title(rows),
         author=author,
         date=(today or datetime.now(UTC).astimezone().date()).isoformat(),
         summary=[overview(one.path, one.rows) for one in inputs],
         results=results_tables(comparison.summary, rows),
-        pictures=[*pictures, *chain.from_iterable(shown)],
+        pictures=pictures,
         warnings=list(dict.fromkeys(doubts)),
-        notes=list(dict.fromkeys(heard.notes)),
+        notes=list(dict.fromkeys(told[ScanfabNote])),
         sections=sections,
         frames=frame_table(rows),
     )
     return Report(page, any(row["alpha_vs_axial"] is not None for row in rows))
+
+
+@contextmanager
+def _listening(told: Told) -> Iterator[list[Any]]:
+    """Collect what is told in the block; it gives back the warnings themselves."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            yield caught
+        finally:
+            for one in caught:
+                for kind in told:
+                    if issubclass(one.category, kind):
+                        told[kind].append(as_options(str(one.message)))
+
+
+def read_inputs(
+    tables: Sequence[Path], cutoff: float | None = None, labels: Sequence[str] | None = None
+) -> list[Input]:
+    """
+    Read tables and manifests.
+
+    Raises
+    ------
+    ScanfabError
+        If one cannot be read or is no fabric table, or if no table has a row.
+    """
+    # a report can do without the names of the source and the strain
+    read = [
+        (path, [{"source": path.stem, "strain": None, **row} for row in read_rows(path)])
+        for path in tables
+    ]
+    chosen = choose_rows(read, cutoff, labels)
+    inputs = [
+        Input(path, rows, read_manifest(path), cutoff)
+        for path, rows in zip(tables, chosen, strict=True)
+    ]
+    if not any(one.rows for one in inputs):
+        raise SettingsError(
+            f"{', '.join(map(str, tables))}: there is nothing to report: no row in the table"
+        )
+    return inputs
 
 
 def _usual_title(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -169,8 +242,8 @@ def _table_pictures(rows: Sequence[Mapping[str, Any]], comparison: Comparison) -
     return [picture_of(one, "svg") for one in figures]
 
 
-def _section(one: Input, heard: _Listening) -> dict[str, Any]:
-    """What the manifest says, and what the source shows; ``heard`` gets the warnings."""
+def _section(one: Input, told: Told) -> dict[str, Any]:
+    """What the manifest says, and what the source shows; ``told`` gets the warnings."""
     section: dict[str, Any] = {"title": str(one.path), "missing": "", "shown": None, "no_view": ""}
     if one.manifest is None:
         missing = (
@@ -179,11 +252,11 @@ def _section(one: Input, heard: _Listening) -> dict[str, Any]:
         )
         return {**section, "missing": missing}
     asked, found = one.manifest["settings"], one.manifest.get("settings_file")
-    heard.warnings += map(str, one.manifest.get("warnings") or [])
-    heard.notes += map(str, one.manifest.get("notes") or [])
+    told[ScanfabWarning] += map(str, one.manifest.get("warnings") or [])
+    told[ScanfabNote] += map(str, one.manifest.get("notes") or [])
     if one.rows:
         try:
-            with heard:
+            with _listening(told):
                 section["shown"] = show_frames(one)
         except (ScanfabError, OSError) as error:
             section["no_view"] = f"The view is left out: {as_options(error)}."
@@ -198,23 +271,105 @@ def _section(one: Input, heard: _Listening) -> dict[str, Any]:
     }
 
 
-class _Listening:
-    """Collects what is told in its blocks, as warnings and as notes."""
+def show_frames(one: Input) -> dict[str, Any]:
+    """
+    Read the first source of a table again: its view, the sample in numbers, and pictures.
 
-    def __init__(self) -> None:
-        self.warnings: list[str] = []
-        self.notes: list[str] = []
+    Raises
+    ------
+    ScanfabError, OSError
+        If it has changed, or cannot be read again.
+    """
+    manifest = one.manifest or {}
+    for file in manifest.get("inputs") or []:
+        path = Path(str(file.get("path")))
+        if path.exists() and path.stat().st_size != file.get("size"):
+            raise SettingsError(f"{path} has changed since the table was computed")
+    asked = manifest["settings"]
+    series, settings = reopen(asked), restored_settings(asked)
+    if settings.cutoffs:
+        # the one whose rows are reported
+        cutoff = settings.cutoff if one.cutoff is None else Length(one.cutoff)
+        settings = replace(settings, cutoffs=(), cutoff=cutoff)
+    source = str(one.rows[0]["source"])
+    rows = [row for row in one.rows if row["source"] == one.rows[0]["source"]]
+    filled = [row for row in rows if row["alpha_vs_axial"] is not None]
+    number = int(max(numbers_of(filled or rows, "frame"), default=0))
+    look = look_at(series, replace(settings, variants="c"), number)
+    of_frame = [row for row in rows if row["frame"] == look.number]
+    strain = spelt_strain(of_frame[0], strain_column(rows)) if of_frame else ""
+    return {
+        "view": view_data(look.scene, look.axis),
+        "view_title": ", ".join(filter(None, [source, f"frame {look.number}", strain])),
+        "facts": _facts(look),
+        "pictures": _pictures(rows, series, settings) if filled else [],
+    }
 
-    def __enter__(self) -> _Listening:
-        self._block = warnings.catch_warnings(record=True)
-        self.caught: list[Any] = self._block.__enter__()
-        warnings.simplefilter("always")
-        return self
 
-    def __exit__(self, *details: Any) -> None:
-        self._block.__exit__(*details)
-        for one in self.caught:
-            if issubclass(one.category, ScanfabWarning):
-                self.warnings.append(as_options(str(one.message)))
-            elif issubclass(one.category, ScanfabNote):
-                self.notes.append(as_options(str(one.message)))
+def _facts(look: Look) -> list[tuple[str, str]]:
+    """The sample in numbers."""
+    first, plan = look.first, look.plan
+    if first is None:
+        return []
+    radii, boundary = first.packing.radius[first.grains], first.number(first.boundary)
+    smallest = float(radii.min())
+    axis = [name for name, part in zip("xyz", look.axis, strict=True) if part == 1.0]
+    facts = [
+        ("grains", f"{first.number(first.grains)} in the first frame that has grains"),
+        ("radii", f"smallest {smallest:.4g}, mean {radii.mean():.4g}, largest {radii.max():.4g}"),
+        ("boundary", f"{boundary} particles" if boundary else "none"),
+        ("cell", _cell(look.sample.packing.cell)),
+        ("loading axis", axis[0] if axis else _numbers(look.axis)),
+    ]
+    if plan is None:
+        return facts
+    facts.append(("cut-off", f"{plan.cutoff:.4g}, {plan.cutoff / smallest:.3g} smallest radii"))
+    if plan.window is not None:
+        facts.append(("centre of the RV", _numbers(plan.window.center)))
+    for window in plan.windows:
+        radius = window.radius
+        if not window.shape.is_sphere:
+            facts.append(("shape of the RV", str(window.shape)))
+            continue
+        part, now = _fraction(first, radius), ""
+        # beside the sample that the RV was chosen for, and beside what became of that since
+        if look.sample.gathered.any() and _fraction(look.sample, radius) != part:
+            now = f" in the first frame that has grains, {_fraction(look.sample, radius)} in frame "
+            now += str(look.number)
+        size = f"{radius:.4g}, {part} of half the sample's smallest extent{now}"
+        facts.append(("radius of the RV", f"{size}, {radius / radii.mean():.3g} mean radii"))
+    return facts
+
+
+def _fraction(sample: Sample, radius: float) -> str:
+    extent = SurfaceBox.of(sample.packing, sample.gathered).smallest_extent
+    return f"{2 * radius / extent:.3g}"
+
+
+def _cell(cell: Cell | None) -> str:
+    if cell is None or not any(cell.periodic):
+        return "not periodic"
+    along = "".join(name for name, repeats in zip("xyz", cell.periodic, strict=True) if repeats)
+    return f"periodic along {along}, vectors ({'; '.join(map(_numbers, cell.vectors))})"
+
+
+def _numbers(vector: Any) -> str:
+    return ", ".join(f"{part:.4g}" for part in vector)
+
+
+def _pictures(rows: list[dict[str, Any]], series: Series, settings: Settings) -> list[Picture]:
+    """Of the first and the last frame, all from one scan."""
+    rougher, tolerance = "", settings.tolerance
+    if settings.spacing is None or settings.directions is None:
+        # as much rougher as makes the scan short enough to wait for
+        most = max(numbers_of(rows, "segments"), default=0.0)
+        tolerance *= max(1.0, most / MOST_SEGMENTS) ** 0.5
+    if tolerance > settings.tolerance:
+        rougher = (
+            f"Scanned to a standard error of {tolerance:.2g} instead of the table's "
+            f"{settings.tolerance:.2g}, which would take too long for a picture."
+        )
+    frames = ScannedFrames(series, replace(settings, tolerance=tolerance), rows, rougher)
+    # pixels, as the disks are pixels anyway, and few of them
+    figures = [figure for figure in make_figures(frames, "frames") if not figure.slow]
+    return [picture_of(figure, "png") for figure in figures]

@@ -67,7 +67,7 @@ ONE, BLOCK = binary_dump(names=NAMES), struct.pack("<i", 18)
 @pytest.mark.parametrize(
     ("data", "told"),
     [
-        (binary_dump(), r'does not name its 6 columns.*`columns="id=1,x=3'),
+        (binary_dump(), r'the 6 columns have no names.*`columns="id=1,x=3'),
         (ONE[:-1], "incomplete"),
         (ONE[:200], "incomplete"),
         (ONE.replace(struct.pack("<q", 3), struct.pack("<q", 4), 1), "4 rows are not 18 numbers"),

@@ -72,7 +72,7 @@ def test_signs_of_pushes(tmp_path):
         return -size
 
     assert np.all(read_both(tmp_path, chain_texts(push=pull)).contacts.force_n < 0)
-    with pytest.warns(ScanfabWarning, match="without their sign"):
+    with pytest.warns(ScanfabWarning, match="no sign of normal contact forces"):
         contacts = read_both(tmp_path, chain_texts(lubrication=UNSIGNED)).contacts
     assert np.all(contacts.force_n > 0)
     # a file with a pull has signs

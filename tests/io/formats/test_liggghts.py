@@ -149,7 +149,7 @@ NO_GRAINS += ["grains_binary_boundingBox_30000.vtk", "grains_boundingBox_30000.v
     [
         *((name, "no grains: expected points with a radius") for name in NO_GRAINS),
         ("mesh_30000.stl", "no reader knows the format"),
-        ("binary_30000.bin", "does not name its 6 columns: name them"),
+        ("binary_30000.bin", "the 6 columns have no names: number them"),
         ("pairs_id_force.txt", r"no grains.*found contacts \(pairs_id_force.txt\)"),
         ("noradius.txt", r"noradius.txt, step 30000: no radius.*`columns.*`radius`"),
     ],
@@ -172,8 +172,3 @@ def test_the_box_beside_a_vtk_file_is_its_cell(tmp_path, name, ending):
     np.testing.assert_allclose(np.diagonal(packing.cell.vectors), [0.014, 0.013, 0.04], rtol=1e-6)
     np.testing.assert_allclose(packing.cell.origin, [-0.005, 0, 0], atol=1e-9)
     assert packing.cell.periodic == (True, True, False)
-
-
-def test_a_contact_across_a_face_without_a_cell_asks_for_it():
-    with pytest.raises(scanfab.PackingError, match="name its cell"):
-        scanfab.read(FLOOR / "grains_30000.vtk", contacts=FLOOR / "pairs_pos_id_force_30000.vtk")

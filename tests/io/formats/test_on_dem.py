@@ -10,7 +10,7 @@ import pyvista
 import scanfab
 from scanfab.base.errors import ReadError
 from scanfab.io.reader import reader_for, reader_named
-from scanfab.testing import check_reader, differences, made_up_packings
+from scanfab.testing import check_reader, made_up_packings
 from tests.helpers.made.on_dem import COMPRESSION, FORCE, IDS, POSITION, draft_1, draft_2
 
 
@@ -50,14 +50,6 @@ def test_what_is_written_has_the_names_of_the_draft(tmp_path):
     np.testing.assert_array_equal(mesh.points, packing.position)
     np.testing.assert_array_equal(mesh["body_id"], packing.id)
     assert mesh.n_verts == len(packing)
-
-
-def test_all_of_a_packing_comes_back_and_no_contacts_are_not_none_at_all(tmp_path):
-    packing = made_up_packings()["everything"]
-    (path,) = scanfab.convert(packing, tmp_path / "a.vtkhdf")
-    assert differences(packing, scanfab.read(path)) == []
-    (path,) = scanfab.convert(made_up_packings()["plain"], tmp_path / "a.vtkhdf")
-    assert scanfab.read(path).contacts is None
 
 
 def test_vtkhdf_of_other_programs_is_read_as_vtk_and_other_hdf5_is_nobodys(tmp_path):

@@ -275,11 +275,11 @@ def test_normal_forces_are_positive_in_compression(tmp_path):
 @pytest.mark.parametrize("base", [0, 1])
 def test_contacts_of_grains_without_ids_name_rows(tmp_path, base):
     contacts = rows(tmp_path / "c.csv", PAIRS + base, names=["id1", "id2"])
-    with pytest.warns(ScanfabNote, match=f"their rows, counted from {base}, since"):
+    with pytest.warns(ScanfabNote, match=f"their rows, counted from {base}"):
         packing = scanfab.read(grains_file(tmp_path, ids=False), contacts=contacts)
     assert {tuple(pair) for pair in packing.contacts.pairs} == {tuple(pair) for pair in PAIRS}
     write(contacts, "id1,id2\n1,40\n2,60\n5,33\n")
-    with pytest.raises(ReadError, match="the grain file has no ids, and as rows"):
+    with pytest.raises(ReadError, match="the grains have no ids, and by rows are no"):
         scanfab.read(tmp_path / "grains.csv", contacts=contacts)
 
 

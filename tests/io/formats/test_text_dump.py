@@ -61,7 +61,7 @@ def test_of_a_repeated_column_the_first_counts_and_ids_keep_all_digits(tmp_path)
 
 def test_a_dump_that_names_no_columns(tmp_path):
     text = dump_text(names="", flags="").replace("ATOMS  \n", "ATOMS\n")
-    with pytest.raises(ReadError, match="does not name its 6 columns"):
+    with pytest.raises(ReadError, match="the 6 columns have no names"):
         read(tmp_path, text, format="lammps")
     packing = read(tmp_path, text, columns={"id": 1, "x": 3, "y": 4, "z": 5, "radius": 6})
     np.testing.assert_array_equal(packing.position, np.array(ROWS)[:, 2:5])

@@ -30,65 +30,11 @@ def polydata(path, binary=False, cells=None, **arrays):
     return path
 
 
-def grid(path, file_format=None, **arrays):
-    cells = [("vertex", np.arange(len(POSITION))[:, None])]
-    meshio.Mesh(POSITION, cells, point_data=arrays).write(path, file_format=file_format)
-    return path
-
-
-WRITERS = {
-    "legacy ASCII": ("a.vtk", polydata, {}),
-    "legacy BINARY": ("a.vtk", polydata, {"binary": True}),
-    "old legacy ASCII": ("a.vtk", grid, {"file_format": "vtk42"}),
-    "new legacy BINARY": ("a.vtk", grid, {"file_format": "vtk51"}),
-    "ASCII .vtp": ("a.vtp", polydata, {}),
-    "meshio's .vtu": ("a.vtu", grid, {}),
-    "meshio's .xdmf": ("a.xdmf", grid, {}),
-}
-
-
-@pytest.mark.parametrize("form", WRITERS)
-def test_every_form_holds_the_same_grains(tmp_path, form):
-    name, writer, options = WRITERS[form]
-    arrays = {"radius": RADIUS, "Id": np.array([7, 3, 9, 1000001]), "v": POSITION}
-    packing = scanfab.read(writer(tmp_path / name, **arrays, **options))
-    np.testing.assert_allclose(packing.position, POSITION, atol=1e-6)
-    np.testing.assert_allclose(packing.radius, RADIUS, rtol=1e-7)
-    np.testing.assert_array_equal(packing.id, [7, 3, 9, 1000001])
-    assert packing.columns["v"].shape == (4, 3)
-
-
-@pytest.mark.parametrize("name", ["radius", "radii", "RADIUS", "rad", "r", "diameter", "Diameter"])
-def test_a_radius_has_many_names(tmp_path, name):
-    path = polydata(tmp_path / "a.vtp", **{name: 2 * RADIUS if "iameter" in name else RADIUS})
-    np.testing.assert_allclose(scanfab.read(path).radius, RADIUS)
-
-
-def test_points_without_a_radius_take_the_users_radius_or_column(tmp_path):
-    path = polydata(tmp_path / "a.vtp", size=RADIUS)
-    with pytest.raises(ReadError, match=r"no radius.*found size.*`columns=.*`radius`"):
-        scanfab.read(path)
-    np.testing.assert_allclose(scanfab.read(path, columns={"radius": "size"}).radius, RADIUS)
-    np.testing.assert_array_equal(scanfab.read(path, radius=0.5).radius, [0.5] * 4)
-
-
 def test_flat_points_get_a_third_coordinate(tmp_path):
     cells = [("vertex", np.arange(4)[:, None])]
     mesh = meshio.Mesh(POSITION[:, :2], cells, point_data={"radius": RADIUS})
     mesh.write(tmp_path / "a.xdmf")
     np.testing.assert_array_equal(scanfab.read(tmp_path / "a.xdmf").position[:, 2], 0)
-
-
-@pytest.mark.parametrize("name", ["lines.vtp", "lines.vtk", "grid.vtu", "grid.vtk", "grid.xdmf"])
-def test_lines_between_centres_are_contacts(tmp_path, name):
-    spheres = polydata(tmp_path / "spheres.vtp", radius=RADIUS)
-    if name.startswith("grid"):
-        meshio.Mesh(POSITION, [("line", LINES)]).write(tmp_path / name)
-    else:
-        polydata(tmp_path / name, cells={})
-    packing = scanfab.read(spheres, contacts=tmp_path / name)
-    np.testing.assert_array_equal(packing.contacts.pairs, LINES)
-    assert packing.contacts.force is None
 
 
 def test_lines_with_ids_name_grains_by_id(tmp_path):
@@ -171,5 +117,5 @@ def test_forces_whose_grain_is_in_doubt_and_arrays_of_other_names_are_left_out(t
     with pytest.warns(ScanfabWarning, match=r"lines\.vtp: the forces are left out: 67% of them"):
         assert scanfab.read(spheres, contacts=contacts).contacts.force is None
     polydata(contacts, cells={"normal_force": np.ones(3), "ContactForce": PUSH, "kn": np.ones(3)})
-    with pytest.warns(ScanfabNote, match=r"left out of the contacts: \w+, \w+: a force is taken"):
+    with pytest.warns(ScanfabNote, match=r"left out of the contacts: \w+, \w+: only a vector"):
         assert scanfab.read(spheres, contacts=contacts).contacts.force is None

@@ -117,13 +117,6 @@ def test_normal_and_shear_force_add_up(tmp_path):
     np.testing.assert_array_equal(packing.contacts.force, [[2, 3, 0]])
 
 
-def test_the_normal_force_of_the_recorder_is_a_number_and_none_of_its_own_is_the_whole():
-    packing = scanfab.read(YADE / HEAP[1], contacts=YADE / RECORDED[1])
-    assert packing.contacts.force is None
-    assert packing.contacts.force_n.shape == (271,)
-    assert scanfab.read(YADE / HEAP[1], contacts=YADE / EXPORTED[1]).contacts.force is None
-
-
 def test_a_contact_through_a_face_without_a_cell_asks_for_it(tmp_path):
     # away from the file of the cell
     spheres = shutil.copy(YADE / PERIODIC_SPHERES, tmp_path)
@@ -189,9 +182,3 @@ def test_attributes_have_the_names_of_the_second_line_or_are_numbered(tmp_path):
 def test_a_text_that_cannot_be_read_says_why(tmp_path, text, message):
     with pytest.raises(ReadError, match=message):
         scanfab.read(write(tmp_path / "a.txt", text))
-
-
-@pytest.mark.parametrize("name", ["x_y_z_r.txt", "periodic.xml.bz2"])
-def test_a_file_of_grains_holds_no_contacts_of_others(name):
-    with pytest.raises(ReadError, match="expected contacts, found grains"):
-        scanfab.read(YADE / "text.txt", contacts=YADE / name)

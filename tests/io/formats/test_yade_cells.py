@@ -54,7 +54,7 @@ def test_the_user_is_told_where_the_cell_comes_from():
 
 def test_cells_that_were_overwritten_are_not_taken():
     """Without files of interactions all cells have the number 0: the last one is left."""
-    with pytest.warns(ScanfabWarning, match=r"lone-periCell.*not one cell for each file"):
+    with pytest.warns(ScanfabWarning, match=r"lone-periCell.*not each file of spheres has one"):
         packings = frames("lone-spheres-*")
     assert [packing.cell for packing in packings] == [None] * 3
 
@@ -114,7 +114,9 @@ def test_cells_of_the_frames_come_from_a_csv_file(tmp_path, key):
 def test_a_frame_that_the_csv_file_does_not_name_is_an_error_that_names_it(tmp_path):
     path = tmp_path / "cells.csv"
     path.write_text("step,lx,ly,lz\n17500,1,1,1\n37500,1,1,1\n")
-    with pytest.raises(ReadError, match=r"cells.csv: names no cell for step 27500.*27500.vtu"):
+    with pytest.raises(
+        ReadError, match=r"cells.csv: has no row with the cell of .* step 27500.*27500.vtu"
+    ):
         frames("rec_spheres.*", cell=path)
 
 

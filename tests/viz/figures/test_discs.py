@@ -9,8 +9,8 @@ import scanfab
 from scanfab import Cell, Packing, SettingsError
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
-from scanfab.viz.figures.hemisphere import half_circle
-from scanfab.viz.figures.rings import contact_ring
+from scanfab.viz.figures.projection import places_of
+from scanfab.viz.figures.rose import contact_ring
 from scanfab.viz.paraview import VtkFolder
 from scanfab.viz.scene import scene_of, section_lines, towards_viewer
 
@@ -35,10 +35,6 @@ def test_a_rose_has_one_ring(frames):
     texts = [text.get_text() for text in ax.get_legend().get_texts()]
     assert texts == ["in the plane x-y"]
     assert "from x towards y" in ax.get_legend().get_title().get_text()
-
-
-def test_discs_have_no_polar_angles(frames):
-    ax = Figure().subplots(subplot_kw={"projection": "polar"})
     with pytest.raises(SettingsError, match="no polar angles, found 30"):
         frames.plot.rose(ax=ax, angles=(30.0,))
 
@@ -62,7 +58,7 @@ def test_the_ring_of_contacts_counts_all_of_them():
 
 
 def test_directions_of_a_plane_begin_at_its_first_axis():
-    angle, directions = half_circle(ZX)
+    angle, directions = places_of(ZX)
     np.testing.assert_allclose(directions[[0, 90]], [[1, 0, 0], [0, 0, 1]], atol=1e-15)
     assert angle[90] == 90.0
 

@@ -1,10 +1,11 @@
-"""A figure is a class in one file: made-up ones are reached wherever those of the package are."""
+"""Figures by name, on a page and in files; made-up ones are reached wherever the package's are."""
 
 from __future__ import annotations
 
 import inspect
 import json
 import re
+import warnings
 from importlib.metadata import EntryPoint
 
 import pytest
@@ -16,20 +17,24 @@ from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.cli.group import cli
 from scanfab.cli.main import run
 from scanfab.pipeline.settings import Settings
+from scanfab.table.compare import compare_tables
 from scanfab.table.plots import figures_of, installed_figures
 from scanfab.table.table import Table, load
 from scanfab.viz.figures.page import drawn_page, make_figures
+from scanfab.viz.figures.style import check_plot_file
 from scanfab.viz.report.report import make_report
 from scanfab.viz.scanned_frames import ScannedFrames
 from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import write
-from tests.helpers.tables import curve
+from tests.helpers.figures import BYTES, save_rows
+from tests.helpers.tables import curve, sheared
 
 pytestmark = pytest.mark.filterwarnings("ignore:skipped:scanfab.base.errors.ScanfabNote")
 OWN = (
     "evolution", "normalised", "correlation", "columns", "rose", "projection", "histogram",
     "cutoffs", "calibration", "map",
 )  # fmt: skip
+TABLE_FIGURES = ("evolution", "normalised", "correlation")
 FAST = ["--boundary", "mask=3", "--tolerance", "3e-3", "--variants", "c", "--frames", "::6"]
 
 
@@ -128,15 +133,9 @@ def test_a_table_without_its_columns_goes_without_it(tmp_path, capsys):
     words = ["--plot", str(tmp_path / "x.png"), "--figure", "made_up"]
     assert run(["compare", str(table), *words]) == 1
     assert "--figure: made_up needs rattlers" in capsys.readouterr().err
-
-
-@pytest.mark.usefixtures("made_up")
-def test_what_there_is_instead_of_a_figure_names_the_made_up_ones(table, capsys):
     assert run(["compare", str(table), "--plot", "x.png", "--figure", "pie"]) == 2
-    assert (
-        "expected evolution, normalised, correlation, columns, made_up, found"
-        in capsys.readouterr().err
-    )
+    known = "evolution, normalised, correlation, columns, made_up"
+    assert f"expected {known}, found" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("made_up")
@@ -156,23 +155,75 @@ def test_what_is_no_figure_is_told_and_spoils_no_other(offered):
         assert tuple(installed_figures()) == OWN
 
 
-def test_a_notebook_shows_what_a_figure_takes():
+def test_a_notebook_shows_what_a_figure_takes_and_gets_axes_in_the_style_of_the_package():
+    from matplotlib import pyplot
+
     plot = Table(curve()).plot.evolution
     assert str(inspect.signature(plot)).startswith("(ax=None, *, of:")
     assert "Bands are total standard errors" in plot.__doc__
-
-
-def test_axes_of_its_own_are_in_the_style_of_the_package():
-    from matplotlib import pyplot
-
     pyplot.switch_backend("agg")
-    ax = Table(curve()).plot.evolution()
+    ax = plot()
     assert ax.xaxis.label.get_size() == 9
     assert not ax.spines["top"].get_visible()
     pyplot.close(ax.figure)
-
-
-@pytest.mark.parametrize("place", [3, [1, 2]])
-def test_what_is_no_axes_is_told(place):
     with pytest.raises(SettingsError, match="ax: expected Axes, a Figure or a SubFigure"):
-        Table(curve()).plot.evolution(ax=place)
+        plot(ax=3)
+
+
+def test_a_comparison_is_made_and_told_once(tmp_path):
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        comparison = compare_tables(sheared())
+        save_rows(tmp_path / "x.png", sheared(), "evolution", comparison=comparison)
+    for text in ("shear_strain stands in", "the loading axis is not"):
+        assert sum(text in str(one.message) for one in told) == 1
+
+
+@pytest.mark.parametrize("name", [None, *TABLE_FIGURES])
+def test_all_panels_are_lettered_and_say_which_alpha(drawn, name):
+    figure = drawn(curve(), name)
+    panels = [axes for axes in figure.axes if axes.axison]
+    letters = [axes.get_title(loc="left") for axes in panels]
+    assert letters == [f"({letter})" for letter in "abcde"[: len(panels)]]
+    assert all(axes.get_ylabel().count(", axial") == 1 for axes in panels)
+
+
+def test_the_words_of_a_figure_fit_its_width(drawn):
+    """Nothing is cut off, whatever the sources are called."""
+    rows = [row for source in ("p" * 90, "q" * 90) for v in "abcd" for row in curve(source, v)]
+    for name in TABLE_FIGURES:
+        figure = drawn(rows, name)
+        box = figure.get_tightbbox()
+        width, height = figure.get_size_inches()
+        assert box.x0 > -0.02
+        assert box.y0 > -0.02
+        assert box.x1 < width + 0.02
+        assert box.y1 < height + 0.02
+
+
+@pytest.mark.parametrize("rows", [[], [{**row, "alpha_vs_axial": None} for row in curve()]])
+def test_nothing_to_draw_is_an_error(rows, tmp_path):
+    with pytest.raises(SettingsError, match="nothing to draw"):
+        save_rows(tmp_path / "x.png", rows)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("suffix", BYTES)
+@pytest.mark.parametrize("name", [None, *TABLE_FIGURES])
+def test_files_are_what_their_names_say_and_repeat(tmp_path, suffix, name):
+    one, two = tmp_path / f"one{suffix}", tmp_path / f"two{suffix}"
+    for path in (one, two):
+        save_rows(path, curve(), name)
+    assert one.read_bytes().startswith(BYTES[suffix])
+    assert one.read_bytes() == two.read_bytes()
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("x.docx", "not as .docx"), ("x", "without a suffix"), ("no/x.png", "there is no folder")],
+)
+def test_files_that_cannot_be_written_are_told_before(tmp_path, name, message):
+    with pytest.raises(SettingsError, match=message):
+        check_plot_file(tmp_path / name)
+    check_plot_file(tmp_path / "x.PNG")

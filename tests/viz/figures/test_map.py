@@ -8,7 +8,7 @@ import pytest
 import scanfab
 from scanfab import Cell, Packing
 from scanfab.scan.blocks import Blocks
-from scanfab.viz.figures.map import Map, _Lattice
+from scanfab.viz.figures.map import Map, lattice_of
 from scanfab.viz.figures.page import drawn_page
 from tests.helpers.lattices import shaken_cubic
 
@@ -44,8 +44,9 @@ def test_a_value_that_one_block_alone_has_is_of_one_colour_in_all_planes(packing
 
 def test_a_cell_that_leans_more_than_it_is_high_has_all_its_blocks():
     edges = np.array([[20.0, 0, 0], [0, 8.0, 0], [9.0, 0, 8.0]])
-    middles = Blocks(np.zeros(3), edges, (2, 2, 2)).middles
-    assert _Lattice(middles).counts == [2, 2, 2]
+    numbers, steps = lattice_of(Blocks(np.zeros(3), edges, (2, 2, 2)).middles)
+    assert numbers.tolist() == [[k % 2, k // 2 % 2, k // 4] for k in range(8)]
+    np.testing.assert_allclose(steps, edges / 2)
 
 
 @pytest.mark.parametrize("blocks", [{"grid": (2, 2, 2)}, {"slices": 2}, {"shells": 2}])

@@ -73,7 +73,7 @@ def test_a_table_is_read_once(table, monkeypatch):
     """It may come by a pipe."""
     read = []
     monkeypatch.setattr(
-        "scanfab.viz.report.inputs.read_rows", lambda path: read.append(path) or read_rows(path)
+        "scanfab.viz.report.report.read_rows", lambda path: read.append(path) or read_rows(path)
     )
     path = table(curve())
     assert make_report([path]).has_void_fabric

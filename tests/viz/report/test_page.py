@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.viz.frame_view import look_at
 from scanfab.viz.report.page import MOST_GRAINS, view_data
-from scanfab.viz.scene import Grains, Scene
+from scanfab.viz.scene import Grains, Scene, look_at
 from tests.helpers.truth import SAMPLE_DATA
 
 
@@ -43,6 +42,6 @@ def test_a_large_sample_is_thinned():
     position = np.random.default_rng(0).uniform(-1, 1, (count, 3))
     no = np.zeros(count, bool)
     grains = Grains(position, np.full(count, 0.01), np.arange(count), no * 1, no, no, no)
-    data = view_data(Scene(grains, np.zeros(3), None), (0, 0, 1))
+    data = view_data(Scene(grains, np.zeros(3)), (0, 0, 1))
     assert (len(data["spheres"]), data["left_out"]) == (MOST_GRAINS, 2 * MOST_GRAINS)
     assert max(abs(number) for sphere in data["spheres"] for number in sphere) <= 1000

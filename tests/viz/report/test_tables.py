@@ -1,11 +1,20 @@
-"""Numbers of the report, spelt with their errors."""
+"""Numbers of the report with their errors, settings with their meanings, and warnings."""
 
 from __future__ import annotations
 
+import inspect
+import json
+from dataclasses import fields
+from pathlib import Path
+
 import pytest
 
+from scanfab.io.sources import READING, read_series
+from scanfab.pipeline.options import MEANINGS
+from scanfab.pipeline.settings import Settings
 from scanfab.table.compare import compare_tables
-from scanfab.viz.report.tables import frame_table, overview, results_tables
+from scanfab.viz.report.caveats import caveats_of
+from scanfab.viz.report.tables import frame_table, overview, results_tables, settings_table
 from tests.helpers.tables import curve, sheared
 
 
@@ -30,11 +39,7 @@ def results_of(value, **errors):
 def test_a_value_has_the_digits_that_its_error_leaves(value, error, text):
     cells = results_of(value, alpha_vs_axial_sample_se=error)
     assert cells["α_vs, frame 0"] == text
-
-
-@pytest.mark.parametrize(("error", "text"), [(0.001, "0.0010"), (7.41e-5, "7.4e-05")])
-def test_errors_have_two_digits(error, text):
-    assert results_of(0.01, alpha_vs_axial_se=error)["its error: scan"] == text
+    assert results_of(0.01, alpha_vs_axial_se=7.41e-5)["its error: scan"] == "7.4e-05"
 
 
 def test_what_is_not_known_is_a_dash():
@@ -65,9 +70,6 @@ def test_grains_are_told_by_variant_and_one_number_is_no_range():
     assert grains(c=[140, 143]) == "140 to 143 grains"
     found = grains(a=[800, 800], c=[235, 286])
     assert found == "grains: 800 in a, 235 to 286 in c"
-
-
-def test_one_strain_is_no_range():
     assert overview("t.csv", curve()[1:2]).endswith("; axial strain 1 %.")
 
 
@@ -86,3 +88,79 @@ def test_turned_axes_lead_with_intensities_and_have_no_slope():
     columns = list(frame_table(rows).columns)
     assert columns.index("void intensity") < columns.index("α_vs")
     assert list(frame_table(curve()).columns).index("α_vs") == 3
+
+
+def test_every_setting_has_a_meaning():
+    """A setting that is new needs a meaning where it is declared."""
+    settings = {field.name for field in fields(Settings)} - {"workers"}
+    assert {*READING, *settings, "fields", "digits"} == set(MEANINGS)
+    assert all(MEANINGS.values())
+    reading = inspect.signature(read_series).parameters.values()
+    assert set(READING) == {one.name for one in reading if one.kind is one.KEYWORD_ONLY}
+
+
+def test_every_line_of_a_manifest_is_explained(computed):
+    manifest = json.loads(Path(f"{computed.table}.manifest.json").read_text("utf-8"))
+    lines = settings_table(manifest["settings"])
+    assert len(lines) > 20
+    assert all(name and value and meaning for name, value, meaning in lines)
+    # a setting that nobody knows
+    assert settings_table({"sources": ["x"], "unheard": 3}) == [("unheard", "3", "")]
+
+
+def doubts(rows, *asked, **values):
+    return caveats_of([{**row, "grains": 100_000, **values} for row in rows], list(asked))
+
+
+@pytest.mark.parametrize(
+    ("values", "part"),
+    [
+        ({"alpha_vs_axial_se": None}, "error of the scan: it was made of one replicate"),
+        ({"alpha_vs_axial": None}, "5 of 5 rows have no void fabric"),
+        (
+            {"alpha_vs_axial_se": 0.01, "alpha_vs_axial_sample_se": 1e-4},
+            "(0.01 beside 0.05; scan 0.01, sample 0.0001). More lines would help",
+        ),
+        (
+            {"alpha_vs_axial_sample_se": 0.02},
+            "(0.02 beside 0.05; scan 0.0003, sample 0.02). Only more grains would help",
+        ),
+        (
+            {"alpha_vs_axial_se": 0.012, "alpha_vs_axial_sample_se": 0.016},
+            "(0.02 beside 0.05; scan 0.012, sample 0.016). It takes more grains, and more lines",
+        ),
+        # parts that are small alone
+        ({"alpha_vs_axial_se": 0.004, "alpha_vs_axial_sample_se": 0.004}, "(0.0057 beside 0.05;"),
+    ],
+)
+def test_what_is_wrong_is_told(values, part):
+    """The error is that of scan and sample together, and what makes it smaller is said."""
+    (text,) = doubts(curve(), **values)
+    assert part in text
+
+
+def test_a_sound_table_has_no_warning_and_a_biased_rule_is_told_with_its_bias():
+    rules = ({"directions": name} for name in (None, "lebedev:11", "nonsense:3", ""))
+    assert doubts(curve(), *rules) == []
+    (text,) = doubts(curve(), {"directions": "equal-angle:10"})
+    assert "equal-angle:10" in text
+    assert "0.43" in text
+    (text,) = doubts(curve()[:2])
+    assert "fewer than three frames" in text
+    chosen = [{k: v for k, v in row.items() if k != "alpha_vs_axial_se"} for row in curve()]
+    (text,) = doubts(chosen)
+    assert "no column alpha_vs_axial_se" in text
+    assert "replicate" not in text
+
+
+def test_the_errors_are_those_of_the_frame_with_the_largest_value():
+    """An error of another frame says nothing of the signal, unless the peak's is not known."""
+    large = {"alpha_vs_axial_se": 0.02, "alpha_vs_axial_sample_se": 0.03, "grains": 20}
+    small = {"alpha_vs_axial_se": 1e-4, "alpha_vs_axial_sample_se": 1e-4}
+    first, second, peak, *rest = [{**row, **small} for row in curve()]
+    assert doubts([{**first, **large}, second, peak, *rest]) == []
+    (text,) = doubts([first, second, {**peak, **large}, *rest])
+    assert "(0.036 beside 0.05; scan 0.02, sample 0.03)" in text
+    peak["alpha_vs_axial_sample_se"] = None
+    (text,) = doubts([{**first, **large}, second, peak, *rest])
+    assert "sample 0.03)" in text

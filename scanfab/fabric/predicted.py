@@ -1,7 +1,16 @@
 """
-The void fabric that contacts alone predict at small cut-offs, and why it follows the contacts.
+The void fabric without a scan: as the window alone gives it, and as the contacts predict it.
 
-In a medium that is the same everywhere the mean length of void segments is
+**The window.** A line that is clipped to a window W loses long segments, the more the shorter its
+piece in W is, so that ℓ(n) depends on the shape of W as it is seen along n. Freely overlapping
+grains (a Poisson medium, Matheron 1975, Random Sets and Integral Geometry) have segments of the
+mean length c + 1/β above a cut-off c, whatever the direction; clipped to W
+
+    ℓ(n) = c + A₁ / (A₀ + β A₁),    A₁ = g(c; n),    A₀ = -dg/dz(c; n),
+
+with g(z; n) the volume that W has in common with itself moved by z n; in a plane the area.
+
+**The contacts.** In a medium that is the same everywhere the mean length of void segments is
 
     ℓ(n; c) = c + L / N,    N(n; c) = (Σ π r² - Σ 2 π R* |μ| (c |μ| + δ)⁺) / V,
 
@@ -21,9 +30,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.column import Column
+from scanfab.base.column import numbers
+from scanfab.base.convex import Convex
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.tensor import axial, weighted_tensors
+from scanfab.fabric.void import VoidFabric
 from scanfab.packing.search import NearPairs
 from scanfab.scan.directions import rule_of
 
@@ -32,13 +43,56 @@ LONGEST_GAP = 0.3
 # of the integral over all directions
 AXES = 100
 
-PREDICTED_ALPHA = Column(
-    "alpha_vs_axial_contacts",
-    float,
-    "",
-    "alpha_vs_axial as overlaps and near contacts predict it, for cut-offs up to 0.3 of the "
-    "smallest radius; empty for an open whole and for clumps",
+WINDOW_ALPHA, PREDICTED_ALPHA = numbers(
+    {
+        "window_alpha_vs_axial": "what the RV's shape alone would give an isotropic medium of the "
+        "same mean length, as alpha_vs_axial; 0 for a sphere; empty for the second moment",
+        "alpha_vs_axial_contacts": "alpha_vs_axial as overlaps and near contacts predict it, for "
+        "cut-offs up to 0.3 of the smallest radius; empty for an open whole and for clumps",
+    }
 )
+
+
+def window_alpha(
+    window: Convex, fabric: VoidFabric, cutoff: float, axis: FloatArray
+) -> float | None:
+    """
+    Signed anisotropy of an isotropic medium with a fabric's mean length, in the same directions.
+
+    β follows from Σ w (c (A₀ + β A₁) + A₁) / Σ w (A₀ + β A₁) = mean length, sums over all axes.
+
+    Parameters
+    ----------
+    window : Convex
+        What clips the lines.
+    fabric : VoidFabric
+        Measured with that window; its first moment.
+    cutoff : float
+        Dump's length unit.
+    axis : ndarray, shape (3,)
+        Loading axis.
+
+    Returns
+    -------
+    float or None
+        None if the mean length is that of no such medium.
+    """
+    if window.is_sphere:
+        return 0.0
+    shared, slope = (
+        one.reshape(fabric.axes.shape[:2])
+        for one in window.overlap(fabric.axes.reshape(-1, 3), cutoff)
+    )
+    long, whole = float((shared @ fabric.weights).sum()), float((slope @ fabric.weights).sum())
+    beyond = fabric.mean_length - cutoff
+    if beyond <= 0.0 or long <= 0.0:
+        return None
+    number = slope + (1.0 / beyond - whole / long) * shared
+    if np.any(number <= 0.0):
+        return None
+    lengths = fabric.weights * (cutoff + shared / number)
+    tensors = weighted_tensors(fabric.axes, lengths)
+    return float(np.mean(axial(tensors, axis, fabric.tensor.space)))
 
 
 def predicted_alpha(
@@ -73,7 +127,7 @@ def predicted_alpha(
     A chain of spheres that overlap along z loses gaps along z: the others are longer.
 
     >>> import numpy as np
-    >>> from scanfab.fabric.spectrum import predicted_alpha
+    >>> from scanfab.fabric.predicted import predicted_alpha
     >>> from scanfab.packing.search import NearPairs
     >>> chain = NearPairs(np.eye(3)[2:], np.array([0.02]), np.array([0.25]), np.pi / 4, 0.98)
     >>> round(predicted_alpha(chain, 0.47, 0.0, (0, 0, 1)), 4)

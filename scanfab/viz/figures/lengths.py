@@ -1,0 +1,204 @@
+"""The figures histogram and cutoffs: how long the void segments are, and what a cut-off does."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import FigureBase
+
+from scanfab.base.typing import FloatArray
+from scanfab.fabric.distribution import direction_points
+from scanfab.table.row import column_of, total_error
+from scanfab.viz.figures.figure import FrameFigure
+from scanfab.viz.figures.style import COLUMN, FRAME_LOOKS, LABELS, band, widen
+
+if TYPE_CHECKING:
+    from scanfab.viz.scanned_frames import ScannedFrame
+
+LINES = 6_000
+# in smallest radii
+CUTOFFS = (0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0)
+
+
+class OnePanel(FrameFigure):
+    """A figure of frames in one panel, which needs ``paint``; on a page its legend is above it."""
+
+    @property
+    def note(self) -> str:
+        """What stands above the legend."""
+        return ""
+
+    def paint(self, ax: Axes) -> None:
+        """Draw on one Axes, without the legend."""
+        raise NotImplementedError
+
+    def draw(self, ax: Axes) -> None:
+        """With the legend in the panel."""
+        self.paint(ax)
+        ax.legend(title=self.note or None)
+
+    def panels(self, part: FigureBase) -> list[Axes]:
+        """One panel, with the legend above it."""
+        axes = part.subplots()
+        self.paint(axes)
+        part.legend(loc="outside upper left", title=self.note or None)
+        return [axes]
+
+
+class LengthSample(NamedTuple):
+    """One frame: void segments, in units of the smallest radius."""
+
+    title: str
+    length: FloatArray
+    cutoff: float
+
+
+class Histogram(OnePanel):
+    """
+    Lengths of the void segments, with the cut-off; an outline for each frame.
+
+    Parameters
+    ----------
+    data : ScannedFrames
+        Of :func:`scanfab.scan_frames`.
+    frame : int, optional
+        The number of a frame, to draw that one alone.
+
+    Raises
+    ------
+    SettingsError
+        If there is nothing to draw.
+    """
+
+    order = 6
+    size = (COLUMN, 3.2)
+    drawn, more = "Lengths of the void segments", "; those below the cut-off are dropped"
+
+    @cached_property
+    def samples(self) -> list[LengthSample]:
+        """What is drawn of each frame."""
+        return [_lengths_of(one) for one in self.chosen(self.data.frames)]
+
+    def paint(self, ax: Axes) -> None:
+        """Density of the lengths; those below the cut-off are on grey."""
+        longest = max(float(np.quantile(sample.length, 0.999)) for sample in self.samples)
+        edges = np.linspace(0, longest, 41)
+        for sample, look in zip(self.samples, FRAME_LOOKS, strict=False):
+            density, _ = np.histogram(sample.length, edges, density=True)
+            dropped = 100 * np.mean(sample.length < sample.cutoff)
+            style: dict[str, Any] = {"color": look["color"], "ls": look["ls"], "lw": 1.1}
+            label = f"{sample.title}:\n{dropped:.0f} % dropped"
+            ax.stairs(density, edges, baseline=None, label=label, **style)
+        cutoff = self.samples[-1].cutoff
+        ax.axvspan(0, cutoff, color="0.92", zorder=0)
+        ax.axvline(cutoff, color="k", lw=0.9, ls=":", label="cut-off")
+        ax.set(yscale="log", xlim=(0, longest), ylabel="probability density")
+        ax.set(xlabel=r"void segment length / $r_{min}$")
+
+
+def _lengths_of(frame: ScannedFrame) -> LengthSample:
+    """Segments of some tens of thousands on lines in even directions."""
+    # compiled kernels, which those who draw something else do without
+    from scanfab.scan.lines import line_triads
+    from scanfab.scan.segments import sample_segments
+
+    points, _ = direction_points(frame.space)
+    some = points[: len(points) // 2 : 5 if frame.space.is_plane else 20]
+    triads = line_triads(some, frame.space)
+    position, radius, window = frame.spheres
+    found = sample_segments(position, radius, triads, LINES, window, frame.space)
+    length, cutoff = found.length[found.void], frame.measurement.plan.cutoff
+    return LengthSample(frame.title, length / frame.smallest, cutoff / frame.smallest)
+
+
+class CutoffCurve(NamedTuple):
+    """One frame: anisotropy over the cut-off, which is in units of the smallest radius."""
+
+    title: str
+    cutoff: FloatArray
+    alpha: FloatArray
+    """alpha_vs_axial, dimensionless."""
+    error: FloatArray
+    """The scan's part of its standard error."""
+    total: FloatArray
+    """Its standard error, of scan and sample together; NaN where either is not known."""
+    chosen: float
+    predicted: FloatArray
+    """alpha_vs_axial as the contacts predict it; NaN where they do not."""
+
+
+class Cutoffs(OnePanel):
+    """
+    Void anisotropy over the cut-off, along the lines of the table; a curve for each frame.
+
+    Bands are total standard errors, bars the scan's part.
+
+    Parameters
+    ----------
+    data : ScannedFrames
+        Of :func:`scanfab.scan_frames`.
+    frame : int, optional
+        The number of a frame, to draw that one alone.
+
+    Raises
+    ------
+    SettingsError
+        If there is nothing to draw.
+    """
+
+    order = 7
+    slow = True
+    size = (COLUMN, 3.4)
+    drawn = "Void anisotropy along the loading axis over the cut-off"
+    more = ", with total standard errors"
+
+    @cached_property
+    def curves(self) -> list[CutoffCurve]:
+        """What is drawn of each frame."""
+        return [_curve_of(one) for one in self.chosen(self.data.with_lines_of_table)]
+
+    @property
+    def note(self) -> str:
+        """What bands and bars are."""
+        hole = any((np.isfinite(one.alpha) & ~np.isfinite(one.total)).any() for one in self.curves)
+        without = "\n(none where either is not known)" if hole else ""
+        return f"bands: one total standard error, scan and sample{without}\nbars: the scan's part"
+
+    def paint(self, ax: Axes) -> None:
+        """A curve for each frame, and the cut-off of the table."""
+        for one, look in zip(self.curves, FRAME_LOOKS, strict=False):
+            band(ax, one.cutoff, 1e3 * one.alpha, 1e3 * one.total, look)
+            error = 1e3 * np.nan_to_num(one.error)
+            ax.errorbar(one.cutoff, 1e3 * one.alpha, error, label=one.title, elinewidth=0.9, **look)
+            ax.plot(one.cutoff, 1e3 * one.predicted, color=look["color"], lw=1.2, ls="-.")
+        if any(np.isfinite(one.predicted).any() for one in self.curves):
+            ax.plot([], [], color="0.3", lw=1.2, ls="-.", label="predicted from near contacts")
+        ax.axvline(self.curves[-1].chosen, color="k", lw=0.9, ls=":", label="cut-off of the table")
+        ax.axhline(0, color="0.6", lw=0.6, zorder=0)
+        ax.set(xlabel=r"cut-off / $r_{min}$", ylabel=LABELS["alpha_vs_axial"])
+        widen(ax, 1.0)
+
+
+def _curve_of(frame: ScannedFrame) -> CutoffCurve:
+    """The lines of the table at other cut-offs, and at its own."""
+    # compiled kernels, which those who draw something else do without
+    from scanfab.packing.sample import VARIANTS
+    from scanfab.pipeline.variant_columns import VariantColumns
+
+    smallest, chosen = frame.smallest, frame.measurement.plan.cutoff
+    lengths = {*(cutoff * smallest for cutoff in CUTOFFS), chosen}
+    measured, variant = frame.measurement.at_cutoffs(lengths), VARIANTS[frame.variant]
+    each = [VariantColumns(measured, variant, place) for place in range(len(lengths))]
+    rows = [{**one.columns(), "predicted": one.predicted_alpha} for one in each]
+    return CutoffCurve(
+        frame.title,
+        cutoff=column_of(rows, "cutoff") / smallest,
+        alpha=column_of(rows, "alpha_vs_axial"),
+        error=column_of(rows, "alpha_vs_axial_se"),
+        total=np.array([total_error(row, "alpha_vs_axial") for row in rows], np.float64),
+        chosen=chosen / smallest,
+        predicted=column_of(rows, "predicted"),
+    )

@@ -1,0 +1,117 @@
+"""What cannot be: one message and the exit code, nothing printed, and no file touched."""
+
+from __future__ import annotations
+
+import os
+import shlex
+
+import pytest
+
+from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.truth import SAMPLE_DATA, TRIAXIAL
+
+DISCS = SAMPLE_DATA / "lammps_biaxial" / "discs.0.lammpstrj.gz"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Where the commands run: two series of 64 grains in a cube, and a result of earlier days."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("cube", "other"):
+        (tmp_path / name).mkdir()
+        write(tmp_path / name / "dump_0.txt", dump_text(cubic_rows(), box=((0, 4),) * 3))
+    write(tmp_path / "out.csv", "precious")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("line", "code", "message"),
+    [
+        # words
+        ("computee", 2, "No such command 'computee'. Did you mean 'compute'?"),
+        ("nonsense", 2, "No such command 'nonsense'. Choose from compute, merge, compare, inspect"),
+        ("compute nowhere", 2, "nowhere: there is no such file, folder or glob"),
+        ("inspect 'other_*.txt'", 2, "matches nothing"),
+        ("compute -", 2, "standard input needs --format"),
+        ("compute - . --format table", 2, "of its own"),
+        ("compute cube --tolerence 1", 2, "No such option '--tolerence'"),
+        ("compute cube --seed x", 2, "'--seed': 'x' is not a valid integer"),
+        # values of options
+        ("compute cube --variants xyz", 2, "--variants: expected letters out of abcd, found 'xyz'"),
+        ("compute cube --cutoff 1foo", 2, "--cutoff: expected a length"),
+        ("compute cube --spacing -1", 2, "--spacing: expected a length"),
+        ("compute cube --directions nonsense:3", 2, "--directions: no rule is called 'nonsense:3'"),
+        ("compute cube --boundary mask", 2, "--boundary: expected COLUMN=VALUE"),
+        ("compute cube --frames a:b", 2, "--frames: expected a slice"),
+        ("compute cube --format nonsense", 2, "there is no reader called 'nonsense'; the readers"),
+        ("compute cube --cell 1 2", 2, "--cell: expected three lengths"),
+        ("compute cube --columns radius", 2, "--columns: expected NAME=COLUMN"),
+        ("compute cube --columns x=1,x=2", 2, "--columns: expected one column as x"),
+        ("compute cube --follow-for -1", 2, "--follow-for"),
+        ("compute cube --rv -1 -o out.csv", 2, "--rv: expected a fraction above 0"),
+        ("compute cube --rv-shape none.stl", 2, "surface that exists (.stl .vtp .ply .obj)"),
+        ("compute cube --rv-follows sand", 2, "--rv-follows: expected none or strain"),
+        ("compute cube --rv-shape box --rv-size 1,2", 2, "--rv-size: expected A,B,C, full edges"),
+        ("compute cube --rv-size 1,2,3", 2, "takes none: choose --rv-radius"),
+        ("compute cube --rv-shape box --rv-radius 2", 2, "--rv-radius: has no meaning if"),
+        ("compute cube --rv-axis x", 2, "leave out --rv-axis, or choose --rv-shape cylinder"),
+        ("map cube --slices two", 2, "two"),
+        ("map cube --slices -1", 2, "--slices: expected 1 or more, found"),
+        ("map cube --slices 2 --with state", 2, "No such option '--with'"),
+        ("map cube", 2, "just one of --grid, --slices and --shells, found none"),
+        ("map cube --grid 2,2", 2, "three numbers of blocks, such as 4,4,8, found '2,2'"),
+        ("map cube --slices 2 --rv 0.4,0.6 --variants c", 2, "--rv: expected one size"),
+        ("calibrate cube --tolerance 0", 2, "tolerance: expected a number above 0"),
+        ("view cube --rv -1 --screenshot x.png", 2, "rv: expected a fraction above 0"),
+        # files to be written
+        ("compute cube -o table.docx", 2, "results can be written as .csv"),
+        ("compute cube -o nowhere/table.csv", 2, "there is no folder nowhere to write to"),
+        ("compute cube --digits 0 -o out.csv", 2, "--digits: expected"),
+        ("compute cube --fields frame,alpha_v", 2, "no column 'alpha_v': did you mean alpha_vs?"),
+        ("compute cube --resume", 2, "--resume goes with -o FILE"),
+        ("compute cube --resume -o -", 2, "--resume goes with -o FILE"),
+        ("compute cube --vtk v --scheduler tcp://x:1", 2, "--vtk is written where frames are"),
+        ("compute cube --vtk out.csv/vtk", 2, "out.csv/vtk"),
+        ("compute cube --figure rose", 2, "--figure goes with --plot FILE"),
+        ("compute cube --plot x.docx", 2, "figures can be written as .png, .svg, .pdf, not as"),
+        ("compute cube --plot nowhere/x.png", 2, "--plot: nowhere/x.png: there is no folder"),
+        ("compute cube --plot x.png --figure pie", 2, "--figure: expected evolution"),
+        ("compute cube --plot x.png --figure correlation:2", 2, "--figure: expected evolution"),
+        ("compute cube --plot x.png --figure rose:95", 2, ""),
+        ("compute cube other --plot x.png --figure rose", 2, "draws one series"),
+        ("calibrate cube --plot ladders.doc", 2, "figures can be written as .png"),
+        ("calibrate cube -o steps.doc", 2, "results can be written as .csv"),
+        ("compare out.csv --summary --differences", 2, "are two tables"),
+        ("compare nowhere.csv", 2, "nowhere.csv"),
+        ("view cube --screenshot x.jpg", 2, "screenshots are PNG files"),
+        ("view cube --screenshot nowhere/x.png", 2, "there is no folder"),
+        # what does not fit the sample
+        ("compute cube --max-chords 5", 1, "max-chords: 5 chords are fewer than"),
+        ("compute cube --spacing 50 -o out.csv", 1, "spacing: expected a length from"),
+        ("compute cube --spacing 1e-6 --directions 20", 1, "choose a wider spacing"),
+        ("compute cube --boundary mask=3", 1, "--boundary: there is no column 'mask'; the columns"),
+        ("compute cube --rv-radius 1 --rv-center 50 2 2", 1, "holds no grain"),
+        ("compute cube --rv-radius 2 --rv-center 6 2 2", 1, "beyond the sample"),
+        ("compute cube --rv 70", 1, "--rv, which is a fraction"),
+        ("map cube --grid 100,100,100", 1, "so that they are at least 4 mean radii thick"),
+        ("map cube --slices 2 --variants c --rv 1e-3", 1, "holds no grain"),
+        ("calibrate {TRIAXIAL} --frame 7 --boundary mask=3", 1, "the series has no frame in 7:8"),
+        ("calibrate {TRIAXIAL} --rv 3 --boundary mask=3", 1, "beyond the sample"),
+        ("calibrate {TRIAXIAL} --rv 0.5,0.6", 1, "nor several rv"),
+        ("calibrate {TRIAXIAL} --boundary mask=5", 1, "no particle of any frame has mask=5"),
+        ("view cube --screenshot x.png --frame 9", 1, "there is no frame 9"),
+        ("view cube --screenshot x.png --frame -5", 1, "there is no frame -5"),
+        # what is of space, of discs
+        ("compute {DISCS} --axis 0,1,1", 2, "--axis: the axis (0, 0.7071, 0.7071) leads out of"),
+        ("compute {DISCS} --directions lebedev:11", 2, "lebedev:11 is a rule of three dimensions"),
+        ("compute {DISCS} --rv-center 7 7 3", 1, "--rv-center: lies outside the plane x-y"),
+        ("map {DISCS} --grid 2,2,1", 1, "spheres in space, but all grains are discs"),
+    ],
+)
+def test_one_message_and_nothing_else(folder, ask, line, code, message):
+    files = sorted(os.walk(folder))
+    answer = ask(*shlex.split(line.format(TRIAXIAL=TRIAXIAL, DISCS=DISCS)), code=code)
+    assert message in answer.told
+    assert answer.out == ""
+    assert sorted(os.walk(folder)) == files
+    assert (folder / "out.csv").read_text() == "precious"

@@ -1,0 +1,356 @@
+"""Figures of scanned frames: which frames, and that what is drawn is what table and scan say."""
+
+from __future__ import annotations
+
+import warnings
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import scanfab
+from scanfab.base.errors import SettingsError
+from scanfab.base.space import SPACE
+from scanfab.fabric.contact import axial_error
+from scanfab.fabric.distribution import direction_points, fit_even
+from scanfab.pipeline.compute import compute_rows
+from scanfab.pipeline.settings import Settings
+from scanfab.table.row import total_error
+from scanfab.viz.figures.lengths import CutoffCurve, Cutoffs
+from scanfab.viz.figures.page import drawn_page, find_figure, make_figures, save_figures
+from scanfab.viz.figures.projection import (
+    contact_noise,
+    noise_note,
+    places_of,
+    smoothed_density,
+    void_noise,
+)
+from scanfab.viz.figures.rose import contact_ring
+from scanfab.viz.scanned_frames import ScannedFrames
+from tests.conftest import ROOT, SAMPLE
+from tests.helpers.figures import BYTES, row_of
+
+pytestmark = pytest.mark.filterwarnings("ignore:skipped:scanfab.base.errors.ScanfabNote")
+WORDS = {"boundary": "mask=3", "tolerance": 5e-4}
+DENSITY = places_of(SPACE)[1][::8, ::12]
+
+
+@pytest.fixture(scope="module")
+def scanned(computed):
+    """The first and the last frame, scanned once for all tests."""
+    with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
+        warnings.simplefilter("ignore", scanfab.ScanfabNote)
+        patch.chdir(ROOT)
+        frames = ScannedFrames(scanfab.read_series(SAMPLE), Settings(**WORDS), computed.rows)
+        assert len(frames.frames) == len(frames.with_lines_of_table) == 2
+        yield frames
+
+
+def figure_of(frames, name):
+    (figure,) = make_figures(frames, "frames", name)
+    return figure
+
+
+def unit_vectors(rng, *shape):
+    vectors = rng.standard_normal((*shape, 3))
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def test_every_figure_of_the_sample_is_drawn(scanned, tmp_path):
+    for figure, suffix in zip(make_figures(scanned, "frames"), [*BYTES, ".png"], strict=True):
+        path = tmp_path / f"figure{suffix}"
+        save_figures(path, [figure])
+        assert path.read_bytes().startswith(BYTES[suffix])
+        assert scanned.name in figure.caption
+        assert figure.caption.endswith(".")
+        with drawn_page([figure]) as page:
+            titles = [axes.get_title(loc="left") for axes in page.axes[:4]]
+        if figure.lettered:
+            assert [title[:3] for title in titles] == ["(a)", "(b)", "(c)", "(d)"]
+            assert all("variant c, frame " in title for title in titles)
+        else:
+            assert titles == [""]
+
+
+def test_titles_name_variant_frame_and_strain_and_rows_are_the_table_s(scanned, computed):
+    for number, alone, frame in zip(
+        (0, 6), scanned.frames, scanned.with_lines_of_table, strict=True
+    ):
+        row = row_of(computed, number)
+        title = rf"variant c, frame {number}, $\varepsilon_a$ = {100 * row['strain']:.3g} %"
+        assert alone.title == frame.title == title
+        assert dict(frame.row) == row
+
+
+def test_frames_are_scanned_once_for_all_figures_and_when_one_needs_them(
+    series, computed, monkeypatch
+):
+    """Both in one pass, so that the frame that fixes all lengths is not read for each of them."""
+    asked = []
+
+    def remember(source, settings, **more):
+        asked.append(settings.frames)
+        return compute_rows(source, settings, **more)
+
+    monkeypatch.setattr("scanfab.viz.scanned_frames.compute_rows", remember)
+    frames = ScannedFrames(series, Settings(**WORDS), computed.rows)
+    assert repr(frames) == f"ScannedFrames(variant c of {SAMPLE}, frames 0 and 6)"
+    assert not asked
+    for _ in range(2):
+        for name in ("histogram", "projection"):
+            getattr(frames.plot, name)(ax=Figure().subplots())
+    assert asked == [slice(0, 7, 6)]
+
+
+@pytest.mark.parametrize(
+    ("strain", "told"), [(lambda _: 0.0, ("", "")), (lambda k: 0.01 * k, ("0", "6"))]
+)
+def test_the_strain_of_a_title_is_that_of_the_table(series, computed, tmp_path, strain, told):
+    """The file that it came from may have lost a frame since; one strain for all is none."""
+    strains = tmp_path / "strain.csv"
+    strains.write_text("frame,strain\n0,0.5\n")
+    settings = Settings(**{**WORDS, "tolerance": 3e-3}, strain=str(strains))
+    rows = [{**row, "strain": strain(row["frame"])} for row in computed.rows]
+    for one, number, value in zip(
+        ScannedFrames(series, settings, rows).frames, (0, 6), told, strict=True
+    ):
+        end = rf", $\varepsilon_a$ = {value} %" if value else ""
+        assert one.title == f"variant c, frame {number}{end}"
+
+
+def test_a_notebook_scans_frames_by_the_options_of_compute(series, computed):
+    """With the table its frames and strains; without one the first and the last frame."""
+    table = scanfab.load(computed.table)
+    other = [{**row, "source": "other", "frame": 99} for row in computed.rows]
+    for more in ({"table": table}, {}, {"table": [*other, *computed.rows]}):
+        frames = scanfab.scan_frames(series, **more, **WORDS)
+        assert repr(frames) == f"ScannedFrames(variant c of {SAMPLE}, frames 0 and 6)"
+    middle = scanfab.scan_frames(series, **WORDS, frames="2:4", variants="b")
+    assert repr(middle) == f"ScannedFrames(variant b of {SAMPLE}, frames 2 and 3)"
+    (frame,) = scanfab.scan_frames(series, **WORDS, frames=6).frames
+    assert frame.title.startswith(r"variant c, frame 6, $\varepsilon_a$ = 15")
+    with pytest.raises(TypeError, match="scan_frames has no option 'tolerence': did you mean"):
+        scanfab.scan_frames(series, tolerence=1e-3)
+    rows = [{**row, "alpha_vs_axial": None} for row in computed.rows]
+    with pytest.raises(SettingsError, match="no frame has a void fabric of variant c"):
+        ScannedFrames(series, Settings(**WORDS), rows)
+
+
+def test_all_panels_are_drawn_on_the_figure_that_they_get(scanned):
+    page = Figure(figsize=(12, 6))
+    left, right = page.subfigures(1, 2)
+    assert scanned.plot.projection(left) is left
+    assert scanned.plot.histogram(right) is right
+    # four disks, the scales of both columns, and the histogram
+    assert len(page.axes) == 7
+    alone = Figure()
+    scanned.plot.projection(alone, frame=6, of="voids")
+    assert [axes.get_title(loc="left")[:20] for axes in alone.axes] == ["(a) mean void length", ""]
+
+
+def test_one_panel_is_drawn_on_the_axes_that_it_gets(scanned):
+    """The last frame, or the one that is asked for; a rose on polar Axes only."""
+    plot, polar = scanned.plot, {"subplot_kw": {"projection": "polar"}}
+    ax = Figure().subplots(**polar)
+    assert plot.rose(ax=ax, angles=(90,), of="contacts", frame=0) is ax
+    assert ax.get_title().startswith("contact normals\nvariant c, frame 0")
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert texts == [r"polar angle $\varphi=90^\circ$"]
+    page = Figure()
+    assert plot.projection(ax=page.subplots(), of="contacts") is page.axes[0]
+    assert page.axes[0].get_title().startswith("contact normals\nvariant c, frame 6")
+    # beside it the scale
+    assert page.axes[1].get_ylabel() == "deviation from the mean in %"
+    for error, message, words in (
+        (SettingsError, r"figure: expected one to four .*found \(95,\)", {"angles": (95,)}),
+        (SettingsError, "frame: expected 0 and 6, found 3", {"frame": 3}),
+        (SettingsError, "of: expected voids or contacts, found 'void'", {"of": "void"}),
+        (TypeError, "the figure rose has no option 'angel': did you mean", {"angel": (90,)}),
+    ):
+        with pytest.raises(error, match=message):
+            plot.rose(ax=ax, **words)
+    with pytest.raises(SettingsError, match="ax: expected polar Axes, found rectilinear: make"):
+        plot.rose(ax=Figure().subplots())
+
+
+@pytest.mark.parametrize("text", ["rose:", "rose:0", "rose:91", "rose:x", "rose:1,2,3,4,5"])
+def test_angles_that_cannot_be_are_an_error(text):
+    with pytest.raises(SettingsError, match=f"figure: expected one to four .*'{text}'"):
+        find_figure(text, "frames")
+
+
+def test_the_rose_is_longer_near_the_axis_and_its_legend_tells_its_circles(scanned):
+    """The values of the rings are read off the page."""
+    angles = (20, 90)
+    with drawn_page([figure_of(scanned, "rose:20,90")]) as page:
+        ends = [line for line in page.axes[2].lines if line.get_marker() not in ("None", "_")]
+        steep, flat = (line.get_ydata() for line in ends)
+        assert steep.min() > 1.0 > flat.max()
+        assert len(flat) == len(steep) == 25
+        assert flat[:12] == pytest.approx(flat[12:24])
+        first = next(line for line in page.axes[0].lines if line.get_marker() not in ("None", "_"))
+        assert np.abs(first.get_ydata() - 1).max() < 0.05
+        contacts = [line for line in page.axes[3].lines if line.get_marker() not in ("None", "_")]
+        assert contacts[0].get_ydata().mean() > 1.1
+        assert contacts[1].get_ydata().mean() < 0.9
+        legend = page.legends[0]
+        named = [handle.get_color() for handle in legend.legend_handles]
+        assert named == [line.get_color() for line in ends]
+        texts = [text.get_text() for text in legend.get_texts()]
+        assert texts == [rf"polar angle $\varphi={phi}^\circ$" for phi in angles]
+        for axes, side in zip(page.axes[2:], ("left", "right"), strict=True):
+            assert not any(label.get_text() for label in axes.get_yticklabels())
+            (low, high), ticks = axes.get_ylim(), axes.get_yticks()
+            assert all(low < tick < high for tick in ticks)
+            said = f"{', '.join(f'{tick:g}' for tick in ticks)} about {low:.3g} ({side})"
+            assert said in legend.get_title().get_text()
+            # no value is cut, nor its bar
+            bars = [end for one in axes.collections for end in one.get_segments()]
+            assert max(end[:, 1].max() for end in bars) < high
+
+
+def test_a_polar_angle_has_one_colour_in_all_figures(scanned):
+    def colours(*angles):
+        looks = figure_of(scanned, f"rose:{','.join(map(str, angles))}").looks
+        return {phi: look["color"] for phi, look in looks.items()}
+
+    usual = colours(90, 60, 30)
+    assert colours(30, 60, 90) == usual
+    assert colours(30) == {30: usual[30]}
+    for angles in ((20, 30, 45, 90), (10, 20, 40, 50)):
+        found = colours(*angles)
+        assert len(set(found.values())) == 4
+        assert all(found[phi] == usual[phi] for phi in found if phi in usual)
+
+
+def test_rings_and_density_of_isotropic_normals_are_one():
+    normals = unit_vectors(np.random.default_rng(0), 200_000)
+    for phi in (30.0, 90.0):
+        ring = contact_ring(normals, phi)
+        assert np.all(np.abs(ring.value - 1) < 5 * ring.error)
+        assert ring.value.mean() == pytest.approx(1, abs=0.02)
+        assert ring.curve(ring.theta) == pytest.approx(1, abs=0.02)
+    assert smoothed_density(normals, DENSITY) == pytest.approx(1, abs=0.02)
+
+
+def test_the_disk_is_equal_area():
+    places, directions = places_of(SPACE)
+    assert np.linalg.norm(directions, axis=-1) == pytest.approx(1)
+    # the cap within polar angle p has the share 1 - cos p of the hemisphere, as of the disk
+    rho = np.linalg.norm(places, axis=-1)
+    assert rho**2 == pytest.approx(1 - directions[..., 2], abs=1e-12)
+
+
+def test_the_projection_is_the_distribution(scanned, computed):
+    first, last = figure_of(scanned, "projection").deviations
+    voids = last["voids"]
+    # in the middle is z, along which the sample was compressed
+    assert voids[0, 0] > 4 > np.abs(first["voids"][0, 0])
+    assert voids[-1].max() < -1
+    assert last["contacts"][0, 0] > 10
+    # second harmonic of the fabric tensor: mean of (l/mean - 1)(3 z^2 - 1)/2 is alpha_vs_axial
+    _, n = places_of(SPACE)
+    weight = np.repeat(np.linspace(0, 1, n.shape[0])[:, None], n.shape[1] - 1, axis=1)
+    value = np.average(0.01 * voids[:, :-1] * (1.5 * n[:, :-1, 2] ** 2 - 0.5), weights=weight)
+    assert value == pytest.approx(row_of(computed, 6)["alpha_vs_axial"], rel=0.05)
+
+
+def test_the_noise_of_the_scan_is_that_of_fits_to_noise():
+    """Mean lengths that differ from line to line alone, fitted as those of a scan are."""
+    rng = np.random.default_rng(1)
+    points, weights = direction_points()
+    second = 1.5 * points[:, 2] ** 2 - 0.5
+    alphas, deviations = [], []
+    for _ in range(25):
+        axes = unit_vectors(rng, 150)
+        fitted = fit_even(axes, 1 + 0.1 * rng.standard_normal(150), np.ones(150))
+        deviation = fitted(points) / (weights @ fitted(points)) - 1
+        alphas.append(weights @ (deviation * second))
+        deviations.append(deviation)
+    row = {"alpha_vs_axial_se": float(np.std(alphas)), "alpha_vs_axial_sample_se": 0.0}
+    assert void_noise(row) == pytest.approx(100 * np.std(deviations), rel=0.25)
+
+
+def test_the_noise_of_contacts_is_that_of_isotropic_ones():
+    rng = np.random.default_rng(2)
+    deviations = [smoothed_density(unit_vectors(rng, 500), DENSITY) - 1 for _ in range(40)]
+    alone = axial_error(unit_vectors(rng, 500), (0, 0, 1))
+    row = {"contacts": 500, "alpha_c_axial_se": alone}
+    noise = contact_noise({**row, "alpha_c_axial_sample_se": alone})
+    assert noise == pytest.approx(100 * np.std(deviations), rel=0.1)
+    # as neighbours are not independent, less of it is chance
+    half = contact_noise({**row, "alpha_c_axial_sample_se": 0.5 * alone})
+    assert half == pytest.approx(0.5 * noise)
+
+
+@pytest.mark.parametrize(("largest", "end"), [(1.0, "so they are noise."), (4.0, "is 1 %.")])
+def test_lobes_below_the_noise_are_called_so(largest, end):
+    deviations = {"voids": np.array([-largest, 0.5]), "contacts": None}
+    row = {"alpha_vs_axial_se": 0.0, "alpha_vs_axial_sample_se": 2e-3}
+    text = noise_note(SimpleNamespace(space=SPACE, row=row, number=3), deviations)
+    start = f"Frame 3: lobes of void lengths reach {largest:g} %, one standard error is 1 %"
+    assert text.startswith(start)
+    assert text.endswith(end)
+    row["alpha_vs_axial_sample_se"] = None
+    assert noise_note(SimpleNamespace(space=SPACE, row=row, number=3), deviations) == ""
+
+
+def test_lengths_have_the_mean_of_the_table(scanned, computed):
+    samples = figure_of(scanned, "histogram").samples
+    for sample, frame in zip(samples, (0, 6), strict=True):
+        row = row_of(computed, frame)
+        kept = sample.length[sample.length >= sample.cutoff]
+        assert len(sample.length) > 10_000
+        assert kept.mean() == pytest.approx(row["mean_length"] / row["cutoff"], rel=0.03)
+
+
+def test_cut_offs_have_the_values_and_errors_of_the_table(scanned, computed):
+    """At the cut-off of the table what it says there, to the last digit but for rounding."""
+    for curve, frame in zip(figure_of(scanned, "cutoffs").curves, (0, 6), strict=True):
+        row = row_of(computed, frame)
+        (place,) = np.flatnonzero(curve.cutoff == 1.0)
+        assert curve.chosen == pytest.approx(1.0)
+        assert curve.alpha[place] == pytest.approx(row["alpha_vs_axial"], rel=1e-9)
+        assert curve.error[place] == pytest.approx(row["alpha_vs_axial_se"], rel=1e-9)
+        total = total_error(row, "alpha_vs_axial")
+        assert curve.total[place] == pytest.approx(total, rel=1e-9)
+        assert np.all(curve.total > curve.error)
+    ax = Figure().subplots()
+    assert scanned.plot.cutoffs(ax=ax, frame=6) is ax
+    at = next(line for line in ax.lines if len(line.get_xdata()) > 2)
+    assert at.get_ydata()[place] == pytest.approx(1e3 * row["alpha_vs_axial"])
+    assert "bands: one total standard error" in ax.get_legend().get_title().get_text()
+
+
+@pytest.mark.filterwarnings("ignore:frame .* above the tolerance:scanfab.ScanfabWarning")
+def test_figures_have_the_moment_of_the_table(series):
+    """The mean of the squares over the mean is far more anisotropic than the mean."""
+    words = {**WORDS, "moment": 2, "variants": "c"}
+    rows = [dict(scanfab.compute(series, **words, frames=str(one))[0]) for one in (0, 6)]
+    curves = figure_of(ScannedFrames(series, Settings(**words), rows), "cutoffs").curves
+    for curve, row in zip(curves, rows, strict=True):
+        (place,) = np.flatnonzero(curve.cutoff == 1.0)
+        near = 4 * np.hypot(curve.error[place], row["alpha_vs_axial_se"])
+        assert abs(curve.alpha[place] - row["alpha_vs_axial"]) < near
+
+
+def test_a_rough_scan_has_its_bands_and_its_own_cut_off_and_tells_nothing(series, computed):
+    """Nor is it told that errors grow with the cut-off, which is what the figure shows."""
+    settings = Settings(boundary="mask=3", tolerance=1e-3, cutoff="0.8rmin")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", scanfab.ScanfabWarning)
+        curves = figure_of(ScannedFrames(series, settings, computed.rows), "cutoffs").curves
+    for curve in curves:
+        assert np.all(curve.total > curve.error)
+        assert curve.chosen in curve.cutoff
+
+
+def test_a_cut_off_without_a_total_error_is_told():
+    values = np.array([1.0, 2.0, 3.0])
+    for total, told in ((values, False), (np.array([1.0, np.nan, 3.0]), True)):
+        figure = Cutoffs(None)
+        figure.curves = [CutoffCurve("one", values, values, values, total, 1.0, values)]
+        with drawn_page([figure]) as page:
+            note = page.legends[0].get_title().get_text()
+        assert ("(none where either is not known)" in note) == told
