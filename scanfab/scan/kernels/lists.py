@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.jit import LANES, REORDERED, inner
+from scanfab.base.jit import LANES, ONE, REORDERED, ZERO, inner
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.bins import add_gaps, list_gap, room_for_gaps
 from scanfab.scan.kernels.grid import Spheres, sphere_at
@@ -27,6 +27,7 @@ from scanfab.scan.kernels.strips import (
     GAP_END,
     GAP_START,
     SET,
+    Line,
     Strip,
     Task,
     span,
@@ -59,6 +60,10 @@ LEAST_REACH2 = 1e-300
 # gaps to be put in bins together
 TOGETHER = 512
 ALMOST = np.uint64(TOGETHER - ROOM)
+
+# where a chord starts and stops; the solid's end on a line, and where its last gap starts and ends
+Chord = tuple[float, float]
+State = tuple[float, float, float]
 
 
 class Lists(NamedTuple):
@@ -188,54 +193,67 @@ def sweep_lists(task: Task, lists: Lists) -> None:
 
 
 @inner(forceinline=True, error_model="numpy")
-def list_gaps(
-    task: Task, lists: Lists, row: int, column: int, which: int, gaps: FloatArray, count: np.uint64
-) -> np.uint64:
-    """Sweep a line over its list, and list the gaps that this settles; returns their number."""
+def list_settled(
+    task: Task,
+    k: np.uint64,
+    line: Line,
+    chord: Chord,
+    state: State,
+    gaps: FloatArray,
+    count: np.uint64,
+) -> tuple[State, np.uint64]:
+    """
+    Let a line meet a chord, and list the gap that this settles; returns its state and their number.
+
+    ``k`` is where the line's state begins. A chord of NaN settles none.
+    """
     lines, counts = task.lines, task.counts
-    number = row * task.strip.pitch + column
-    i = np.uint64(number)
-    k = i + SET * np.uint64(which)
-    enters, leaves = lines[i + ENTRY], lines[i + EXIT]
-    line = task.strip.first_u + column * task.strip.spacing, 0.0, enters, leaves
-    end, low, high = lines[k + END], lines[k + GAP_START], lines[k + GAP_END]
-    for place in range(first_place(number), lists.stop[i], NEXT):
-        depth, reach2 = lists.chords[np.uint64(place)], lists.chords[np.uint64(place + ABREAST)]
-        half_chord = np.sqrt(abs(reach2))
-        # NaN: the sphere is not in the second set of solids
-        half_chord = half_chord if which == 0 or reach2 > 0.0 else np.nan
-        start, stop = depth - half_chord, depth + half_chord
-        first, is_met = low, is_listed(start, enters, counts)
-        if counts.window is not None and counts.window.start is not None:
-            met_beyond(lines, k, start, stop, enters, leaves)
-            is_met = reaches_in(start, stop, enters, leaves)
-            first = begins_at(low, lines[k + BEFORE])
-        if is_met:
-            # listed anyhow, as chords are
-            list_gap(gaps, count, line, first, high, counts)
-            count += np.uint64((start > end) & (high - first >= counts.least))
-            end, low, high = moved(start, stop, end, low, high)
-    lines[k + END], lines[k + GAP_START], lines[k + GAP_END] = end, low, high
-    return count
+    (start, stop), (end, low, high), (_, _, enters, leaves) = chord, state, line
+    first, is_met = low, is_listed(start, enters, counts)
+    if counts.window is not None and counts.window.start is not None:
+        met_beyond(lines, k, start, stop, enters, leaves)
+        is_met = reaches_in(start, stop, enters, leaves)
+        first = begins_at(low, lines[k + BEFORE])
+    if is_met:
+        # listed anyhow, as chords are
+        list_gap(gaps, count, line, first, high, counts)
+        count += np.uint64((start > end) & (high - first >= counts.least))
+        state = moved(start, stop, end, low, high)
+    return state, count
 
 
 @inner(error_model="numpy")
 def bin_lists(task: Task, lists: Lists) -> None:
     """Sweep the lines of a strip over their lists, put the gaps in bins, and empty the lists."""
-    strip, counts = task.strip, task.counts
-    gaps, met = room_for_gaps(TOGETHER), 0
+    lines, strip, counts, stops = task.lines, task.strip, task.counts, lists.stop
+    gaps, gaps2, met = room_for_gaps(TOGETHER), room_for_gaps(TOGETHER), 0
     for row in range(strip.rows):
-        v = strip.first_v + row * strip.spacing
-        for which in range(1 if counts.second is None else 2):
-            count = np.uint64(0)
-            for column in range(strip.columns):
-                count = list_gaps(task, lists, row, column, which, gaps, count)
-                if count >= ALMOST or column == strip.columns - 1:
-                    add_gaps(task.bins, counts, gaps, count, 1.0, which, v)
-                    count = np.uint64(0)
-        for line in range(row * strip.pitch, row * strip.pitch + strip.columns):
-            met += (lists.stop[line] - first_place(line)) // NEXT
-            lists.stop[line] = first_place(line)
+        v, count, count2 = strip.first_v + row * strip.spacing, np.uint64(0), np.uint64(0)
+        for column in range(strip.columns):
+            number = row * strip.pitch + column
+            i, i2 = np.uint64(number), np.uint64(number) + SET
+            line = strip.first_u + column * strip.spacing, v, lines[i + ENTRY], lines[i + EXIT]
+            state = lines[i + END], lines[i + GAP_START], lines[i + GAP_END]
+            state2 = lines[i2 + END], lines[i2 + GAP_START], lines[i2 + GAP_END]
+            for place in range(first_place(number), stops[i], NEXT):
+                depth, reach2 = (
+                    lists.chords[np.uint64(place)],
+                    lists.chords[np.uint64(place + ABREAST)],
+                )
+                half_chord = np.sqrt(abs(reach2))
+                chord = depth - half_chord, depth + half_chord
+                state, count = list_settled(task, i, line, chord, state, gaps, count)
+                if counts.second is not None and reach2 > 0.0:
+                    state2, count2 = list_settled(task, i2, line, chord, state2, gaps2, count2)
+            lines[i + END], lines[i + GAP_START], lines[i + GAP_END] = state
+            if counts.second is not None:
+                lines[i2 + END], lines[i2 + GAP_START], lines[i2 + GAP_END] = state2
+            met += (stops[i] - first_place(number)) // NEXT
+            stops[i] = first_place(number)
+            if count >= ALMOST or count2 >= ALMOST or column == strip.columns - 1:
+                add_gaps(task.bins, counts, gaps, count, 1.0, ZERO, v)
+                add_gaps(task.bins, counts, gaps2, count2, 1.0, ONE, v)
+                count = count2 = np.uint64(0)
     task.tally[0, CHORDS] += met
 
 

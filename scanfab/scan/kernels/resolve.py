@@ -28,6 +28,7 @@ from scanfab.scan.kernels.strips import (
     Edge,
     Line,
     Measured,
+    Sphere,
     Task,
     span,
 )
@@ -63,6 +64,42 @@ def closed_lines(task: Task, which: int, closed: int) -> tuple[IntArray, IntArra
     return first, column_of
 
 
+@inner(forceinline=True, error_model="numpy")
+def cut(
+    task: Task,
+    sphere: Sphere,
+    first: IntArray,
+    column_of: IntArray,
+    stop: IntArray,
+    chords: FloatArray,
+) -> int:
+    """
+    List the chords that a sphere cuts from closed lines; with no room, count them.
+
+    Line k's chords are counted in ``stop[k + 2]``; its list ends at ``stop[k + 1]``. Returns the
+    number of chords.
+    """
+    strip, met = task.strip, 0
+    rows = span(sphere.v, sphere.radius, strip.first_v, strip.per_spacing, 0, strip.rows)
+    for row in range(rows[0], rows[1]):
+        dv = strip.first_v + row * strip.spacing - sphere.v
+        reach2 = sphere.radius * sphere.radius - dv * dv
+        for line in range(first[row], first[row + 1]):
+            du = strip.first_u - sphere.u + column_of[line] * strip.spacing
+            rest2 = reach2 - du * du
+            if not rest2 >= 0.0:
+                continue
+            met += 1
+            if chords.size > 0:
+                place, half_chord = stop[line + 1], np.sqrt(rest2)
+                chords[0, place] = sphere.depth - half_chord
+                chords[1, place] = sphere.depth + half_chord
+                stop[line + 1] += 1
+            else:
+                stop[line + 2] += 1
+    return met
+
+
 @inner(error_model="numpy")
 def chords_of(
     task: Task, spheres: Spheres, chosen: IntArray, which: int, first: IntArray, column_of: IntArray
@@ -73,33 +110,18 @@ def chords_of(
     Returns the start of each line's list (and the end of the last), and where chords start and
     stop, shape (2, M).
     """
-    strip = task.strip
     stop, chords = np.zeros(column_of.size + 2, np.int64), np.empty((2, 0))
-    # first they are counted; where lists begin while they are filled, they end at last
-    for fill in range(2):
-        for k in chosen:
-            if which == 1 and spheres.removed[k]:
-                continue
-            sphere = sphere_at(spheres, k)
-            from_u = strip.first_u - sphere.u
-            rows = span(sphere.v, sphere.radius, strip.first_v, strip.per_spacing, 0, strip.rows)
-            for row in range(rows[0], rows[1]):
-                dv = strip.first_v + row * strip.spacing - sphere.v
-                reach2 = sphere.radius * sphere.radius - dv * dv
-                for line in range(first[row], first[row + 1]):
-                    du = from_u + column_of[line] * strip.spacing
-                    rest2 = reach2 - du * du
-                    if not rest2 >= 0.0:
-                        continue
-                    if fill:
-                        place, half_chord = stop[line + 1], np.sqrt(rest2)
-                        chords[0, place] = sphere.depth - half_chord
-                        chords[1, place] = sphere.depth + half_chord
-                    stop[line + (1 if fill else 2)] += 1
-        if not fill:
-            for line in range(2, stop.size):
-                stop[line] += stop[line - 1]
-            chords = np.empty((2, stop[-1]))
+    hit, hits = np.empty_like(chosen), 0
+    for k in chosen:
+        if which == 0 or not spheres.removed[k]:
+            hit[hits] = k
+            hits += cut(task, sphere_at(spheres, k), first, column_of, stop, chords) > 0
+    for line in range(2, stop.size):
+        stop[line] += stop[line - 1]
+    chords = np.empty((2, stop[-1]))
+    # where a list begins while it is filled, the one before it ends at last
+    for k in hit[:hits]:
+        cut(task, sphere_at(spheres, k), first, column_of, stop, chords)
     return stop, chords
 
 
