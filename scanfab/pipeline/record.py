@@ -74,7 +74,11 @@ class Record(NamedTuple):
     @classmethod
     def of(cls, path: Path, manifest: dict[str, Any], rows: Sequence[Mapping[str, Any]]) -> Record:
         """A record of rows as they were read; SettingsError for settings that cannot be used."""
-        settings, found = restored_settings(manifest["settings"]), FrameRows()
+        found = FrameRows()
+        try:
+            settings = restored_settings(manifest["settings"])
+        except SettingsError as error:
+            raise SettingsError(f"{path}: {error}") from None
         for row in rows:
             complete = row_of(settings.columns, row)
             found.setdefault((row["source"], row["frame"]), []).append(complete)
@@ -130,8 +134,8 @@ def restored_settings(asked: Mapping[str, Any]) -> Settings:
     kind = MapSettings if is_map(asked) else Settings
     try:
         return kind(**{name: asked[name] for name in kind.__dataclass_fields__ if name in asked})
-    except (AttributeError, TypeError, ValueError) as error:
-        raise SettingsError(f"the settings of the manifest cannot be used: {error}") from None
+    except (AttributeError, TypeError, ValueError, SettingsError) as error:
+        raise SettingsError(f"the settings of its manifest cannot be used: {error}") from None
 
 
 def named_files(asked: Mapping[str, Any]) -> list[Path]:
@@ -196,7 +200,8 @@ def read_manifest(table: Path) -> dict[str, Any] | None:
     try:
         found = json.loads(path.read_text("utf-8"))
         lists = [found["settings"]["sources"], *(found.get(name, []) for name in LISTS)]
-        if not all(isinstance(one, list) for one in lists):
+        is_named = all(isinstance(entry, dict) for entry in found.get("inputs", []))
+        if not is_named or not all(isinstance(one, list) for one in lists):
             raise TypeError
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         expected = "a manifest of scanfab compute"

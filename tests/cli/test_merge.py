@@ -197,6 +197,27 @@ def test_a_file_that_has_changed_between_jobs_is_named(parts, refused):
     assert f"{parts[2]}: {name} has changed between the jobs" in refused(*parts)
 
 
+@pytest.mark.parametrize(
+    ("place", "value", "said"),
+    [
+        (("inputs", 0), 5, "expected a manifest of scanfab compute"),
+        (
+            ("settings", "strain"),
+            "gone.csv",
+            "the settings of its manifest cannot be used: strain: ",
+        ),
+    ],
+)
+def test_a_manifest_that_cannot_be_used_is_named(parts, refused, place, value, said):
+    path = Path(f"{parts[0]}.manifest.json")
+    manifest = json.loads(path.read_text())
+    manifest[place[0]][place[1]] = value
+    path.write_text(json.dumps(manifest))
+    message = refused(*parts)
+    assert parts[0] in message
+    assert said in message
+
+
 def test_a_part_is_not_replaced(parts):
     before = Path(parts[0]).read_bytes()
     assert run(["merge", *parts, "-o", parts[0]]) == 2
