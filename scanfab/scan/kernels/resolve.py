@@ -50,18 +50,16 @@ from scanfab.scan.kernels.sweep import (
 
 @inner()
 def closed_lines(task: Task, which: int, closed: int) -> tuple[IntArray, IntArray]:
-    """The first closed line of each row and behind the last one, and the columns of them all."""
+    """Of each place of a strip the number of closed lines before it, and the places of these."""
     strip = task.strip
-    first, column_of = np.zeros(strip.rows + 1, np.int64), np.empty(closed, np.int64)
+    first, place_of = np.zeros(strip.rows * strip.pitch + 1, np.int64), np.empty(closed, np.int64)
     count = 0
-    for row in range(strip.rows):
-        for column in range(strip.columns):
-            place = np.uint64(row * strip.pitch + column)
-            if task.lines[place + SET * np.uint64(which) + END] == FAR:
-                column_of[count] = column
-                count += 1
-        first[row + 1] = count
-    return first, column_of
+    for place in range(first.size - 1):
+        if task.lines[np.uint64(place) + SET * np.uint64(which) + END] == FAR:
+            place_of[count] = place
+            count += 1
+        first[place + 1] = count
+    return first, place_of
 
 
 @inner(forceinline=True, error_model="numpy")
@@ -69,7 +67,7 @@ def cut(
     task: Task,
     sphere: Sphere,
     first: IntArray,
-    column_of: IntArray,
+    place_of: IntArray,
     stop: IntArray,
     chords: FloatArray,
 ) -> int:
@@ -81,11 +79,15 @@ def cut(
     """
     strip, met = task.strip, 0
     rows = span(sphere.v, sphere.radius, strip.first_v, strip.per_spacing, 0, strip.rows)
+    columns = span(sphere.u, sphere.radius, strip.first_u, strip.per_spacing, 0, strip.columns)
+    if columns[0] >= columns[1]:
+        return 0
     for row in range(rows[0], rows[1]):
         dv = strip.first_v + row * strip.spacing - sphere.v
         reach2 = sphere.radius * sphere.radius - dv * dv
-        for line in range(first[row], first[row + 1]):
-            du = strip.first_u - sphere.u + column_of[line] * strip.spacing
+        at = row * strip.pitch
+        for line in range(first[at + columns[0]], first[at + columns[1]]):
+            du = strip.first_u - sphere.u + (place_of[line] - at) * strip.spacing
             rest2 = reach2 - du * du
             if not rest2 >= 0.0:
                 continue
@@ -102,7 +104,7 @@ def cut(
 
 @inner(error_model="numpy")
 def chords_of(
-    task: Task, spheres: Spheres, chosen: IntArray, which: int, first: IntArray, column_of: IntArray
+    task: Task, spheres: Spheres, chosen: IntArray, which: int, first: IntArray, place_of: IntArray
 ) -> tuple[IntArray, FloatArray]:
     """
     The chords of closed lines, in lists one after the other, each in the order of depth.
@@ -110,18 +112,18 @@ def chords_of(
     Returns the start of each line's list (and the end of the last), and where chords start and
     stop, shape (2, M).
     """
-    stop, chords = np.zeros(column_of.size + 2, np.int64), np.empty((2, 0))
+    stop, chords = np.zeros(place_of.size + 2, np.int64), np.empty((2, 0))
     hit, hits = np.empty_like(chosen), 0
     for k in chosen:
         if which == 0 or not spheres.removed[k]:
             hit[hits] = k
-            hits += cut(task, sphere_at(spheres, k), first, column_of, stop, chords) > 0
+            hits += cut(task, sphere_at(spheres, k), first, place_of, stop, chords) > 0
     for line in range(2, stop.size):
         stop[line] += stop[line - 1]
     chords = np.empty((2, stop[-1]))
     # where a list begins while it is filled, the one before it ends at last
     for k in hit[:hits]:
-        cut(task, sphere_at(spheres, k), first, column_of, stop, chords)
+        cut(task, sphere_at(spheres, k), first, place_of, stop, chords)
     return stop, chords
 
 
@@ -175,21 +177,20 @@ def solve_line(
 def solve_closed(task: Task, spheres: Spheres, chosen: IntArray, which: int, closed: int) -> None:
     """Replace what the sweep tallied on closed lines by what their lists of chords give."""
     lines, strip = task.lines, task.strip
-    first, column_of = closed_lines(task, which, closed)
-    stop, chords = chords_of(task, spheres, chosen, which, first, column_of)
-    for row in range(strip.rows):
-        v = strip.first_v + row * strip.spacing
-        for number in range(first[row], first[row + 1]):
-            u = strip.first_u + column_of[number] * strip.spacing
-            place = np.uint64(row * strip.pitch + column_of[number])
-            line = u, v, lines[place + ENTRY], lines[place + EXIT]
-            order, end = np.empty(stop[number + 1] - stop[number], np.int64), 0.0
-            for k in range(order.size):
-                order[k] = stop[number] + k
-            for sign in (-1.0, 1.0):
-                end = solve_line(task, which, line, chords, order, sign)
-                sort_by(chords[0], order)
-            lines[place + SET * np.uint64(which) + END] = end
+    first, place_of = closed_lines(task, which, closed)
+    stop, chords = chords_of(task, spheres, chosen, which, first, place_of)
+    for number in range(closed):
+        row, column = place_of[number] // strip.pitch, place_of[number] % strip.pitch
+        u, v = strip.first_u + column * strip.spacing, strip.first_v + row * strip.spacing
+        place = np.uint64(place_of[number])
+        line = u, v, lines[place + ENTRY], lines[place + EXIT]
+        order, end = np.empty(stop[number + 1] - stop[number], np.int64), 0.0
+        for k in range(order.size):
+            order[k] = stop[number] + k
+        for sign in (-1.0, 1.0):
+            end = solve_line(task, which, line, chords, order, sign)
+            sort_by(chords[0], order)
+        lines[place + SET * np.uint64(which) + END] = end
 
 
 class Beyond(NamedTuple):
