@@ -223,6 +223,7 @@ def partition_of(whole: Blocks, window: Blocks) -> Partition:
         to_block=np.array([np.column_stack([one.matrix, one.shift]) for one in both]),
         parts=np.array([[*one.parts, one.shells] for one in both], dtype=np.float64),
         repeats=np.array([one.repeats for one in both], dtype=np.float64),
-        form=square[:, i, j] * np.where(i == j, 1.0, 2.0),
+        # in rows: kernels are compiled once more for an array in another order
+        form=np.ascontiguousarray(square[:, i, j] * np.where(i == j, 1.0, 2.0)),
         halves=True if octants else None,
     )
