@@ -61,7 +61,7 @@ def test_frames_of_mixed_dimension_are_an_error(compute, frames, words):
     ("words", "code", "message"),
     [
         (("--with", "forces"), 1, "--with forces needs"),
-        (("--with", "state"), 0, "the contacts have no forces: stress"),
+        (("--with", "state"), 0, "the contacts have no forces: all columns that need the stress"),
         (("--rattlers", "force"), 1, "the rule --rattlers force needs the"),
     ],
 )

@@ -58,7 +58,7 @@ def folder(tmp_path, monkeypatch):
         ("map cube --slices two", 2, "two"),
         ("map cube --slices -1", 2, "--slices: expected 1 or more, found"),
         ("map cube --slices 2 --with state", 2, "No such option '--with'"),
-        ("map cube", 2, "just one of --grid, --slices and --shells, found none"),
+        ("map cube", 2, "exactly one of --grid, --slices and --shells, found none"),
         ("map cube --grid 2,2", 2, "three numbers of blocks, such as 4,4,8, found '2,2'"),
         ("map cube --slices 2 --rv 0.4,0.6 --variants c", 2, "--rv: expected one size"),
         ("calibrate cube --tolerance 0", 2, "tolerance: expected a number above 0"),
