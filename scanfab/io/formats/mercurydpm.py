@@ -37,22 +37,25 @@ FSTAT_HEAD = re.compile(FSTAT.pattern + rb"#(?:[ \t]+\S+){6}\s+#(?:[ \t]+\S+){6,
 RESTART = re.compile(rb"(?:restart_version|MercuryDPM)[ \t]+[\d.]+")
 TIME = re.compile(rb"^(?:timeStep|dt) \S+ (?:time|t) (\S+)", re.MULTILINE)
 DOMAIN = re.compile(rb"(?im)^xmin (\S+) xmax (\S+) ymin (\S+) ymax (\S+) zmin (\S+) zmax (\S+)")
-# rows of a restart; versions 1 to 3 list centre, velocity and radius without words between them
+# rows of a restart; versions 2 and 3 list centre, velocity and radius without words between them
 SPHERE = re.compile(
     rb"(?!\w*(?:SuperQuadric|NonSpherical|Clump|Multi))\w*Particle id (?P<id>\S+) indSpecies "
     rb"(?P<species>\S+) position (?P<x>\S+) (?P<y>\S+) (?P<z>\S+) .*\bradius (?P<radius>\S+)"
 )
-OLD_SPHERE = re.compile(rb"TSP BP (?P<x>\S+) (?P<y>\S+) (?P<z>\S+) \S+ \S+ \S+ (?P<radius>\S+)")
+OLD_SPHERE = re.compile(
+    rb"(?:TSP BP )?(?=[-+.\d])(?P<x>\S+) (?P<y>\S+) (?P<z>\S+) \S+ \S+ \S+ (?P<radius>\S+)"
+)
 PAIR = re.compile(
     rb"\w+ particle(?:Wall)?Ids (?P<i>\S+) (?P<j>\S+) .*?"
     rb"\bforce (?P<fx>\S+) (?P<fy>\S+) (?P<fz>\S+)"
 )
 PERIOD = re.compile(
-    rb"PeriodicBoundary .*?normal (?P<nx>\S+) (?P<ny>\S+) (?P<nz>\S+) .*?"
-    rb"(?:position_left|distanceLeft) (?P<left>\S+) .*?shift (?P<x>\S+) (?P<y>\S+) (?P<z>\S+)"
+    rb"(?:PeriodicBoundary .*?)?normal (?P<nx>\S+) (?P<ny>\S+) (?P<nz>\S+) .*?"
+    rb"(?:pos\w*_left|distanceLeft) (?P<left>\S+) .*?shift (?P<x>\S+) (?P<y>\S+) (?P<z>\S+)"
 )
-# boundaries that repeat the sample; all but the plain PeriodicBoundary are refused
-PERIODS = re.compile(rb"\w*(?:LeesEdwards|Periodic|Maser|StressStrain|Circular)")
+# boundaries that repeat the sample; all but the plain PeriodicBoundary are refused. Version 2 lists
+# them in a section of their own, without the word.
+PERIODS = re.compile(rb"normal |\w*(?:LeesEdwards|Periodic|Maser|StressStrain|Circular)")
 
 
 class MercuryReader(shared.GrainsOnly):
@@ -176,7 +179,8 @@ def _cell(path: Path, data: bytes) -> Cell | None:
     words = b" ".join(word for bounds in DOMAIN.findall(data)[:1] for word in bounds)
     bounds = np.array(shared.numbers(f"{path}: its domain xMin xMax ...", words, 6))
     origin, vectors = bounds[::2], np.diag(bounds[1::2] - bounds[::2])
-    rows = [row for row in _section(path, data, b"Boundaries") if PERIODS.match(row)]
+    section = b"WallsPeriodic" if b"\nWallsPeriodic " in data else b"Boundaries"
+    rows = [row for row in _section(path, data, section) if PERIODS.match(row)]
     expected = "a PeriodicBoundary (or name the cell: `cell=(LX, LY, LZ)`)"
     boundaries = np.column_stack([*_columns(path, rows, PERIOD, expected).values()])
     which, axes = np.nonzero(boundaries[:, :3])

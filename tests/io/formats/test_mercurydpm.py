@@ -79,12 +79,18 @@ def test_a_restart_has_contacts_and_its_period(tmp_path):
     assert scanfab.read(path, cell=(1, 2, 3)).cell.periodic == (True, True, True)
 
 
-def test_an_old_restart(tmp_path):
-    rows = "".join(f"TSP BP {x} {y} {z} 9 9 9 {RADIUS} 0 0 0\n" for x, y, z in CENTRES)
+@pytest.mark.parametrize(
+    ("version", "first", "periods"),
+    [
+        (2, "", "WallsPeriodic 1\nnormal 0 1 0 pos_left 0.5 pos_right 2.5 shift 0 2 0"),
+        (3, "TSP BP ", "Boundaries 1\nPeriodicBoundary normal 0 1 0 position_left 0.5 shift 0 2 0"),
+    ],
+)
+def test_an_old_restart(tmp_path, version, first, periods):
+    rows = "".join(f"{first}{x} {y} {z} 9 9 9 {RADIUS} 0 0 0\n" for x, y, z in CENTRES)
     text = (
-        "restart_version 3\nname a\nxmin 0 xmax 1 ymin 0 ymax 2 zmin 0 zmax 3\n"
-        "dt 1 t 0.5 tmax 1\nBoundaries 1\nPeriodicBoundary normal 0 1 0 position_left 0.5 "
-        f"position_right 2.5 shift 0 2 0\nParticles 3\n{rows}FixedParticles 0\n"
+        f"restart_version {version}\nname a\nxmin 0 xmax 1 ymin 0 ymax 2 zmin 0 zmax 3\n"
+        f"dt 1 t 0.5 tmax 1\n{periods}\nParticles 3\n{rows}FixedParticles 0\n"
     )
     packing = scanfab.read(write(tmp_path / "a.restart", text))
     np.testing.assert_array_equal(packing.radius, RADIUS)
