@@ -135,16 +135,23 @@ def _named(path: Path, style: str, columns: Columns, cell: Cell | None) -> Colum
     is_hybrid = style == "hybrid" or (more > 0 and not style)
     order = HYBRID if is_hybrid else PLAIN
     named = dict(zip(order, values, strict=False))
+    problem = f"are not {' '.join(PLAIN)} (or a hybrid's {' '.join(HYBRID)})"
     fits = more >= 0 if is_hybrid else more == 0
     if fits and not style:
         # centres may lie a little outside the box, as LAMMPS wraps periodic boxes only now and then
         centres = np.column_stack([named[axis] for axis in "xyz"])
         place = np.full_like(centres, np.nan) if cell is None else cell.fractional(centres)
-        are_inside, are_whole = (place > -0.5) & (place < 1.5), named["type"] % 1 == 0
-        are_sizes = (named["diameter"] > 0) & (named["density"] > 0)
-        fits = bool(are_inside.all() and are_whole.all() and are_sizes.all())
+        expected = {
+            "a positive diameter and density": (named["diameter"] > 0) & (named["density"] > 0),
+            "a whole type": named["type"] % 1 == 0,
+            "the centre in the box": np.all((place > -0.5) & (place < 1.5), axis=1),
+        }
+        for what, holds in expected.items():
+            if fits and not holds.all():
+                fits, atom = False, int(np.argmin(holds))
+                found = " ".join(f"{column[atom]:g}" for column in values)
+                problem = f"do not read as {' '.join(order)}: expected {what}, found '{found}'"
     if not fits:
-        problem = f"are not {' '.join(PLAIN)} (or a hybrid's {' '.join(HYBRID)})"
         advice = '`columns="id=1,diameter=3,x=5,y=6,z=7"` names them'
         raise ReadError(f"{path}: the {len(columns)} columns below 'Atoms' {problem}: {advice}")
     names = [*order, *["mol", *list(columns)[len(PLAIN) + 1 :]][:more], *flags]

@@ -76,8 +76,9 @@ def test_columns_can_be_named_by_their_numbers(tmp_path):
     ("old", "new", "message"),
     [
         (LAMMPS, "LIGGGHTS Description", "expected diameters.*YADE's radii"),
-        (" 1.0 2500 0", " 1.0 0 2500", "are not id type .* names them"),
-        (" 1.0 2500", " 0 2500", "are not id type"),
+        (" 1.0 2500 0", " 1.0 0 2500", "density, found '1 1 1 0 2500.*names them"),
+        (" 1.0 2500", " 0 2500", "expected a positive diameter"),
+        ("-1 3 xlo", "90 94 xlo", "expected the centre in the box, found '1 1 1 2500"),
         ("1 atom types", "1 atom types\n3 ellipsoids", "expected diameters.*found ellipsoids"),
         ("Atoms\n", "Atoms # atomic\n", "found 'Atoms # atomic'"),
         ("Atoms\n", "Masses\n", "expected .* a section Atoms"),
