@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable, Mapping
 from functools import cache
 from typing import Any
@@ -27,15 +28,22 @@ SHEAR = (
     "the cell is periodic along all its vectors"
 )
 SHEAR_STRAIN = Column("shear_strain", float, "", SHEAR)
-# The shear strain stands before the columns of halves because these were added to the table later.
-OF_FABRICS = {name: fabric.columns for name, fabric in OWN_FABRICS.items()}
-OF_FABRICS["halves"] = (SHEAR_STRAIN, *OF_FABRICS["halves"])
+# parts of the jackknife, which only errors are made of: the last columns of a table
+JACKKNIFE = re.compile(r"_(without|half)_\d$")
 
-OWN_COLUMNS: tuple[Column, ...] = (
-    *FRAME_COLUMNS,
-    *SAMPLE_COLUMNS,
-    *SCAN_COLUMNS,
-    *(column for columns in OF_FABRICS.values() for column in columns),
+
+def _parts_last(columns: Iterable[Column]) -> tuple[Column, ...]:
+    return tuple(sorted(columns, key=lambda column: JACKKNIFE.search(column.name) is not None))
+
+
+OWN_COLUMNS = _parts_last(
+    [
+        *FRAME_COLUMNS,
+        *SAMPLE_COLUMNS,
+        *SCAN_COLUMNS,
+        *(column for fabric in OWN_FABRICS.values() for column in fabric.columns),
+        SHEAR_STRAIN,
+    ]
 )
 """Columns of every fabric table."""
 
@@ -88,11 +96,11 @@ def table_columns(more: Collection[str] = ()) -> tuple[Column, ...]:
     The columns of a computed table.
 
     The columns of every table come first, then the columns of ``MORE_COLUMNS`` whose names are in
-    ``more``, then the columns of other packages' fabrics.
+    ``more``, then the columns of other packages' fabrics, and last the parts of the jackknife.
     """
     chosen = (column for column in MORE_COLUMNS if column.name in more)
     others = (column for fabric in installed_fabrics().values() for column in fabric.columns)
-    return (*OWN_COLUMNS, *chosen, *others)
+    return _parts_last([*OWN_COLUMNS, *chosen, *others])
 
 
 def map_columns(more: Collection[str] = (), *, shells: bool = False) -> tuple[Column, ...]:

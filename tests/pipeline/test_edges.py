@@ -23,7 +23,7 @@ def columns(table, *names):
 
 def test_rows_say_by_which_rule_they_are(ball):
     start = compute(ball, edge="start", rv=0.35, **OPTIONS)
-    assert list(start.names) == [*scanfab.COLUMNS, "edge", "left_out"]
+    assert [name for name in start.names if name not in scanfab.COLUMNS] == ["edge", "left_out"]
     assert [row.edge for row in start] == ["clip", "clip", "start", "start"]
     assert [row.left_out is None for row in start] == [True, True, False, False]
     ends = compute(ball, edge="ends", rv=0.35, **OPTIONS)
