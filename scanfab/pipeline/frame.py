@@ -152,7 +152,7 @@ def _large_errors(rows: list[Row], plan: Plan) -> Iterator[Note]:
     """Other cut-offs, RVs and the second moment are measured along lines chosen for one."""
     worst = max(rows, key=lambda row: row.alpha_vs_axial_se or 0.0)
     error, rv = worst.alpha_vs_axial_se or 0.0, worst.get(RV_COLUMN.name)
-    aim, others = plan.settings.tolerance, plan.lists_gaps or len(plan.rvs) > 1
+    aim, others = plan.settings.tolerance, plan.settings.lists_gaps or len(plan.rvs) > 1
     if plan.auto and others and error > aim:
         reached, tolerance = spelt_apart(error, aim)
         where = f"at the cut-off {worst.cutoff:g}{f' in the RV {rv:g}' if rv else ''}"

@@ -86,7 +86,7 @@ class Measurement:
 
     def at_cutoffs(self, cutoffs: Iterable[float]) -> Measurement:
         """The measurement of the same lines at other cut-offs, in the dump's unit."""
-        plan = replace(self.plan, cutoffs=tuple(sorted(cutoffs)), lists_gaps=True)
+        plan = replace(self.plan, cutoffs=tuple(sorted(cutoffs)))
         return _with_gaps(self.sample, self.solids, self.sums, plan, self.notes)
 
 
@@ -113,7 +113,7 @@ def _with_gaps(
     """Add the gaps of all lines, if the plan needs them, and gaps by octant of a second scan."""
     blocks, gaps = _octants(sample, plan), None
     scan = gap_scan(solids, plan, blocks, plan.cutoffs)
-    if plan.lists_gaps:
+    if plan.settings.lists_gaps or len(plan.cutoffs) > 1:
         gaps = scan(plan.rule, spacing=plan.spacing, replicates=range(sums.replicates))
     # the directions of an auto scan, or more directions for few grains
     count, rule = len(solids.grain_radius), usual_rule(solids.space)

@@ -68,8 +68,6 @@ class Plan:
     max_chords: float
     """An auto scan stops before it cuts more chords."""
     rule: DirectionRule
-    lists_gaps: bool
-    """Whether all gaps must be listed, for several cut-offs or another moment."""
     rvs: tuple[RV, ...]
     """
     The RVs in ascending order, as they lie in the first frame that has grains, or, after
@@ -121,22 +119,22 @@ class Plan:
             yield replace(self, rvs=(rv,), variants=variants, replicates=replicates, auto="")
 
 
-def plan_without_grains(settings: Settings, space: Space = SPACE) -> Plan:
+def plan_without_grains(settings: Settings, sample: Sample | None = None) -> Plan:
     """
-    The part of a plan that the settings alone decide.
+    The plan of a series without grains: its frames have rows, but nothing is scanned.
 
-    It is the whole plan of a series without grains: its frames have rows, but nothing is scanned.
+    With a ``sample``, the first frame that has grains, it is what :func:`make_plan` starts from.
     """
+    space = SPACE if sample is None else sample.packing.space
     return Plan(
         settings=settings,
         space=space,
-        strains=Strains.of(settings),
+        strains=Strains.of(settings, sample),
         variants=settings.variants,
         workers=settings.workers,
         max_chords=settings.max_chords,
         rule=settings.directions or usual_rule(space),
-        lists_gaps=settings.lists_gaps,
-        rvs=rvs_of(settings),
+        rvs=rvs_of(settings, sample),
         cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),
     )
 
@@ -162,11 +160,10 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     refuse_impossible(sample)
     packing = sample.packing
     settings = settings_in(settings, packing.space)
-    plan = plan_without_grains(settings, packing.space)
+    plan = plan_without_grains(settings, sample)
     radii = packing.radius[sample.grains]
     lengths = {"rmin": float(radii.min()), "rmean": float(radii.mean()), "rmax": float(radii.max())}
     box = SurfaceBox.of(packing, sample.gathered)
-    plan = replace(plan, rvs=rvs_of(settings, sample))
     window, windows = plan.window, plan.windows
     notes = [note for one in windows for note in doubts_of_rv(one, sample)]
     blocks = deformation = None
@@ -189,7 +186,6 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     cutoff = settings.cutoff.resolve(lengths)
     return replace(
         plan,
-        strains=plan.strains.since(sample),
         deformation=deformation,
         max_chords=plan.max_chords * share,
         cutoff=cutoff,

@@ -282,12 +282,12 @@ class _AutoScan:
                 f"met: alpha_vs_axial_se holds the error that it reached; about {missing:.2g} "
                 f"times as many lines would be needed (`max_chords`, `tolerance`)"
             )
-            followed = float(self.sums.steps.sum() / self.sums.work.sum())
-            if followed > 0.5:
+            steps, work = self.sums.steps.sum(), self.sums.work.sum()
+            if 2 * steps > work:
                 text += (
-                    f"; {followed:.0%} of the work was to follow long void segments through the "
-                    f"images of the cell: is the cell too large, or periodic where the sample is "
-                    f"not (`cell`, `periodic`)?"
+                    f"; {steps / work:.0%} of the work was to follow long void segments through "
+                    f"images of the cell: is it too large, or periodic where the sample is not "
+                    f"(`cell`, `periodic`)?"
                 )
             yield Note(TOLERANCE_MISSED, text)
         for name, errors in self.errors.items():
@@ -309,9 +309,8 @@ def _within_budget(plan: Plan, solids: Solids) -> Plan:
         return plan
     if plan.auto != "replicates" or plan.max_chords < axes:
         raise SettingsError(
-            f"max_chords: expected at least the {chords:.2g} chords that {plan.replicates} "
-            f"replicates of {len(plan.rule)} directions cut, found {plan.max_chords:g}: choose a "
-            f"wider `spacing`, fewer `directions` or a larger `max_chords`"
+            f"max_chords: expected at least {chords:.2g}, the chords of {plan.replicates} "
+            f"replicates, found {plan.max_chords:g}: choose a wider `spacing` or fewer `directions`"
         )
     return replace(plan, spacing=plan.spacing * plan.space.apart(chords / plan.max_chords))
 
