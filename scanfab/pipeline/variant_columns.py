@@ -29,8 +29,8 @@ from scanfab.table.columns import installed_fabrics
 # the user is warned if a larger fraction of the segments leaves the sample
 MOST_LEFT_OUT = 0.01
 NO_INNER_WINDOW = (
-    "the sample is flat or too small for `edge=ends`: the whole is then measured in an ellipsoid "
-    "that lies one largest radius inside the hull of the grain centres, and none fits"
+    "the sample is flat or too small for `edge=ends`: no ellipsoid fits that lies one largest "
+    "radius inside the hull of the grain centres"
 )
 
 
@@ -184,19 +184,18 @@ class VariantColumns:
         if void is None:
             text = "in some direction no void segment is kept, so there is no void fabric"
             return {"empty_direction": text}
-        filled = f"{void.filled:.0%} of the directions keep no void segment in a replicate"
-        text = f"{filled}: choose a smaller spacing"
-        return {"filled_directions": text} if void.filled > 0.01 else {}
+        if void.filled <= 0.01:
+            return {}
+        text = f"{void.filled:.0%} of the directions keep no void segment in a replicate"
+        return {"filled_directions": f"{text}: choose a smaller spacing"}
 
 
 def edge_of(variant: Variant, plan: Plan, solids: Solids) -> str | None:
     """The edge rule for a variant; None for a periodic whole, which has no edge."""
-    edge = plan.settings.edge
-    if variant.in_window:
-        return edge
-    if solids.medium is not None:
+    if solids.medium is not None and not variant.in_window:
         return None
-    return ENDS if edge == ENDS else CLIP
+    edge = plan.settings.edge
+    return edge if variant.in_window or edge == ENDS else CLIP
 
 
 def left_out_of(sums: ScanSums, variant: Variant, edge: str | None, kept: float) -> float | None:
@@ -210,15 +209,13 @@ def left_out_of(sums: ScanSums, variant: Variant, edge: str | None, kept: float)
 def doubts_of_lines(sums: ScanSums, variant: Variant, left_out: float | None) -> dict[str, str]:
     """Notes, by code, on lines that meet no grain and on segments that leave the sample."""
     texts, index = {}, "abcd".index(variant.name)
-    channels, others = (int(counts[:, index].sum()) for counts in (sums.channels, sums.lines))
+    channels, met = (int(counts[:, index].sum()) for counts in (sums.channels, sums.lines))
     if channels:
-        texts["channels"] = (
-            f"{channels} of {channels + others} lines stay in a channel and meet no grain"
-        )
+        text = f"{channels} of {channels + met} lines stay in a channel and meet no grain"
+        texts["channels"] = text
     if left_out is not None and left_out > MOST_LEFT_OUT:
         texts["left_out"] = (
-            f"{left_out:.1%} of the void segments of the RV leave the sample and are left "
-            f"out: these are long segments, so the mean length is too small: choose a smaller "
-            f"`rv`, or `edge=ends`, which needs nothing outside the RV"
+            f"{left_out:.1%} of the void segments of the RV leave the sample and are left out: "
+            f"the longest, so the mean length is too small: choose a smaller `rv`, or `edge=ends`"
         )
     return texts

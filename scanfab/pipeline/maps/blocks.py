@@ -64,10 +64,8 @@ class MapBlocks(NamedTuple):
         """
         packing, gathered = sample.packing, sample.gathered
         if packing.space.is_plane:
-            raise SettingsError(
-                f"a map needs spheres, but all grains are discs in the plane "
-                f"{packing.space.name}: use `compute` with an RV at each `rv_center` instead"
-            )
+            found = f"all grains are discs in {packing.space}"
+            raise SettingsError(f"a map needs spheres, but {found}: use `compute` with `rv_center`")
         open_axes = np.eye(3)
         if settings.slices is not None:
             # the loading axis is the last one
@@ -107,10 +105,10 @@ class MapBlocks(NamedTuple):
         cosines = np.abs(undivided.matrix @ np.asarray(settings.axis)) * undivided.heights
         across = int(np.argmax(cosines))
         if cosines[across] < MOST_OBLIQUE:
+            angle = np.degrees(np.arccos(cosines[across]))
             raise SettingsError(
-                f"slices: in a periodic cell they are parallel to its faces, but the nearest "
-                f"normal is {np.degrees(np.arccos(cosines[across])):.0f} degrees off the axis: "
-                f"choose another `axis`, or `grid`"
+                f"slices: they lie along faces of the periodic cell, whose nearest normal is "
+                f"{angle:.0f} degrees off the axis: choose another `axis`, or `grid`"
             )
         parts = np.where(np.arange(3) == across, settings.blocks, 1)
         return replace(undivided, parts=tuple(parts.tolist()))

@@ -325,9 +325,8 @@ class VariantMap:
         if lacking:
             texts["few_segments"] = (
                 f"{lacking} of {counted(len(self.blocks), 'block')} have no void fabric: {empty} "
-                f"have no void segment at all, {lacking - empty} have none in more than 5 % of the "
-                f"directions: choose fewer blocks, closer lines (`spacing`, `tolerance`) or a "
-                f"shorter `cutoff`"
+                f"have no void segment, {lacking - empty} have none in over 5 % of the directions: "
+                f"choose fewer blocks, closer lines (`spacing`) or a shorter `cutoff`"
             )
         texts[HOMOGENEITY] = self._homogeneity()
         return (Note(code, text, (variant.name,)) for code, text in texts.items())
@@ -346,11 +345,8 @@ class VariantMap:
                 f"alpha_vs_axial of {test.blocks} blocks scatters {test.ratio:.2g} times as much "
                 f"as their errors explain ({chance}): {sign}the sample is not homogeneous"
             )
-        few = "too few blocks to tell whether the sample is homogeneous"
-        if not self.at_surface.any():
-            return few
-        better = "" if self.variant.in_window else "blocks of the RV by `variants=c` and "
-        return (
-            f"{few}: {inner.sum()} of {len(inner)} are neither empty nor at a surface: choose "
-            f"smaller blocks, or {better}`edge=start`"
-        )
+        text = "too few blocks to tell whether the sample is homogeneous"
+        if self.at_surface.any():
+            text += f": {inner.sum()} of {len(inner)} are neither empty nor at a surface"
+            text += " (choose smaller blocks, or those of the RV with `edge=start`)"
+        return text
