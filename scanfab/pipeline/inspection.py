@@ -16,7 +16,7 @@ from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impo
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import Frames, boundary_hints
-from scanfab.pipeline.rv import windows_of
+from scanfab.pipeline.rv import rvs_of
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.window_settings import settings_in
 from scanfab.table.row import Record
@@ -117,7 +117,7 @@ def _rv(frames: Frames, sample: Sample) -> Window | None:
     if not sample.grains.any():
         return None
     tell(frames.check_boundary(sample))
-    return windows_of(sample, settings_in(frames.settings, sample.packing.space))[-1]
+    return rvs_of(settings_in(frames.settings, sample.packing.space), sample)[-1].window
 
 
 def _report(

@@ -8,7 +8,7 @@ from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox
 from scanfab.pipeline.measurement import measure
 from scanfab.pipeline.plan import make_plan
-from scanfab.pipeline.rv import windows_of
+from scanfab.pipeline.rv import rvs_of
 from scanfab.scan.scan import scan_lines
 from scanfab.scan.solids import Solids
 from tests.helpers.lattices import rotation, shaken_cubic
@@ -32,7 +32,7 @@ def flat():
 
 
 def window_of(sample, **options):
-    return windows_of(sample, Settings(**options))[0]
+    return rvs_of(Settings(**options), sample)[0].window
 
 
 def test_sizes_are_fractions_of_the_half_extents(flat):
