@@ -20,7 +20,7 @@ from scanfab.pipeline.job import Job
 from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.record import asked_for
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.told import recorded
+from scanfab.pipeline.told import listening
 from scanfab.table.table import Table, load
 from scanfab.table.writing import Excerpt
 from scanfab.viz.paraview import vtk_folders
@@ -114,7 +114,7 @@ def compute_file(
     refuse_unknown("compute_file", options, known)
     if kind is Settings:
         options = {name: one for name, one in options.items() if name not in BLOCK_OPTIONS}
-    with recorded() as told:
+    with listening() as told:
         opened = _opened(source, options)
         parts = [of_whole(one, kind(**options)) for one in opened]
         settings = _same(one for _, one in parts)
