@@ -44,7 +44,7 @@ def asked_by(tmp_path, monkeypatch):
             found.update(asked_for(*given))
             raise ReadError("enough")
 
-        monkeypatch.setattr("scanfab.pipeline.record.asked_for", remember)
+        monkeypatch.setattr("scanfab.pipeline.job.asked_for", remember)
         assert run(["compute", *words]) == 1
         return json.loads(json.dumps(found))
 
