@@ -23,7 +23,6 @@ from scanfab.pipeline.plan import make_plan
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.tolerance import TOLERANCE_MISSED, Goal, missing_work
 from scanfab.pipeline.values import SHAPES, Length
-from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.directions import direction_rule, rule_of, usual_rule
 from scanfab.table.plots import Plots
 from scanfab.table.row import Record
@@ -215,7 +214,7 @@ class _OneFrame:
         if sample is None or not sample.grains.any():
             raise PackingError(f"frame {self.number} has no grains: choose another frame")
         self.name, self.sample, self.space = frames.name, sample, self.first.packing.space
-        self.settings = settings_in(settings, self.space)
+        self.settings = settings.in_space(self.space)
         tell(sample.doubts_of_escaped(), f"frame {self.number}")
         # these notes hold for every step
         tell(make_plan(self.settings, self.first).notes)

@@ -21,7 +21,6 @@ from scanfab.pipeline.rv import RV, Deformation, doubts_of_rv, sizes_of, windows
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import Strains
 from scanfab.pipeline.values import Vector
-from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.directions import DirectionRule, usual_rule
 
 # settings that a plan copies unchanged
@@ -187,7 +186,7 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     """
     refuse_impossible(sample)
     packing, space = sample.packing, sample.packing.space
-    settings = settings_in(settings, space)
+    settings = settings.in_space(space)
     plan = plan_without_grains(settings, space)
     radii = packing.radius[sample.grains]
     lengths = {"rmin": float(radii.min()), "rmean": float(radii.mean()), "rmax": float(radii.max())}
