@@ -9,6 +9,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -326,7 +327,8 @@ def _objections(
     for gone in sorted(before.keys() - read):
         yield f"{gone} is not among the files that are read now"
     for one in series:
-        yield from _changed_frames(one, before, record.rows)
+        if finished := {frame for source, frame in record.rows if source == one.name}:
+            yield from _changed_files(one, before, finished)
     # a new line may give a strain to a frame that had none
     lacks_strain = any(row.strain is None for rows in record.rows.values() for row in rows)
     for file in (*named, *cells):
@@ -335,24 +337,25 @@ def _objections(
             yield f"{file} has changed since, in more than new lines at its end"
 
 
-def _changed_frames(series: Series, before: Mapping[str, Any], rows: FrameRows) -> Iterator[str]:
-    """Changes in the files of finished frames, and in the files that are read with them."""
-    steps = [step for step, file in series.grains.files.items() if str(file) in before]
-    last = max((step for step in steps if step is not None), default=None)
-    files = [(s, f) for one in (series.grains, *series.contacts) for s, f in one.files.items()]
-    for step, file in files:
+def _changed_files(
+    series: Series, before: Mapping[str, Any], finished: Collection[int]
+) -> Iterator[str]:
+    """Changes in the files of a series up to its last finished frame."""
+    frames = list(islice(series, max(finished) + 1))
+    families = (series.grains, *series.contacts)
+    steps = {file: step for family in families for step, file in family.files.items()}
+    last = [step for step, file in series.grains.files.items() if str(file) in before][-1:]
+    for file in series.files(max(finished)):
+        step = steps.get(file, -1)
+        if series.cells is not None and file == series.cells.path:
+            continue  # it may get new lines
         if str(file) not in before:
-            if steps and (step is None or last is None or step <= last):
-                yield f"{file} is new, and not behind the last frame"
-            continue
-        beside = series.beside(file) if series.grains.files.get(step) == file else []
-        changed = [one for one in beside if not _is_same(one, before)]
-        if not _is_same(file, before, may_grow=step is None or step == last):
-            changed.append(file)
-        # a broken file counts as one frame: if it has more now, later frames have other numbers
-        numbers = [frame.number for frame in series if changed and frame.name_step == step]
-        if changed and (len(numbers) != 1 or (series.name, numbers[0]) in rows):
-            yield f"{changed[0]} has changed since, or is new beside the grains"
+            yield f"{file} is new, and not behind the last frame"
+        elif not _is_same(file, before, may_grow=step in [None, *last]):
+            # a broken file counts as one frame: if it has more now, later frames have other numbers
+            numbers = [frame.number for frame in frames if frame.name_step == step]
+            if len(numbers) != 1 or numbers[0] in finished:
+                yield f"{file} has changed since"
 
 
 def _is_same(

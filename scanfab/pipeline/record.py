@@ -17,6 +17,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shlex
 import shutil
 import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -30,9 +31,12 @@ from typing import IO, Any, NamedTuple
 from scanfab.base.ending import undone_at_end
 from scanfab.base.errors import ReadError, SettingsError, note
 from scanfab.base.files import locked, named_errors, whole_file
-from scanfab.base.option import options_of
-from scanfab.base.spelling import counted
-from scanfab.pipeline.maps.settings import MapSettings, is_map
+from scanfab.base.option import flag_of, options_of
+from scanfab.base.spelling import counted, shortest
+from scanfab.io.options import READING_OPTIONS
+from scanfab.io.series import Series
+from scanfab.io.sources import READING, open_sources
+from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import SHAPES, STRAIN_MODES, as_written
 from scanfab.table.columns import row_of
@@ -45,6 +49,8 @@ from scanfab.table.writing import ALL, Excerpt, manifest_of
 FREE = ("frames", "sources")
 # entries of a manifest that are lists, and may be missing in the manifest of an older version
 LISTS = ("inputs", "warnings", "notes")
+# options that take their numbers one by one
+APART = ("rv_center", "rv_size", "cell")
 # a file is read by so many bytes at a time
 PIECE = 1 << 20
 # errors that a damaged JSON file causes
@@ -122,6 +128,74 @@ def restored_settings(asked: Mapping[str, Any]) -> Settings:
         return kind(**{name: asked[name] for name in kind.__dataclass_fields__ if name in asked})
     except (AttributeError, TypeError, ValueError, SettingsError) as error:
         raise SettingsError(f"the settings of the manifest cannot be used: {error}") from None
+
+
+def repeat_command(
+    asked: Mapping[str, Any], output: str | None = None, named: Collection[str] = ()
+) -> str:
+    """
+    The command line that repeats a computation, quoted for a shell.
+
+    Parameters
+    ----------
+    asked : mapping
+        The ``settings`` of a manifest.
+    output : str, optional
+        The table.
+    named : collection of str, optional
+        Options to name even with their default value, because a settings file beside the dumps
+        gives them another value.
+
+    Examples
+    --------
+    >>> from scanfab.pipeline.record import asked_for, repeat_command
+    >>> from scanfab.pipeline.settings import Settings
+    >>> repeat_command(asked_for(["dumps"], {}, Settings(boundary="type=2", seed=3)))
+    'scanfab compute dumps --boundary type=2 --seed 3'
+    """
+    of_map = is_map(asked)
+    reading = {option.name: option.default for option in READING_OPTIONS}
+    usual = asked_for((), reading, MapSettings(slices=1) if of_map else Settings())
+    # the options that make a table a map have no default
+    usual |= dict.fromkeys(BLOCK_OPTIONS)
+    words = ["scanfab", "map" if of_map else "compute", *map(str, asked["sources"])]
+    for name, value in given_settings(asked).items():
+        if usual.get(name) != value or flag_of(name)[2:] in named:
+            words += _words(flag_of(name), name, value)
+    if output is not None:
+        words += ["-o", output]
+    return shlex.join(words)
+
+
+def given_settings(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings of a manifest that have a value, as users write them."""
+    named = {name: asked[name] for name in asked if name not in ("scanfab", "sources")}
+    return {name: value for name, value in named.items() if value not in (None, [], {})}
+
+
+def reopen(asked: Mapping[str, Any]) -> Series:
+    """Open the first series that a manifest names; ReadError if it cannot be read again."""
+    sources = [str(source) for source in asked["sources"]]
+    if "-" in sources:
+        raise ReadError("the frames came by standard input, which cannot be read again")
+    given = given_settings(asked)
+    return open_sources(sources, **{name: given[name] for name in READING if name in given})[0]
+
+
+def _words(flag: str, name: str, value: Any) -> list[str]:
+    """An option as words of a command line."""
+    if isinstance(value, dict):
+        value = [f"{key}={column}" for key, column in value.items()]
+    if isinstance(value, list):
+        parts = [shortest(one) if isinstance(one, float) else str(one) for one in value]
+        if name == "boundary":
+            return [word for rule in parts for word in (flag, rule)]
+        if name in APART:
+            return [flag, *parts]
+        value = ",".join(parts)
+    text = shortest(value) if isinstance(value, float) else str(value)
+    # a value that starts with a dash would be taken for an option
+    return [f"{flag}={text}"] if text.startswith("-") else [flag, text]
 
 
 def named_files(asked: Mapping[str, Any]) -> list[Path]:

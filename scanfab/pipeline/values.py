@@ -253,7 +253,8 @@ def parse_strain(name: str, value: Any) -> str:
     """Parse the source of the axial strain: a word, or an existing file."""
     text = str(value)
     if text not in STRAIN_MODES and not Path(text).is_file():
-        raise unusable(name, "auto, cell, boundary, grains or a CSV file that exists", text)
+        found = text if isinstance(value, Path) else value
+        raise unusable(name, "auto, cell, boundary, grains or a CSV file that exists", found)
     return text
 
 

@@ -9,8 +9,13 @@ import pytest
 
 from scanfab.base.errors import ReadError
 from scanfab.cli.main import run
-from scanfab.pipeline.record import asked_for, read_manifest, restored_settings
-from scanfab.pipeline.repeat import reopen, repeat_command
+from scanfab.pipeline.record import (
+    asked_for,
+    read_manifest,
+    reopen,
+    repeat_command,
+    restored_settings,
+)
 from scanfab.pipeline.settings import Settings
 from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import cubic_rows, dump_text, write
