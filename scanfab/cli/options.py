@@ -252,7 +252,7 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
     copy = temporary_copy(iter(partial(sys.stdin.buffer.read, PART), b""), "standard input")
     if copy.stat().st_size == 0:
         raise ReadError("standard input: expected a dump, found nothing")
-    return [replace(read_series(copy, **reading), name="-")]
+    return [replace(read_series(copy, **reading), name="-", sources=("-",))]
 
 
 def open_one(sources: tuple[str, ...], reading: dict[str, Any], done: str) -> Series:

@@ -3,32 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.option import (
-    number,
-    numbers,
-    one_of,
-    optional,
-    options_of,
-    reading,
-    unusable,
-    whole,
-)
+from scanfab.base.option import number, numbers, optional, options_of, reading, unusable, whole
+from scanfab.io.reader import installed_readers, reader_named
 
 parse_positive = optional(number("a number above 0", lambda value: 0 < value < math.inf))
 parse_skip = whole("how many lines to skip, 0 or more", lambda value: 0 <= value < 2**31)
-
-
-def _reader_names() -> Iterable[str]:
-    from scanfab.io.reader import installed_readers
-
-    return installed_readers()
 
 
 def parse_text(name: str, value: Any) -> str | None:
@@ -40,8 +26,6 @@ def parse_text(name: str, value: Any) -> str | None:
 
 def parse_format(name: str, value: Any) -> str | None:
     """The name of an installed reader."""
-    from scanfab.io.reader import reader_named
-
     given = parse_text(name, value)
     if given is not None:
         reader_named(given)
@@ -57,8 +41,10 @@ def parse_contacts(name: str, value: Any) -> str | PathLike[str]:
 
 def parse_columns(name: str, value: Any) -> dict[str, str] | None:
     """A dict of standard name to column, from a mapping or from ``NAME=COLUMN,NAME=COLUMN``."""
-    if value is None or isinstance(value, Mapping):
-        return None if value is None else dict(value)
+    if value is None:
+        return None
+    if isinstance(value, Mapping):
+        return dict(value)
     names: dict[str, str] = {}
     for part in str(value).split(","):
         standard, _, column = map(str.strip, part.partition("="))
@@ -108,15 +94,16 @@ def parse_periodic(name: str, value: Any) -> str | None:
 
 def parse_dim(name: str, value: Any) -> str | int:
     """``auto``, 2 or 3."""
-    word = one_of("auto", "2", "3")(name, str(value))
-    return word if word == "auto" else int(word)
+    if str(value) not in ("auto", "2", "3"):
+        raise unusable(name, "auto, 2 or 3", value)
+    return "auto" if value == "auto" else int(value)
 
 
 @dataclass(frozen=True)
 class Reading:
     """The options of ``read_series``."""
 
-    format: str | None = reading(parse_format, metavar="NAME", choices=_reader_names)
+    format: str | None = reading(parse_format, metavar="NAME", choices=installed_readers)
     """Reader to use (default: chosen by the content of the file)."""
     columns: dict[str, str] | None = reading(parse_columns, metavar="NAMES")
     """

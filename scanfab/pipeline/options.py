@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.option import option, options_of, reading, running
 from scanfab.io.files import without_temporary
 from scanfab.io.options import READING_OPTIONS
+from scanfab.io.writer import installed_writers
 from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.pipeline.settings import Settings
 
@@ -79,19 +79,13 @@ class Output:
     """
 
 
-def _writer_names() -> Iterable[str]:
-    from scanfab.io.writer import installed_writers
-
-    return installed_writers()
-
-
 @dataclass
 class Other:
     """Options of the other commands, which compute no table."""
 
     frame: int = reading(default=0, decides=False, metavar="K")
     """Which frame; a negative number counts from the end."""
-    to: str | None = running(metavar="NAME", choices=_writer_names, first=True)
+    to: str | None = running(metavar="NAME", choices=installed_writers, first=True)
     """Format to write (default: from the suffix of OUT); scanfab formats lists all formats."""
 
     strain_max: float | None = running(group="fabric")

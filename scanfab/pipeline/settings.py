@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import Any
 
+from scanfab.base.column import Column
 from scanfab.base.errors import DimensionError, SettingsError
 from scanfab.base.option import fabric, options_of, reading, refuse_unknown, sample, scan, window
+from scanfab.base.space import Space
+from scanfab.base.spelling import spelt_place
 from scanfab.io.options import parse_frames
+from scanfab.packing.boundary import BoundaryRule
 from scanfab.packing.columns import RV_COLUMN
+from scanfab.packing.rattlers import installed_rules
 from scanfab.pipeline import values
-from scanfab.pipeline.values import AXES, SHAPES, STRAIN_MODES, Axis, Length, Vector, as_written
+from scanfab.pipeline.values import Axis, Length, Vector, as_written
 from scanfab.scan.columns import EDGE_COLUMNS
+from scanfab.scan.directions import RULES, DirectionRule, rule_of
 from scanfab.scan.edges import CLIP, EDGES, ENDS
-
-if TYPE_CHECKING:
-    from scanfab.base.column import Column
-    from scanfab.packing.boundary import BoundaryRule
-    from scanfab.scan.directions import DirectionRule
-
 
 # This takes one processor one to two minutes, and is some hundred times what a frame of a dense
 # packing needs for the default tolerance.
 MAX_CHORDS = 1e10
+# a component of a unit vector up to this counts as 0
+ROUNDING = 1e-9
+# beginnings of direction rules, for shell completion
+DIRECTIONS = ("auto", *(f"{name}:" for name in RULES))
 # options that have a meaning only if another option has this value
 NEEDS = {
     "rv_radius": ("rv_shape", "sphere"),
@@ -70,7 +75,9 @@ class Settings:
     """Radius of the spherical RV in the dump's units, instead of `rv`."""
     rv_center: Vector | None = window(values.parse_point, metavar="X Y Z")
     """Centre of the RV in the dump's units (default: middle of the sample)."""
-    rv_shape: str = window(values.parse_shape, default="sphere", choices=tuple(SHAPES), also="FILE")
+    rv_shape: str = window(
+        values.parse_shape, default="sphere", choices=tuple(values.SHAPES), also="FILE"
+    )
     """
     Shape of the RV; FILE is a closed convex surface in the dump's units (.stl .vtp .ply .obj).
     """
@@ -79,7 +86,7 @@ class Settings:
     Size of the RV in the dump's units, instead of `rv`: edges of the box, radius and height of the
     cylinder, semi-axes of the ellipsoid. Discs take two numbers.
     """
-    rv_axis: Axis | None = window(values.parse_rv_axis, choices=tuple(AXES), also="X,Y,Z")
+    rv_axis: Axis | None = window(values.parse_rv_axis, choices=tuple(values.AXES), also="X,Y,Z")
     """Axis of the cylinder (default: `axis`)."""
     rv_follows: str = window(default="none", choices=("none", "strain"))
     """
@@ -124,7 +131,7 @@ class Settings:
     )
     """Distance between neighbouring scan lines, written as `cutoff` is; auto meets `tolerance`."""
     directions: DirectionRule | None = scan(
-        values.parse_directions, default="auto", metavar="N|RULE", choices=values.direction_rules
+        values.parse_directions, default="auto", metavar="N|RULE", choices=DIRECTIONS
     )
     """
     Directions of the scan: N axes, rounded up to the next exact rule, or lebedev:DEGREE,
@@ -145,7 +152,7 @@ class Settings:
     min_contacts: int = sample(values.parse_count, default=2)
     """A grain with fewer contacts (a clump: with fewer neighbours) is a rattler."""
     rattlers: str = sample(
-        values.parse_rattlers, default="count", metavar="RULE", choices=values.rattler_rules
+        values.parse_rattlers, default="count", metavar="RULE", choices=installed_rules
     )
     """
     Rule that finds rattlers. count: one pass over all contacts; recursive: further passes without
@@ -158,7 +165,7 @@ class Settings:
     """
     For contacts found by geometry: two grains touch if their distance is below (r1 + r2)(1 + X).
     """
-    axis: Axis = fabric(values.parse_axis, choices=tuple(AXES), also="X,Y,Z")
+    axis: Axis = fabric(values.parse_axis, choices=tuple(values.AXES), also="X,Y,Z")
     """
     Loading axis, along which the anisotropies are signed (default: z; for discs the second axis of
     their plane).
@@ -170,7 +177,9 @@ class Settings:
     Groups of further columns: forces (branches, strong and weak contacts), state (void ratio,
     stress, fabric against stress), invariants, harmonics. Several: forces,state.
     """
-    strain: str = sample(values.parse_strain, default="auto", choices=STRAIN_MODES, also="FILE.csv")
+    strain: str = sample(
+        values.parse_strain, default="auto", choices=values.STRAIN_MODES, also="FILE.csv"
+    )
     """Where the axial strain comes from; auto: the cell if it is periodic, else the boundary."""
     frames: slice = reading(
         lambda name, value: parse_frames(value, name), metavar="A:B:C", first=True
@@ -194,7 +203,7 @@ class Settings:
             raise SettingsError(problem)
         # Only a cylinder is checked here: other shapes may be those of discs, which a frame tells.
         if self.rv_shape == "cylinder":
-            self.check_sizes(3)
+            self._check_sizes(3)
 
     def __repr__(self) -> str:
         chosen = [
@@ -207,7 +216,7 @@ class Settings:
 
     def _clashes(self) -> Iterator[str]:
         """Messages about options that contradict each other, each with what to do."""
-        shape, takes = self.rv_shape, SHAPES.get(self.rv_shape)
+        shape, takes = self.rv_shape, values.SHAPES.get(self.rv_shape)
         sizes = {"rv_radius": self.rv_radius, "rv_size": self.rv_size, "rv_shape": takes is None}
         for name in (name for name, given in sizes.items() if given and len(self.rvs) > 1):
             several = f"`rv` asks for {len(self.rvs)}"
@@ -220,7 +229,7 @@ class Settings:
             if getattr(self, name) and found != needed:
                 choose = f'leave out `{name}`, or choose `{other}="{needed}"`'
                 yield f"{name}: has no meaning if `{other}` is {found}: {choose}"
-        if self.rv_follows == "strain" and self.strain not in STRAIN_MODES:
+        if self.rv_follows == "strain" and self.strain not in values.STRAIN_MODES:
             yield (
                 f"rv_follows: a file of strains ({self.strain}) does not say how the sample "
                 f"deforms along all axes: choose another `strain`, or leave out `rv_follows`"
@@ -231,21 +240,9 @@ class Settings:
                 "the second moment of the full lengths: choose `edge=start`, or `moment=1`"
             )
 
-    def check_sizes(self, dimension: int) -> None:
-        """
-        Check that the number of the RV's sizes fits the dimension of the sample.
-
-        Parameters
-        ----------
-        dimension : int
-            2 for discs, 3 for spheres.
-
-        Raises
-        ------
-        SettingsError
-            If there are too many sizes, or too few.
-        """
-        shape, takes = self.rv_shape, SHAPES.get(self.rv_shape)
+    def _check_sizes(self, dimension: int) -> None:
+        """Raise DimensionError if the RV has too many or too few sizes for discs or spheres."""
+        shape, takes = self.rv_shape, values.SHAPES.get(self.rv_shape)
         if not self.rv_size or not takes:
             return
         if len(self.rv_size) != (2 if shape == "cylinder" else dimension):
@@ -255,6 +252,61 @@ class Settings:
             raise DimensionError(
                 f"rv_size: expected {takes} (`rv_shape` is {shape}), found {found}"
             )
+
+    def in_space(self, space: Space) -> Settings:
+        """
+        Adapt settings to discs in a plane; settings for spheres do not change.
+
+        Parameters
+        ----------
+        space : Space
+            Space of the first frame that has grains: only a frame shows that the grains are discs.
+
+        Raises
+        ------
+        DimensionError
+            If the settings are for spheres and the grains are discs, or the other way round.
+        """
+        self._check_sizes(space.dimension)
+        if space.across is None:
+            return self
+        if self.rv_shape not in ("sphere", "box", "ellipsoid"):
+            raise DimensionError(
+                f"rv_shape: {self.rv_shape} is no window for discs in {space}: choose sphere (a "
+                f"circle), box (a rectangle) or ellipsoid (an ellipse)"
+            )
+        return replace(
+            self, axis=self._axis_in(space, space.across), directions=self._directions_in(space)
+        )
+
+    def _axis_in(self, space: Space, across: int) -> Axis:
+        """The loading axis in a plane; the default is the second axis of the plane."""
+        axis, (first, second) = self.axis, ("xyz"[k] for k in sorted(space.along))
+        if isinstance(axis, values.UsualAxis):
+            return values.AXES[second]
+        if abs(axis[across]) > ROUNDING:
+            named = as_written(axis)
+            spelt = named if isinstance(named, str) else spelt_place(axis)
+            raise DimensionError(
+                f"axis: the axis {spelt} leads out of {space} of the discs: choose {first}, "
+                f"{second}, or another axis in the plane"
+            )
+        if axis[across] == 0.0:
+            return axis
+        flat = [0.0 if k == across else part for k, part in enumerate(axis)]
+        return Axis(*(part / math.hypot(*flat) for part in flat))
+
+    def _directions_in(self, space: Space) -> DirectionRule | None:
+        """The direction rule in a plane: as many equal angles as axes were asked for."""
+        rule = self.directions
+        if rule is None or rule.space == space:
+            return rule
+        if rule.asked is None:
+            raise DimensionError(
+                f"directions: {rule.name} is a rule for three dimensions, but all discs lie in "
+                f"{space}: choose a number of axes, such as 16"
+            )
+        return rule_of(rule.asked, space)
 
     @property
     def rvs(self) -> tuple[float, ...]:

@@ -9,7 +9,7 @@ import pytest
 
 import scanfab
 from scanfab.cli.main import run
-from scanfab.pipeline.repeat import repeat_command
+from scanfab.pipeline.record import repeat_command
 from tests.helpers.interruptions import write_series
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")

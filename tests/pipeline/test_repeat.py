@@ -9,8 +9,13 @@ import pytest
 
 from scanfab.base.errors import ReadError
 from scanfab.cli.main import run
-from scanfab.pipeline.record import asked_for, read_manifest, restored_settings
-from scanfab.pipeline.repeat import reopen, repeat_command
+from scanfab.pipeline.record import (
+    asked_for,
+    read_manifest,
+    reopen,
+    repeat_command,
+    restored_settings,
+)
 from scanfab.pipeline.settings import Settings
 from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import cubic_rows, dump_text, write
@@ -44,7 +49,7 @@ def asked_by(tmp_path, monkeypatch):
             found.update(asked_for(*given))
             raise ReadError("enough")
 
-        monkeypatch.setattr("scanfab.pipeline.record.asked_for", remember)
+        monkeypatch.setattr("scanfab.pipeline.job.asked_for", remember)
         assert run(["compute", *words]) == 1
         return json.loads(json.dumps(found))
 
