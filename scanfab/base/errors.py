@@ -7,8 +7,11 @@ frame; the command line and the report make sentences of it.
 
 from __future__ import annotations
 
+import re
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import NamedTuple
 
 SKIPPED = "skipped"
@@ -43,6 +46,10 @@ class DimensionError(SettingsError):
     """An option for spheres is used with discs, or the other way round."""
 
 
+class NoReferenceError(SettingsError):
+    """The frame that `reference` names does not exist, or has no grains."""
+
+
 class ScanfabWarning(UserWarning):
     """A doubt about a result, which is nevertheless computed."""
 
@@ -64,6 +71,8 @@ class Note(NamedTuple):
     """The message; it names options as Python spells them."""
     variants: tuple[str, ...] = ()
     """Variants that the note is about; empty if it is about the whole frame."""
+    kind: type[Warning] = ScanfabWarning
+    """How it is issued: a doubt about a result, or mere information (:class:`ScanfabNote`)."""
 
     def told(self, where: str) -> str:
         """
@@ -82,27 +91,51 @@ class Note(NamedTuple):
         return f"{where}{named}: {self.text}"
 
 
+_kept: ContextVar[list[Note] | None] = ContextVar("kept", default=None)
+
+
 def warn(text: str) -> None:
     """Warn the user of a doubt about a result."""
-    warnings.warn(text, ScanfabWarning, stacklevel=5)
+    _issue(text, ScanfabWarning)
 
 
 def note(text: str) -> None:
     """Inform the user of something that puts no result in doubt."""
-    warnings.warn(text, ScanfabNote, stacklevel=5)
+    _issue(text, ScanfabNote)
+
+
+def _issue(text: str, kind: type[Warning]) -> None:
+    kept = _kept.get()
+    if kept is None:
+        warnings.warn(text, kind, stacklevel=6)
+    else:
+        # messages that differ only in numbers, such as steps in names of files, are the same note
+        kept.append(Note(re.sub(r"\d+", "", text), text, kind=kind))
+
+
+@contextmanager
+def collected() -> Iterator[list[Note]]:
+    """Collect what this thread calls :func:`warn` and :func:`note` for inside the block."""
+    notes: list[Note] = []
+    token = _kept.set(notes)
+    try:
+        yield notes
+    finally:
+        _kept.reset(token)
 
 
 def joined(notes: Iterable[Note]) -> tuple[Note, ...]:
     """Merge notes with the same message into one note about all their variants."""
-    variants: dict[tuple[str, str], dict[str, None]] = {}
-    for code, text, about in notes:
-        variants.setdefault((code, text), {}).update(dict.fromkeys(about))
-    return tuple(Note(*key, tuple(about)) for key, about in variants.items())
+    merged: dict[tuple[str, str], Note] = {}
+    for one in notes:
+        before = merged.setdefault((one.code, one.text), one)
+        variants = tuple(dict.fromkeys(before.variants + one.variants))
+        merged[one.code, one.text] = before._replace(variants=variants)
+    return tuple(merged.values())
 
 
 def tell(notes: Iterable[Note], where: str = "") -> None:
-    """Issue a warning for each note; a skipped frame has a warning class of its own."""
+    """Issue a warning for each note; ``where`` names its frame."""
     for note in notes:
-        skipped = note.code == SKIPPED
-        text = note.told(f"{where} skipped" if skipped else where)
-        warnings.warn(text, SkippedFrameWarning if skipped else ScanfabWarning, stacklevel=3)
+        text = note.told(f"{where} skipped" if note.code == SKIPPED else where)
+        warnings.warn(text, note.kind, stacklevel=3)

@@ -43,7 +43,7 @@ def run(args: list[str]) -> int:
     """Run a command and return its exit code; an error becomes one message on standard error."""
     import click
 
-    from scanfab.base.errors import DimensionError
+    from scanfab.base.errors import DimensionError, NoReferenceError
     from scanfab.cli.group import cli
     from scanfab.cli.signals import interrupted_words
 
@@ -63,7 +63,7 @@ def run(args: list[str]) -> int:
         if debug or (message := _message(error)) is None:
             raise
         click.echo(f"scanfab: error: {message}", err=True)
-        return 2 if isinstance(error, DimensionError) else 1
+        return 2 if isinstance(error, DimensionError | NoReferenceError) else 1
 
 
 def _message(error: Exception) -> str | None:

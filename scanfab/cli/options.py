@@ -34,7 +34,16 @@ S = TypeVar("S", bound=Settings)
 SETS: dict[str, Sequence[str]] = {
     "READING": [option.name for option in READING_OPTIONS],
     "SAMPLE": ("boundary", "min_contacts", "rattlers", "min_force", "contact_tolerance"),
-    "WINDOW": ("rv", "rv_radius", "rv_center", "rv_shape", "rv_size", "rv_axis", "rv_follows"),
+    "WINDOW": (
+        "reference",
+        "rv",
+        "rv_radius",
+        "rv_center",
+        "rv_shape",
+        "rv_size",
+        "rv_axis",
+        "rv_follows",
+    ),  # fmt: skip
     "EXCERPT": ("fields", "digits"),
 }
 # --cutoff of commands that take tables

@@ -81,6 +81,18 @@ class SampleState(NamedTuple):
         return deviator / size
 
 
+def void_scatter(blocked: BlockedSums, axis: FloatArray, space: Space) -> Jackknife | None:
+    """Axial anisotropy of the void fabric without each block; None if any does not exist."""
+    axes, weights, full, without = blocked
+    values = []
+    for length, segments in (full, *without):
+        fabric = void_fabric(axes, weights, length, segments, space)
+        if fabric is None:
+            return None
+        values.append(axial(fabric.replicates, axis, space))
+    return jackknife(np.array(values))
+
+
 @dataclass(frozen=True, eq=False)
 class Measured:
     """Input of all fabrics, and results that several fabrics share."""
@@ -137,16 +149,7 @@ class Measured:
     @cached_property
     def void_scatter(self) -> Jackknife | None:
         """Axial anisotropy of the void fabric without each block; None if any does not exist."""
-        if self.void is None:
-            return None
-        axes, weights, full, without = self.blocked
-        values = []
-        for length, segments in (full, *without):
-            fabric = void_fabric(axes, weights, length, segments, self.space)
-            if fabric is None:
-                return None
-            values.append(axial(fabric.replicates, self.axis, self.space))
-        return jackknife(np.array(values))
+        return None if self.void is None else void_scatter(self.blocked, self.axis, self.space)
 
     @cached_property
     def contact_scatter(self) -> Jackknife | None:

@@ -180,7 +180,7 @@ def regrouped(first: int, before: Grouping, now: Grouping) -> Note | None:
     if not both == len(np.unique(one)) == len(np.unique(two)):
         text = (
             f"other spheres are one body than in frame {first}: each frame is computed with its "
-            f"own bodies; is the column that numbers them the right one (`bodies`)? (told once)"
+            f"own bodies; is the column that numbers them the right one (`bodies`)?"
         )
         return Note("other_bodies", text)
     if len(common) == len(before.id) == len(now.id):
@@ -189,7 +189,7 @@ def regrouped(first: int, before: Grouping, now: Grouping) -> Note | None:
         f"{counted(len(np.unique(frame.body)), 'grain')} of {counted(len(frame.id), 'sphere')}"
         for frame in (now, before)
     )
-    text = f"{here}, where frame {first} has {there}: grains have left or come in (told once)"
+    text = f"{here}, where frame {first} has {there}: grains have left or come in"
     return Note("grains_left", text)
 
 

@@ -17,11 +17,11 @@ from scanfab.base.option import options_of, refuse_unknown
 from scanfab.base.spelling import counted
 from scanfab.io.options import parse_frames
 from scanfab.pipeline.frame import OTHER_CUTOFFS, compute_frame
-from scanfab.pipeline.frames import Frames, Source
+from scanfab.pipeline.frames import Frames, Source, doubts_of_frame
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import make_plan
-from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work, variant_errors
+from scanfab.pipeline.settings import MAX_CHORDS, OF_SAMPLE, Settings
+from scanfab.pipeline.tolerance import missing_work, variant_errors
 from scanfab.pipeline.values import SHAPES, Length
 from scanfab.scan.directions import direction_rule, rule_of, usual_rule
 from scanfab.table.plots import Plots
@@ -42,8 +42,6 @@ STEPS = (3, 5, 8, 16, 32, 64, 128)
 CUTOFFS = tuple(0.25 * k for k in range(13))
 # ladder of RVs: fractions of half the smallest extent
 RV_FRACTIONS = (0.4, 0.5, 0.6, 0.67, 0.7, 0.8)
-# wanted error of the scan over the error of the sample: it raises the total error by 3 %
-OF_SAMPLE = 0.25
 # most directions to recommend, and number of times that recommended settings are tried and refined
 MOST_DIRECTIONS, ROUNDS = 2905, 5
 # significance level for a difference between steps of a ladder, and degrees of freedom of the
@@ -152,7 +150,7 @@ def calibrate(
     Calibration
         Steps of all ladders, and recommended settings. These start from the widest spacing and the
         fewest directions beyond which nothing changes. Directions are then added until the error
-        of the scan is below a quarter of the error of the sample, or at the tolerance if that is
+        of the scan is below a twentieth of the error of the sample, or at the tolerance if that is
         larger.
 
     Raises
@@ -176,6 +174,9 @@ def calibrate(
     settings = Settings(variants=variants, **options)
     if settings.lists_gaps or len(settings.rvs) > 1:
         raise SettingsError("calibrate: leave out `cutoffs`, `moment` and all but one `rv`")
+    # a number, so that the ladders differ in nothing but their steps
+    most = settings.max_chords or MAX_CHORDS
+    settings = replace(settings, tolerance=settings.aim(), max_chords=most)
     one_frame = _OneFrame(source, settings, frame)
     cutoffs = one_frame.cutoffs()
     spacings, directions, rvs = (one_frame.ladder(name) for name in ("spacing", "directions", "rv"))
@@ -183,7 +184,7 @@ def calibrate(
     cutoff = settings.cutoff.value if settings.cutoff.unit == "rmin" else PAPER_CUTOFF
     at_cutoff = [row for row in cutoffs if row.value == cutoff] or cutoffs
     sample = _largest(at_cutoff, "alpha_vs_axial_sample_se")
-    target = max(settings.tolerance, OF_SAMPLE * (sample or 0.0))
+    target = max(settings.aim(), OF_SAMPLE * (sample or 0.0))
     best, recommended = one_frame.recommended(spacings, directions, target)
     findings = [_finding(name, rows) for name, rows in ladders.items() if rows]
     reached, own = (
@@ -204,17 +205,17 @@ class _OneFrame:
         frames = Frames(source, replace(settings, frames=parse_frames(frame, "frame")))
         self.name, (self.number, wanted) = frames.name, frames.one()
         # the first frame of the series that has grains makes the plan
-        first = frames.first()
+        first = frames.reference()
         if first is None:
             raise PackingError("no frame has grains, so there is nothing to calibrate")
-        number, readable, self.first = first
-        tell(frames.notes(readable, self.first))
+        number, _, self.first = first
         sample = self.first if number == self.number else frames.sample(self.number, wanted)
         if sample is None or not sample.grains.any():
             raise PackingError(f"frame {self.number} has no grains: choose another frame")
         self.name, self.sample, self.space = frames.name, sample, self.first.packing.space
         self.settings = settings.in_space(self.space)
-        tell(sample.doubts_of_escaped(), f"frame {self.number}")
+        doubts = doubts_of_frame(wanted, sample, self.settings)
+        tell([*doubts, *sample.doubts_of_escaped()], f"frame {self.number}")
         # these notes hold for every step
         tell(make_plan(self.settings, self.first).notes)
 
@@ -265,10 +266,10 @@ class _OneFrame:
         plan, radius = make_plan(settings, self.first), self.sample.packing.radius
         shadow = self.space.shadow(radius[self.sample.grains])
         chords = self.space.lines(shadow, plan.spacing) * plan.replicates * len(plan.rule)
-        if ladder in ("spacing", "directions") and chords > settings.max_chords:
+        if ladder in ("spacing", "directions") and chords > settings.budget:
             raise SettingsError(
                 f"it would cut {chords:.2g} chords from grains, more than `max_chords` allows "
-                f"({settings.max_chords:g})"
+                f"({settings.budget:g})"
             )
         result = compute_frame(self.sample, plan, number=self.number, source=self.name)
         seconds = time.perf_counter() - begun
@@ -278,7 +279,6 @@ class _OneFrame:
         for row in result.rows:
             # notes on errors at other cut-offs are dropped: each row has its own error
             own = [n for n in result.notes if row.variant in n.variants and n.code != OTHER_CUTOFFS]
-            own += [note for note in result.notes if note.code == TOLERANCE_MISSED]
             step = StepRow(
                 **{field.name: row[field.name] for field in fields(StepRow) if field.name in row},
                 ladder=ladder,
@@ -309,7 +309,8 @@ class _OneFrame:
         for _ in range(ROUNDS):
             trial = replace(other_lines, spacing=Length(spacing, "rmin"), directions=rule)
             _, found = self.step("recommended", len(rule), trial)
-            errors = [variant_errors(found.sums, found.plan, name) for name in found.plan.variants]
+            names = found.plan.variants
+            errors = [variant_errors(found.sums, found.plan, name).over(target) for name in names]
             missing = missing_work(errors, found.plan, found.sums.replicates)
             if missing <= 1.0:
                 break

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-import os
-import platform
-import threading
 import time
-import warnings
 from collections import deque
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor, wait
@@ -16,20 +12,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from scanfab.base.errors import SKIPPED, Note, PackingError, ReadError, tell
+from scanfab.base.errors import (
+    SKIPPED,
+    Note,
+    PackingError,
+    ReadError,
+    SkippedFrameWarning,
+    collected,
+    tell,
+)
 from scanfab.base.option import options_of, takes_options, unusable
 from scanfab.io.frame import Frame
-from scanfab.packing.bodies import Grouping, regrouped
-from scanfab.packing.cell import Cell
-from scanfab.packing.escaped import ESCAPED
-from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.cluster import DaskExecutor, DeadWorkersError
 from scanfab.pipeline.frame import FrameResult, compute_frame
-from scanfab.pipeline.frames import Frames, Source
+from scanfab.pipeline.frames import Frames, Source, Unread, doubts_of_frame
 from scanfab.pipeline.plan import Plan, make_plan, plan_without_grains
-from scanfab.pipeline.settings import MAX_CHORDS, Settings
-from scanfab.pipeline.strain import Flips
+from scanfab.pipeline.series_notes import Facts, SeriesNotes
+from scanfab.pipeline.settings import Settings
 from scanfab.scan.directions import DirectionRule
 from scanfab.table.row import Row
 from scanfab.table.table import Table
@@ -38,12 +38,8 @@ LOGGER = logging.getLogger("scanfab")
 
 Observer = Callable[[FrameResult], None]
 
-# codes of notes that would be repeated in all later frames: a grain that flew away stays away
-ONCE_A_SERIES = {ESCAPED, "other_bodies", "grains_left"}
 # a run that waits for a frame asks so often, in seconds, how many frames the workers can take
 PAUSE = 2.0
-# the warnings of the frame that a thread of another process computes
-_heard = threading.local()
 
 
 @takes_options(options_of(Settings))
@@ -66,8 +62,8 @@ def compute(
     moment: int = 1,
     spacing: str | float = "auto",
     directions: str | int | DirectionRule = "auto",
-    tolerance: float = 1e-4,
-    max_chords: float = MAX_CHORDS,
+    tolerance: str | float = "auto",
+    max_chords: float | None = None,
     min_contacts: int = 2,
     rattlers: str = "count",
     min_force: float = 0.0,
@@ -76,6 +72,7 @@ def compute(
     with_: str | Sequence[str] | None = None,
     strain: str | Path = "auto",
     frames: str | int | slice | None = None,
+    reference: int | None = None,
     seed: int = 0,
     workers: int | None = None,
     on_error: str = "stop",
@@ -138,6 +135,7 @@ def compute_frames(
     done: Container[int] = (),
     observe: Observer | None = None,
     executor: Executor | None = None,
+    notes: SeriesNotes | None = None,
 ) -> Iterator[list[Row]]:
     """
     Compute the rows of :func:`compute`, frame by frame in the order of the series.
@@ -150,6 +148,8 @@ def compute_frames(
         Frames to leave out, because an earlier run has computed them.
     observe : callable, optional
         Called with the :class:`FrameResult` of each frame, in the process that computes it.
+    notes : SeriesNotes, optional
+        Issues what there is to say of the frames.
 
     Yields
     ------
@@ -161,20 +161,22 @@ def compute_frames(
         raise unusable("executor", "a concurrent.futures.Executor", executor)
     frames = Frames(source, settings)
     # an error in a file of strains is raised before the first frame is read
-    plan = plan_without_grains(settings)
-    if (first := frames.first()) is not None:
-        _, frame, sample = first
-        tell(frames.notes(frame, sample))
-        plan = make_plan(settings, sample)
+    plan, reference = plan_without_grains(settings), None
+    with collected() as told:
+        found = frames.reference()
+    if found is not None:
+        plan = make_plan(settings, found[2])
+        reference = found[0], float(found[2].packing.radius[found[2].grains].min())
         tell(plan.notes)
-    notes, own = _SeriesNotes(frames.settings), ThreadPoolExecutor(settings.workers)
+    notes, own = notes or SeriesNotes(frames.settings), ThreadPoolExecutor(settings.workers)
     try:
-        jobs = _jobs(frames, plan, done, observe, is_far=executor is not None)
+        jobs = _jobs(frames, plan, done, observe, told, is_far=executor is not None)
         for computed in _in_order(jobs, executor or own, settings, own):
-            notes.tell(computed)
+            notes.add(computed.number, computed.rows, computed.notes, computed.facts)
             if computed.rows:
                 yield computed.rows
     finally:
+        notes.end(reference)
         # an interrupted run does not wait for the frames under way
         own.shutdown(wait=False, cancel_futures=True)
     if math.isnan(plan.cutoff):
@@ -182,9 +184,14 @@ def compute_frames(
 
 
 def _jobs(
-    frames: Frames, plan: Plan, done: Container[int], observe: Observer | None, is_far: bool
-) -> Iterator[_Job | None]:
-    """The chosen frames that are not done; None while the next frame of a simulation is missing."""
+    frames: Frames, plan: Plan, done: Container[int], observe: Observer | None, told: list[Note],
+    is_far: bool,
+) -> Iterator[_Job | None]:  # fmt: skip
+    """
+    The chosen frames that are not done; None while the next frame of a simulation is missing.
+
+    ``told`` is what was said while the reference frame was read.
+    """
     for due in frames.as_they_come():
         if due is None:
             yield None
@@ -193,10 +200,12 @@ def _jobs(
         known = frames.ready.pop(number, frame)
         if number in done or known is None:
             continue
+        sample = known if isinstance(known, Sample) else None
         if is_far and isinstance(frame, Frame):
             # another process reads the frame itself, even if it was read here
-            known = frame.alone()
-        yield _Job(known, plan, number, frames.name, observe, _here())
+            frame, sample = frame.alone(), None
+        already = told if sample is not None else []
+        yield _Job(frame, sample, plan, number, frames.name, observe, already)
 
 
 class _Computed(NamedTuple):
@@ -204,26 +213,24 @@ class _Computed(NamedTuple):
 
     number: int
     rows: list[Row]
-    notes: tuple[Note, ...]
-    cell: Cell | None = None
-    """None also if the frame has no grains."""
-    grouping: Grouping | None = None
-    """The clumps; None if each sphere is a grain."""
-    heard: tuple[Warning, ...] = ()
-    """Warnings of another process, which nobody has seen there."""
+    notes: Sequence[Note]
+    facts: Facts | None = None
+    """None if the frame has no grains."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Job:
     """One frame to be computed, by a thread of this process or by another process."""
 
-    frame: Sample | Packing | Frame
+    frame: Unread
+    sample: Sample | None
+    """What is in the frame, if it was read already."""
     plan: Plan
     number: int
     source: str
     observe: Observer | None
-    home: tuple[str, int]
-    """Machine and process that show warnings to the user."""
+    told: Sequence[Note]
+    """What was said while it was read."""
 
     def __str__(self) -> str:
         return f"frame {self.number}"
@@ -234,55 +241,18 @@ class _Job:
         return self.frame.snapshot.path if isinstance(self.frame, Frame) else None
 
     def __call__(self, threads: int) -> _Computed:
-        if _here() != self.home:
-            # threads of a worker compute frames side by side, so each keeps its own warnings
-            warnings.simplefilter("always")
-            warnings.showwarning = _hear
-        begun, _heard.warnings = time.perf_counter(), []
-        plan = replace(self.plan, workers=threads)
-        found = compute_frame(self.frame, plan, number=self.number, source=self.source)
-        seconds, packing = time.perf_counter() - begun, found.sample.packing
-        grains = found.sample.number(found.sample.grains)
+        begun, plan = time.perf_counter(), replace(self.plan, workers=threads)
+        with collected() as told:
+            frame = self.sample or self.frame
+            found = compute_frame(frame, plan, number=self.number, source=self.source)
+        seconds, sample = time.perf_counter() - begun, found.sample
+        grains = sample.number(sample.grains)
         LOGGER.info("%s: frame %d: %d grains in %.2g s", self.source, self.number, grains, seconds)
         if self.observe is not None:
             self.observe(found)
-        grouping = None
-        if packing.bodies is not None:
-            grouping = Grouping(packing.id, packing.id[packing.bodies.head])
-        cell, heard = packing.cell if grains else None, tuple(_heard.warnings)
-        return _Computed(self.number, found.rows, found.notes, cell, grouping, heard)
-
-
-def _here() -> tuple[str, int]:
-    return platform.node(), os.getpid()
-
-
-def _hear(message: Any, *_: Any, **__: Any) -> None:
-    """Take the place of ``warnings.showwarning`` in the process of a worker."""
-    getattr(_heard, "warnings", []).append(message)
-
-
-class _SeriesNotes:
-    """Issues the notes of the frames of one series as warnings, in the order of the frames."""
-
-    def __init__(self, settings: Settings) -> None:
-        self._flips = Flips(settings.frames.step)
-        self._first: tuple[int, Grouping] | None = None
-        self._told: set[str] = set()
-
-    def tell(self, computed: _Computed) -> None:
-        """Issue the notes of a frame."""
-        for warning in computed.heard:
-            warnings.warn(warning, stacklevel=3)
-        notes = list(computed.notes)
-        if computed.grouping is not None:
-            self._first = self._first or (computed.number, computed.grouping)
-            notes += filter(None, [regrouped(*self._first, computed.grouping)])
-        for note in notes:
-            if note.code not in ONCE_A_SERIES & self._told:
-                tell([note], f"frame {computed.number}")
-            self._told.add(note.code)
-        tell(self._flips.notes(computed.number, computed.cell))
+        doubts = doubts_of_frame(self.frame, sample, plan.settings)
+        notes = [*self.told, *told, *doubts, *found.notes]
+        return _Computed(self.number, found.rows, notes, Facts.of(sample) if grains else None)
 
 
 def _in_order(
@@ -333,4 +303,5 @@ def _result(executor: Executor, job: _Job, future: Future[_Computed], skips: boo
         error = executor.explained(found, job) if isinstance(executor, DaskExecutor) else found
         if not skips or not isinstance(error, PackingError | ReadError | DeadWorkersError):
             raise error from None
-        return _Computed(job.number, [], (Note(SKIPPED, str(error).removeprefix(f"{job}: ")),))
+        text = str(error).removeprefix(f"{job}: ")
+        return _Computed(job.number, [], [Note(SKIPPED, text, kind=SkippedFrameWarning)])

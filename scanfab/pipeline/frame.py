@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -18,12 +18,15 @@ from scanfab.pipeline.frames import packing_of, sample_rule
 from scanfab.pipeline.maps.rows import map_rows
 from scanfab.pipeline.measurement import Measurement, measure
 from scanfab.pipeline.plan import Plan
+from scanfab.pipeline.rv import RV, doubts_of_rv
 from scanfab.pipeline.state import refuse_forces
 from scanfab.pipeline.variant_columns import VariantColumns
 from scanfab.scan.blocks import Blocks
 from scanfab.table.columns import row_of
 from scanfab.table.row import Row
 
+# with fewer grains the numbers of a row mean little
+FEW_GRAINS = 10
 OTHER_CUTOFFS = "error_at_other_cutoffs"
 """Code of the note that the scan is fine enough for its cut-off, but not for another."""
 
@@ -35,9 +38,11 @@ class FrameResult:
     source: str
     number: int
     sample: Sample
-    measurements: tuple[Measurement, ...]
-    """One for each RV, the smallest first; the first also holds the whole sample. Empty for a map
-    and for a frame without grains."""
+    measurements: Sequence[Measurement]
+    """
+    One for each RV. The whole sample has one of its own in an auto scan; in a fixed scan the first
+    RV's holds it too. Empty for a map and for a frame without grains.
+    """
     rows: list[Row]
     notes: tuple[Note, ...] = ()
     """Doubts about the rows."""
@@ -53,7 +58,7 @@ class FrameResult:
         return next(
             one
             for one in self.measurements
-            if one.plan.rvs_of(variant)[0].fraction == rv and variant in one.plan.variants
+            if variant in one.plan.variants and one.plan.rvs_of(variant)[0].fraction == rv
         )
 
 
@@ -107,27 +112,33 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
     }
     if not has_grains:
         return FrameResult(source, number, frame, (), list(_empty_rows(known, plan)))
-    escaped = frame.doubts_of_escaped()
+    rvs, plan = plan.rvs, plan.in_frame(frame)
+    notes = frame.doubts_of_escaped()
+    notes += [note for rv in plan.rvs for note in doubts_of_rv(rv, frame)]
     if plan.map_blocks is not None:
-        mapped, told, blocks = map_rows(frame, plan.in_frame(frame), known, f"frame {number}")
-        return FrameResult(source, number, frame, (), mapped, (*escaped, *told), blocks)
+        rows, told, blocks = map_rows(frame, plan, known, f"frame {number}")
+        return FrameResult(source, number, frame, (), rows, (*notes, *told), blocks)
     groups, columns = plan.settings.with_, plan.settings.columns
     if "forces" in groups or "state" in groups:
         refuse_forces(frame, groups)
-    measurements = measure(frame, plan.in_frame(frame), f"frame {number}")
-    rows: list[Row] = []
+    result = FrameResult(source, number, frame, measure(frame, plan, f"frame {number}"), [])
     doubts: list[Note] = []
     for variant in plan.variants:
-        for measurement, _ in zip(measurements, plan.rvs_of(variant), strict=False):
+        for rv in rvs if VARIANTS[variant].in_window else (RV(),):
+            measurement = result.measured(variant, rv.fraction)
             for place in range(len(plan.cutoffs)):
                 # one at a time, because each holds the contacts of its variant
                 one = VariantColumns(measurement, VARIANTS[variant], place)
                 values = {**known, "variant": variant, **one.columns()}
-                rows.append(row_of(columns, values))
+                result.rows.append(row_of(columns, values))
                 doubts += one.notes()
-    of_scan = [note for measurement in measurements for note in measurement.notes]
-    notes = (*escaped, *of_scan, *joined(doubts), *_large_errors(rows, plan))
-    return FrameResult(source, number, frame, measurements, rows, notes)
+    few = tuple(dict.fromkeys(row.variant for row in result.rows if 0 < row.grains < FEW_GRAINS))
+    if few:
+        text = f"fewer than {FEW_GRAINS} grains: the numbers of these rows mean little"
+        doubts.append(Note("few_grains", text, few))
+    notes += [note for measurement in result.measurements for note in measurement.notes]
+    notes += [*joined(doubts), *_large_errors(result.rows, plan)]
+    return replace(result, notes=tuple(notes))
 
 
 def _empty_rows(known: Mapping[str, Any], plan: Plan) -> Iterator[Row]:
@@ -145,9 +156,13 @@ def _large_errors(rows: list[Row], plan: Plan) -> Iterator[Note]:
 
     This happens for other cut-offs, other RVs and the second moment, which use the same lines.
     """
-    worst = max(rows, key=lambda row: row.alpha_vs_axial_se or 0.0)
+
+    def aim_of(row: Row) -> float:
+        return plan.settings.aim(row.alpha_vs_axial_sample_se)
+
+    worst = max(rows, key=lambda row: (row.alpha_vs_axial_se or 0.0) / aim_of(row))
     error, rv = worst.alpha_vs_axial_se or 0.0, worst.get(RV_COLUMN.name)
-    aim, others = plan.settings.tolerance, plan.settings.lists_gaps or len(plan.rvs) > 1
+    aim, others = aim_of(worst), plan.settings.lists_gaps or len(plan.rvs) > 1
     if plan.auto and others and error > aim:
         reached, tolerance = spelt_apart(error, aim)
         where = f"at the cut-off {worst.cutoff:g}{f' in the RV {rv:g}' if rv else ''}"

@@ -1,4 +1,4 @@
-"""The frames of one source as samples: the chosen frames, and the first that has grains."""
+"""The frames of one source as samples: the chosen frames, and the reference frame."""
 
 from __future__ import annotations
 
@@ -10,7 +10,17 @@ from functools import cached_property
 from itertools import count, islice
 from typing import Any
 
-from scanfab.base.errors import SKIPPED, Note, PackingError, ReadError, SettingsError, tell
+from scanfab.base.errors import (
+    SKIPPED,
+    NoReferenceError,
+    Note,
+    PackingError,
+    ReadError,
+    SettingsError,
+    SkippedFrameWarning,
+    tell,
+)
+from scanfab.base.spelling import counted
 from scanfab.io.follow import FollowedSeries
 from scanfab.io.frame import Frame
 from scanfab.io.series import ENDLESS, Series
@@ -68,16 +78,16 @@ class Frames:
     The frames of one source, read when they are needed; a packing is a series of one frame.
 
     With ``on_error="stop"`` a damaged frame is an error. With ``"skip"`` a warning names it and it
-    is left out, no matter whether it was chosen or lies before the first frame that has grains. No
-    frame is read twice: samples that the search for that first frame has read are used again.
+    is left out, no matter whether it was chosen or lies before the reference frame. No frame is
+    read twice: samples that the search for the reference frame has read are used again.
 
     Parameters
     ----------
     source : Packing, Series or iterable of Packing
         One frame, or many.
     settings : Settings
-        Only ``frames``, ``on_error``, ``boundary``, ``min_contacts``, ``rattlers``, ``min_force``
-        and ``contact_tolerance`` are used.
+        Only ``frames``, ``reference``, ``on_error``, ``boundary``, ``min_contacts``, ``rattlers``,
+        ``min_force`` and ``contact_tolerance`` are used.
 
     Raises
     ------
@@ -98,9 +108,11 @@ class Frames:
         if isinstance(self.source, FollowedSeries) and _counts_from_end(self.settings.frames):
             what = f"{as_written(self.settings.frames)} counts from the end of the series"
             raise SettingsError(f"frames: {what}, which nobody knows while it is followed")
+        self.named = number_of_reference(self.source, self.settings)
+        """Number of the reference frame, if the user names one."""
         self.name = self.source.name
         self.ready: dict[int, Sample | None] = {}
-        """Chosen frames that :meth:`first` has read; None for damaged frames."""
+        """Chosen frames that :meth:`reference` has read; None for damaged frames."""
 
     def __iter__(self) -> Iterator[tuple[int, Unread]]:
         """All frames with their numbers, unread."""
@@ -150,24 +162,42 @@ class Frames:
                 return number, frame
         raise self.no_such_frames()
 
-    def first(self) -> tuple[int, Unread, Sample] | None:
+    def reference(self) -> tuple[int, Unread, Sample] | None:
         """
-        The first frame of the series that has grains, chosen or not; None if no frame has any.
+        The frame that lengths come from: the one that the user names, else the first with grains.
+
+        It need not be chosen. None if no frame has any grains.
 
         Raises
         ------
+        NoReferenceError
+            If the frame that the user names does not exist or has no grains.
         SettingsError
             If no frame has boundary particles, or all particles are boundary.
+        ReadError
+            If the frame that the user names cannot be read.
         """
-        has_particles = False
+        has_particles, is_stream = False, isinstance(self.source, _Stream)
         for number, frame in self:
-            sample = self.sample(number, frame)
+            if self.named is not None and number < self.named and not is_stream:
+                continue
+            is_named = number == self.named
+            sample = self.read(frame) if is_named else self.sample(number, frame)
             if number in self.chosen:
                 self.ready[number] = sample
             if sample is not None and sample.grains.any():
+                if self.named not in (None, number):
+                    raise NoReferenceError(
+                        f"reference: packings are not kept, so it must be their first frame that "
+                        f"has grains: expected {number}, found {self.named}"
+                    )
                 tell(self.check_boundary(sample))
                 return number, frame, sample
+            if is_named:
+                raise NoReferenceError(f"reference: frame {number} of {self.name} has no grains")
             has_particles |= sample is not None and len(sample.packing) > 0
+        if self.named is not None:
+            raise no_such_reference(self.named, self.name, len(self.source))
         if has_particles:
             named = " or ".join(rule.text for rule in self.settings.boundary)
             what = f"{named} selects all particles of every frame"
@@ -183,21 +213,12 @@ class Frames:
         except (PackingError, ReadError) as error:
             if self.settings.on_error == "stop":
                 raise
-            tell([Note(SKIPPED, str(error))], f"frame {number}")
+            tell([Note(SKIPPED, str(error), kind=SkippedFrameWarning)], f"frame {number}")
             return None
 
     def read(self, frame: Unread) -> Sample:
         """Read a frame and sort its particles into grains, boundary and rattlers."""
         return sample_rule(self.settings).sample(packing_of(frame))
-
-    def notes(self, frame: Unread, sample: Sample) -> list[Note]:
-        """Doubts about a frame before anything is measured."""
-        file = frame if isinstance(frame, Frame) else None
-        notes = doubts_of(sample, **(file.named if file else {}))
-        # a packing made of arrays has the cell that its maker wants
-        if no_cell := cell_doubt(sample, file.carries if file else "cell"):
-            notes.append(Note("no_cell", no_cell))
-        return notes if self.settings.boundary else notes + boundary_hints(sample, self.settings)
 
     def check_boundary(self, first: Sample) -> list[Note]:
         """
@@ -229,6 +250,45 @@ class Frames:
         name, frames = self.name or "the packing", as_written(self.settings.frames)
         has = "1 frame, 0" if count == 1 else f"{count} frames, 0 to {count - 1}"
         return NoChosenFrameError(f"frames: the series has no frame in {frames}: {name} has {has}")
+
+
+def number_of_reference(source: Series | _Stream, settings: Settings) -> int | None:
+    """
+    The number of the reference frame, if the user names one, counted from 0.
+
+    Raises
+    ------
+    NoReferenceError
+        If the series has no such frame, or if it counts from an end that nobody knows yet.
+    """
+    named = settings.reference
+    if named is None or (named >= 0 and not isinstance(source, Series)):
+        return named
+    if isinstance(source, FollowedSeries | _Stream):
+        if named >= 0:
+            return named
+        what = f"{named} counts from the end, which nobody knows while frames are still to come"
+        raise NoReferenceError(f"reference: {what}: name a frame from the beginning")
+    count = len(source)
+    if not -count <= named < count:
+        raise no_such_reference(named, source.name, count)
+    return named % count
+
+
+def no_such_reference(number: int, name: str, count: int) -> NoReferenceError:
+    """The error for a reference frame that does not exist."""
+    has = f"{name or 'the source'} has {counted(count, 'frame')}"
+    return NoReferenceError(f"reference: there is no frame {number}: {has}, counted from 0")
+
+
+def doubts_of_frame(frame: Unread, sample: Sample, settings: Settings) -> list[Note]:
+    """What looks wrong in a frame before anything is measured."""
+    file = frame if isinstance(frame, Frame) else None
+    notes = doubts_of(sample, **(file.named if file else {}))
+    # a packing made of arrays has the cell that its maker wants
+    if no_cell := cell_doubt(sample, file.carries if file else "cell"):
+        notes.append(Note("no_cell", no_cell))
+    return notes if settings.boundary else notes + boundary_hints(sample, settings)
 
 
 def packing_of(frame: Unread) -> Packing:

@@ -14,13 +14,15 @@ from scanfab.base.convex import Convex
 from scanfab.base.errors import Note
 from scanfab.base.shapes import sphere
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.packing.sample import Sample, Variant
+from scanfab.fabric.measured import BlockedSums, void_scatter
+from scanfab.packing.sample import VARIANTS, Sample, Variant
 from scanfab.packing.window import Window, inner_ellipsoid
 from scanfab.pipeline.plan import NOISE, Plan
 from scanfab.pipeline.tolerance import scan_to_tolerance
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import DirectionRule, design_of, usual_rule
 from scanfab.scan.edges import CLIP, ENDS, START
+from scanfab.scan.following import FollowedTooFarError
 from scanfab.scan.gaps import GapSums, scan_gaps
 from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.scan import ScanSums
@@ -87,42 +89,92 @@ class Measurement:
     def at_cutoffs(self, cutoffs: Iterable[float]) -> Measurement:
         """The measurement of the same lines at other cut-offs, in the dump's unit."""
         plan = replace(self.plan, cutoffs=tuple(sorted(cutoffs)))
-        return _with_gaps(self.sample, self.solids, self.sums, plan, self.notes)
+        blocked, _ = _scan_octants(self.solids, plan, self.blocks)
+        gaps = _all_gaps(self.solids, plan, self.sums, self.blocks)
+        return replace(self, plan=plan, gaps=gaps, blocked=blocked)
 
 
-def measure(sample: Sample, plan: Plan, where: str = "the frame") -> tuple[Measurement, ...]:
+def measure(sample: Sample, plan: Plan, where: str = "the frame") -> list[Measurement]:
     """
     Scan one frame that has grains; all RVs are scanned along the same lines.
 
-    The whole sample is measured together with the first RV. ``where`` names the frame in the log.
+    In a fixed scan, the whole sample is measured together with the first RV. ``where`` names the
+    frame in the log.
     """
-    first = _measure(sample, plan, where)
-    others = first.plan.along(first.sums.replicates)
-    return (first, *(_measure(sample, other, where) for other in others))
+    found = []
+    for part in plan.scans():
+        first = _measure(sample, part, where)
+        others = first.plan.along(first.sums.replicates)
+        found += [first, *(_measure(sample, other, where) for other in others)]
+    return found
 
 
 def _measure(sample: Sample, plan: Plan, where: str) -> Measurement:
+    """Scan fewer lines for the sample's error, which may set the tolerance, then all lines."""
     solids = solids_of(sample, plan.window, variants=plan.variants, edge=plan.settings.edge)
-    sums, plan, notes = scan_to_tolerance(solids, plan, where)
-    return _with_gaps(sample, solids, sums, plan, tuple(notes))
+    if plan.rvs and plan.rvs[0].lack and all(VARIANTS[name].in_window for name in plan.variants):
+        # nothing is measured in this RV
+        none = np.zeros(len(solids.radius), bool)
+        solids = replace(
+            solids, position=solids.position[none], radius=solids.radius[none],
+            removed=solids.removed[none], around=None,
+        )  # fmt: skip
+    blocks = _octants(sample, plan)
+    blocked, rule = _scan_octants(solids, plan, blocks)
+    aims: dict[str, float] = {}
+    if plan.auto:
+        # the rows at this cut-off decide
+        place = int(np.argmin(np.abs(np.array(plan.cutoffs) - plan.cutoff)))
+        axis = np.asarray(plan.settings.axis)
+        for name in plan.variants:
+            scatter = void_scatter(blocked_sums(blocked, rule, plan, name, place), axis, plan.space)
+            aims[name] = plan.settings.aim(None if scatter is None else scatter.error)
+        held = [aims[name] for name in plan.variants if blocked.in_blocks(name, place)[1].any()]
+        # without any grain, wide lines show that there is none
+        plan = plan.aiming_at(min(held)) if held else replace(plan.aiming_at(1.0), auto="")
+    sums, plan, notes = scan_to_tolerance(solids, plan, aims, where)
+    gaps = _all_gaps(solids, plan, sums, blocks)
+    return Measurement(sample, plan, solids, sums, gaps, blocked, rule, blocks, tuple(notes))
 
 
-def _with_gaps(
-    sample: Sample, solids: Solids, sums: ScanSums, plan: Plan, notes: tuple[Note, ...]
-) -> Measurement:
-    """Add the gaps of all lines, if the plan needs them, and gaps by octant of a second scan."""
-    blocks, gaps = _octants(sample, plan), None
+def _all_gaps(
+    solids: Solids, plan: Plan, sums: ScanSums, blocks: tuple[Blocks, Blocks]
+) -> GapSums | None:
+    """All gaps of the lines of a scan, if several cut-offs or another moment need them."""
+    if not plan.settings.lists_gaps and len(plan.cutoffs) == 1:
+        return None
     scan = gap_scan(solids, plan, blocks, plan.cutoffs)
-    if plan.settings.lists_gaps or len(plan.cutoffs) > 1:
-        gaps = scan(plan.rule, spacing=plan.spacing, replicates=range(sums.replicates))
+    return scan(plan.rule, spacing=plan.spacing, replicates=range(sums.replicates))
+
+
+def _scan_octants(
+    solids: Solids, plan: Plan, blocks: tuple[Blocks, Blocks]
+) -> tuple[GapSums, DirectionRule]:
+    """Scan fewer lines, with gaps by octant, for the error due to the sample."""
     # the directions of an auto scan, or more directions for few grains
     count, rule = len(solids.grain_radius), usual_rule(solids.space)
     if len(rule) * count < AXES_TIMES_GRAINS:
         rule = design_of(AXES_TIMES_GRAINS / max(count, 1), solids.space)
     most = min(max(CHORDS_A_GRAIN * count, FEWEST_CHORDS), MOST_CHORDS)
-    spacing = coarse_spacing(solids, BLOCK_REPLICATES * len(rule), sums, plan, most)
-    blocked = scan(rule, spacing=spacing, replicates=range(BLOCK_REPLICATES))
-    return Measurement(sample, plan, solids, sums, gaps, blocked, rule, blocks, notes)
+    spacing = coarse_spacing(solids, BLOCK_REPLICATES * len(rule), plan, most)
+    scan = partial(gap_scan(solids, plan, blocks, plan.cutoffs), most_steps=most)
+    while True:
+        try:
+            return scan(rule, spacing=spacing, replicates=range(BLOCK_REPLICATES)), rule
+        except FollowedTooFarError:
+            # only a scan can tell how far lines run through a periodic medium
+            if solids.chords(2.0 * spacing) < 1.0:
+                raise
+            spacing *= 2.0
+
+
+def blocked_sums(
+    blocked: GapSums, rule: DirectionRule, plan: Plan, variant: str, place: int
+) -> BlockedSums:
+    """Sums over all octants and without each octant, of a variant at a cut-off of the plan."""
+    kept = partial(blocked.kept, variant, place, plan.settings.moment)
+    parts = range(2**plan.space.dimension)
+    return BlockedSums(blocked.axes, rule.weights, kept(), [kept(without=part) for part in parts])
 
 
 def gap_scan(
@@ -131,8 +183,7 @@ def gap_scan(
     """
     Prepare a scan that lists all gaps by block, with the variants and seed of a plan.
 
-    Rule, spacing and replicates are still to be given. The number of steps is not limited, because
-    the scan before shows how many there are.
+    Rule, spacing and replicates are still to be given, and the limit of steps, if there is one.
     """
     return partial(
         scan_gaps, solids,
@@ -159,17 +210,21 @@ def _octants(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
     return whole, Blocks.about(plan.window.center, reach, axis, plan.space)
 
 
-def coarse_spacing(solids: Solids, axes: int, before: ScanSums, plan: Plan, most: float) -> float:
+def coarse_spacing(
+    solids: Solids, axes: int, plan: Plan, most: float, before: ScanSums | None = None
+) -> float:
     """
     Spacing of a scan for errors: as close as is useful, but with at most ``most`` chords.
 
-    ``axes`` is the number of axes in all its replicates. The scan ``before`` shows how many steps
-    are needed to follow lines through a periodic medium.
+    ``axes`` is the number of axes in all its replicates. A scan ``before`` shows how many steps are
+    needed to follow lines through a periodic medium.
     """
     if not len(solids.grain_radius):
         return solids.reach
-    spacing = NOISE[solids.space.dimension].close * float(solids.grain_radius.mean())
-    steps = plan.space.lines(float(before.steps.mean()) / len(plan.rule), spacing / plan.spacing)
+    spacing, steps = NOISE[solids.space.dimension].close * float(solids.grain_radius.mean()), 0.0
+    if before is not None:
+        steps = float(before.steps.mean()) / len(plan.rule)
+        steps = plan.space.lines(steps, spacing / plan.spacing)
     # each line costs as much as a chord, even if it meets nothing
     chords = axes * (solids.chords(spacing) + most_lines(solids, spacing) + steps)
     return spacing * plan.space.apart(max(chords / most, 1.0))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 from scanfab.base.convex import Convex
@@ -16,7 +17,7 @@ from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.maps.blocks import MapBlocks
 from scanfab.pipeline.maps.settings import MapSettings
-from scanfab.pipeline.rv import RV, Deformation, doubts_of_rv, rvs_of
+from scanfab.pipeline.rv import RV, Deformation, in_sample, rvs_of
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import Strains
 from scanfab.scan.directions import DirectionRule, usual_rule
@@ -52,6 +53,17 @@ class Noise(NamedTuple):
 NOISE = {3: Noise(0.068, 0.75, 0.3), 2: Noise(0.032, 0.8, 0.1)}
 
 
+class Region(NamedTuple):
+    """Size of a scanned region and of the grains in it."""
+
+    area: float
+    """Projected area, averaged over directions (in a plane a length)."""
+    depth: float
+    """Three quarters of the mean length of lines in it; for a sphere, the radius."""
+    radius: float
+    """Mean radius of the grains in the reference frame."""
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
     """Everything that is needed to compute the frames of a series; lengths in the dump's unit."""
@@ -69,9 +81,9 @@ class Plan:
     rule: DirectionRule
     rvs: tuple[RV, ...]
     """
-    The RVs in ascending order, as they lie in the first frame that has grains, or, after
-    :meth:`in_frame`, in another frame. The first RV is scanned until its tolerance is met; the
-    others are scanned along the same lines.
+    The RVs in ascending order, as they lie in the reference frame, or, after :meth:`in_frame`, in
+    another frame. The first RV that is not empty is scanned until its tolerance is met; the others
+    are scanned along the same lines.
     """
     cutoffs: tuple[float, ...]
     """Cut-offs of the table's rows, in ascending order."""
@@ -84,6 +96,12 @@ class Plan:
     """Number of replicates of a fixed scan, or of the first round of an auto scan."""
     auto: str = ""
     """What the scan may add to meet the tolerance: ``""``, ``replicates`` or ``directions``."""
+    region: Region | None = None
+    """The scanned region, from which the spacing of an auto scan follows."""
+    of_whole: dict[str, Any] | None = None
+    """
+    Spacing, replicates and region of the whole sample, if its auto scan has lines of its own.
+    """
     deformation: Deformation | None = None
     """The deformation that the windows follow; None if they keep their shape."""
     map_blocks: MapBlocks | None = None
@@ -106,10 +124,39 @@ class Plan:
         return self.rvs if VARIANTS[variant].in_window else (RV(),)
 
     def in_frame(self, sample: Sample) -> Plan:
-        """The plan with the windows as they lie in a frame."""
-        if self.deformation is None:
+        """
+        The plan with the RVs as they lie in a frame.
+
+        The first RV, whose scan decides on the lines of all, is one that has a void fabric, if any.
+        """
+        rvs = self.rvs if self.deformation is None else self.deformation.rvs_in(sample, self.rvs)
+        rvs = tuple(in_sample(rv, sample) for rv in rvs)
+        return replace(self, rvs=tuple(sorted(rvs, key=lambda rv: rv.lack != "")))
+
+    def scans(self) -> Iterator[Plan]:
+        """
+        The plans of the separate scans of a frame.
+
+        Variants share the lines of a fixed scan. An auto scan needs other lines for the whole
+        sample than for the RV, so it is two scans, each until its tolerance is met.
+        """
+        if self.of_whole is None:
+            yield self
+            return
+        whole, inner = (
+            "".join(name for name in self.variants if VARIANTS[name].in_window is in_window)
+            for in_window in (False, True)
+        )
+        yield replace(self, variants=whole, rvs=(), **self.of_whole, of_whole=None)
+        yield replace(self, variants=inner, of_whole=None)
+
+    def aiming_at(self, tolerance: float) -> Plan:
+        """The plan with the spacing at which an auto scan begins for a tolerance."""
+        if self.region is None or self.auto != "replicates":
             return self
-        return replace(self, rvs=self.deformation.rvs_in(sample, self.rvs))
+        blocks = self.settings.blocks
+        spacing = _auto_spacing(self.region, len(self.rule), tolerance, blocks, self.space)
+        return replace(self, spacing=spacing)
 
     def along(self, replicates: int) -> Iterator[Plan]:
         """A plan for each further RV, with the same lines as for the first."""
@@ -131,7 +178,7 @@ def plan_without_grains(settings: Settings, sample: Sample | None = None) -> Pla
         strains=Strains.of(settings, sample),
         variants=settings.variants,
         workers=settings.workers,
-        max_chords=settings.max_chords,
+        max_chords=settings.budget,
         rule=settings.directions or usual_rule(space),
         rvs=rvs_of(settings, sample),
         cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),
@@ -164,25 +211,27 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     lengths = {"rmin": float(radii.min()), "rmean": float(radii.mean()), "rmax": float(radii.max())}
     box = SurfaceBox.of(packing, sample.gathered)
     window, windows = plan.window, plan.windows
-    notes = [note for one in windows for note in doubts_of_rv(one, sample)]
-    blocks = deformation = None
+    for one in windows:
+        one.check_fits(packing)
+    notes, blocks, deformation = list[Note](), None, None
     if isinstance(settings, MapSettings):
         blocks = MapBlocks.of(settings, sample)
         notes += blocks.doubts(sample, window)
-    if plan.rule.bias > 0.1 * settings.tolerance:
+    if plan.rule.bias > 0.1 * settings.aim():
         name, bias = plan.rule.name, plan.rule.bias
         text = f"directions {name}: an isotropic sample would get alpha = {bias:.2g}"
         notes.append(Note("biased_directions", text))
     if settings.rv_follows != "none" and windows:
         deformation = Deformation.since(sample, settings.strain, settings.axis)
-    # The limit of chords holds for all RVs together. The first RV gets the fraction that its scan
-    # needs at least: its part of the total volume. With variants of the whole sample, this scan
-    # is also that of the whole.
-    share, volumes = 1.0, [one.shape.volume for one in windows]
-    if windows:
-        is_whole = any(not VARIANTS[name].in_window for name in settings.variants)
-        share = 1.0 / len(windows) if is_whole else volumes[0] / sum(volumes)
-    cutoff = settings.cutoff.resolve(lengths)
+    cutoff, lines = settings.cutoff.resolve(lengths), partial(_lines, settings, plan.rule, box)
+    chosen = lines(window.shape if window else None, lengths)
+    share, of_whole = 1.0, None
+    if window is not None and chosen["auto"]:
+        # The limit of chords holds for all RVs together. The first RV gets the fraction that its
+        # scan needs at least: its part of the total volume.
+        share = window.shape.volume / sum(one.shape.volume for one in windows)
+        if not all(VARIANTS[name].in_window for name in settings.variants):
+            of_whole = {**lines(None, lengths), "max_chords": plan.max_chords}
     return replace(
         plan,
         deformation=deformation,
@@ -192,27 +241,32 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
         cutoffs=tuple(sorted(length.resolve(lengths) for length in settings.cutoffs)) or (cutoff,),
         map_blocks=blocks,
         notes=tuple(notes),
-        **_lines(settings, len(plan.rule), box, window.shape if window else None, lengths),
+        of_whole=of_whole,
+        **chosen,
     )
 
 
 def _lines(
-    settings: Settings, axes: int, box: SurfaceBox, shape: Convex | None, lengths: dict[str, float]
+    settings: Settings,
+    rule: DirectionRule,
+    box: SurfaceBox,
+    shape: Convex | None,
+    lengths: dict[str, float],
 ) -> dict[str, Any]:
-    """Spacing of the lines, number of replicates, and what an auto scan may add."""
+    """Spacing of the lines, number of replicates, what an auto scan may add, and the region."""
     space = box.space
-    # Size of the scanned region, which is the window, or the sphere of half the smallest extent of
-    # the whole. ``area`` is its projected area, averaged over directions (in a plane a length).
-    # ``depth`` is three quarters of the mean length of lines in it; for a sphere, the radius.
+    # the window, or for the whole sample the sphere of half its smallest extent
     reach = 0.5 * box.smallest_extent if shape is None else shape.reach
     area, depth = math.pi * reach**2, reach
     if space.is_plane or (shape is not None and not shape.is_sphere):
         shape = shape or sphere(reach, space)
         area = shape.mean_shadow
         depth = 0.75 * shape.volume / area
+    region = Region(area, depth, lengths["rmean"])
     if settings.spacing is None:
-        spacing = _auto_spacing(settings, axes, area, depth, lengths["rmean"], space)
-        return {"spacing": spacing, "replicates": REPLICATES, "auto": "replicates"}
+        spacing = _auto_spacing(region, len(rule), settings.aim(), settings.blocks, space)
+        words = {"replicates": REPLICATES, "auto": "replicates", "region": region}
+        return {"spacing": spacing, **words}
     spacing = settings.spacing.resolve(lengths)
     if not CLOSEST * reach <= spacing <= 2.0 * reach:
         raise SettingsError(
@@ -223,24 +277,23 @@ def _lines(
     auto = "directions" if settings.directions is None else ""
     fewest, most = (REPLICATES, MOST_REPLICATES) if auto else (1, REPLICATES)
     replicates = int(min(max(space.lines(area, spacing) / FEWEST_LINES, fewest), most))
-    return {"spacing": spacing * space.apart(replicates), "replicates": replicates, "auto": auto}
+    spacing *= space.apart(replicates)
+    return {"spacing": spacing, "replicates": replicates, "auto": auto, "region": region}
 
 
-def _auto_spacing(
-    settings: Settings, axes: int, area: float, depth: float, radius: float, space: Space
-) -> float:
+def _auto_spacing(region: Region, axes: int, tolerance: float, blocks: int, space: Space) -> float:
     """
     Spacing of the lines in one replicate at which the first round probably meets the tolerance.
 
     The spacing is limited: if it is too wide, a replicate has too few lines; if it is too close,
     more directions would reduce the error more.
     """
-    noise = NOISE[space.dimension]
+    noise, (area, depth, radius) = NOISE[space.dimension], region
     segments_per_line = max(depth / (3.0 * radius), 1.0)
     # the needed number of lines per axis and replicate, which is area / spacing²
-    lines = noise.segments / settings.tolerance**2 / (REPLICATES * axes * segments_per_line)
+    lines = noise.segments / tolerance**2 / (REPLICATES * axes * segments_per_line)
     # each block of a map gets its share of the lines
-    lines *= settings.blocks
+    lines *= blocks
     apart = area / lines / radius ** (space.dimension - 1)
     spacing = radius * max(
         min(math.pow(apart, 1.0 / (space.dimension - 1.0 + noise.growth)), WIDE),

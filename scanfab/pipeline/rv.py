@@ -1,8 +1,8 @@
-"""RVs of a series: their place in the first frame, and in deformed frames."""
+"""RVs of a series: their place in the reference frame, and in the other frames."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.io.surface import read_surface
 from scanfab.packing.packing import spelt_plane
-from scanfab.packing.sample import Sample
+from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import RV_MEANING, SurfaceBox, Window
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import cell_of, centers_of, strain_mode
@@ -24,6 +24,8 @@ from scanfab.pipeline.values import Vector
 
 # in radii of the smallest grain: a smaller RV is refused as a mistake
 SMALLEST = 1e-9
+# grains that have flown away and are named in a message
+MOST_NAMED = 5
 
 
 class RV(NamedTuple):
@@ -33,6 +35,8 @@ class RV(NamedTuple):
     """Size as a fraction of the sample; None unless there are several RVs."""
     window: Window | None = None
     """Place and shape; None in a series without grains."""
+    lack: str = ""
+    """Why there is no void fabric in it; empty if there is one."""
 
 
 def rvs_of(settings: Settings, sample: Sample | None = None) -> tuple[RV, ...]:
@@ -114,38 +118,50 @@ def _cylinder_within(half: FloatArray, axis: Vector) -> tuple[float, float]:
     return fits * radius, 2.0 * fits * length
 
 
-def doubts_of_rv(window: Window, sample: Sample) -> list[Note]:
-    """
-    Check the place of an RV, and add a note if it lies near the surface of the sample.
+def in_sample(rv: RV, sample: Sample) -> RV:
+    """The RV, with the reason why it has no void fabric in a sample, if it has none."""
+    packing, window = sample.packing, rv.window
+    if window is None:
+        return rv
+    largest = float(packing.radius[sample.grains].max())
+    beyond = -SurfaceBox.of(packing, sample.gathered).room_around(window)
+    lack = ""
+    if not sample.counted(VARIANTS["c"], window).any():
+        lack = f"the {window} holds no centre of a grain"
+    elif beyond > 2 * largest:
+        lack = (
+            f"the {window} reaches {beyond:g} beyond the sample, which is more than twice the "
+            f"largest radius ({largest:g})"
+        )
+        escaped = packing.id[sample.escaped.grains]
+        if escaped.size and not sample.escaped.are_many:
+            more = ", ..." if len(escaped) > MOST_NAMED else ""
+            named = ", ".join(map(str, escaped[:MOST_NAMED])) + more
+            lack += f" (without the grains that have flown away: {named})"
+    return rv._replace(lack=lack)
 
-    Raises
-    ------
-    SettingsError
-        If the RV holds no grain, reaches too far beyond the sample, or overlaps its own image.
-    """
-    packing, largest = sample.packing, float(sample.packing.radius[sample.grains].max())
-    window.check_fits(packing)
-    room = SurfaceBox.of(packing, sample.gathered).room_around(window)
-    meets = window.may_meet(packing.position, packing.radius, packing)
-    if not np.any(meets & sample.grains):
-        raise SettingsError(
-            f"the {window} holds no grain: choose another `rv_center`, or a larger RV "
-            f"(`rv_radius`, `rv_size`)"
+
+def doubts_of_rv(rv: RV, sample: Sample) -> Iterator[Note]:
+    """A note if an RV has no void fabric in a sample, or if it lies near the sample's surface."""
+    if rv.window is None:
+        return
+    size = "" if rv.fraction is None else f"_{rv.fraction:g}"
+    if rv.lack:
+        yield Note(
+            f"empty_rv{size}",
+            f"{rv.lack}, so c and d have no void fabric: choose another `rv_center` or `rv`, "
+            f"{RV_MEANING}, another frame for its place (such as `reference=-1`), or let it move "
+            f'with the sample (`rv_follows="strain"`, `strain="grains"`)',
         )
-    if room < -2 * largest:
-        raise SettingsError(
-            f"the {window} reaches {-room:g} beyond the sample, which is more than twice the "
-            f"largest radius ({largest:g}): choose another `rv_center` or a smaller `rv`, "
-            f"{RV_MEANING}" + ("" if window.shape.is_sphere else ", or a smaller `rv_size`")
+        return
+    largest = float(sample.packing.radius[sample.grains].max())
+    if SurfaceBox.of(sample.packing, sample.gathered).room_around(rv.window) < largest:
+        yield Note(
+            f"rv_at_surface{size}",
+            f"the {rv.window} comes closer to the sample's surface than the largest radius "
+            f"({largest:g}), so it cuts the outermost layer of grains, which the boundary "
+            f"arranges: choose a smaller `rv`, or use more grains",
         )
-    if room >= largest:
-        return []
-    text = (
-        f"the {window} comes closer to the sample's surface than the largest radius ({largest:g}), "
-        f"so it cuts the outermost layer of grains, which the boundary arranges: choose a smaller "
-        f"`rv`, or use more grains"
-    )
-    return [Note("rv_at_surface", text)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +212,7 @@ class Deformation:
             return tuple(rvs)
         gradient = edges @ np.linalg.inv(self.edges)
         found = []
-        for size, window in rvs:
+        for size, window, _ in rvs:
             assert window is not None
             center = origin + gradient @ (window.center - self.origin)
             found.append(RV(size, Window(center, window.shape.deformed(gradient))))

@@ -9,7 +9,17 @@ from typing import Any
 
 from scanfab.base.column import Column
 from scanfab.base.errors import DimensionError, SettingsError
-from scanfab.base.option import fabric, options_of, reading, refuse_unknown, sample, scan, window
+from scanfab.base.option import (
+    fabric,
+    optional,
+    options_of,
+    reading,
+    refuse_unknown,
+    sample,
+    scan,
+    whole,
+    window,
+)
 from scanfab.base.space import Space
 from scanfab.base.spelling import spelt_place
 from scanfab.io.options import parse_frames
@@ -17,14 +27,18 @@ from scanfab.packing.boundary import BoundaryRule
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.rattlers import installed_rules
 from scanfab.pipeline import values
-from scanfab.pipeline.values import Axis, Length, Vector, as_written
+from scanfab.pipeline.values import Axis, Length, StandardError, Vector, as_written
 from scanfab.scan.columns import EDGE_COLUMNS
 from scanfab.scan.directions import RULES, DirectionRule, rule_of
 from scanfab.scan.edges import CLIP, EDGES, ENDS
 
-# This takes one processor one to two minutes, and is some hundred times what a frame of a dense
-# packing needs for the default tolerance.
-MAX_CHORDS = 1e10
+# A scan of so many chords takes one processor one to two minutes. A frame of a dense packing needs
+# some hundred times less for a tolerance of 1e-4, and a tenth of it is the limit if the tolerance
+# follows from the sample's error.
+MAX_CHORDS, MAX_CHORDS_AUTO = 1e10, 1e9
+# The tolerance auto: this part of the sample's error, but not less than the second number. More
+# digits of the scan add nothing to an error that comes from the sample.
+OF_SAMPLE, LEAST_TOLERANCE = 0.05, 1e-4
 # a component of a unit vector up to this counts as 0
 ROUNDING = 1e-9
 # beginnings of direction rules, for shell completion
@@ -138,16 +152,20 @@ class Settings:
     design:DEGREE, icosahedral:DEGREE, product:DEGREE, fibonacci:N, equal-angle:STEP,
     equal-angle-full:STEP; auto meets `tolerance`.
     """
-    tolerance: float = scan(values.parse_tolerance, default=1e-4, first=True)
+    tolerance: StandardError | None = scan(
+        values.parse_tolerance, default="auto", metavar="X", choices=("auto",), first=True
+    )
     """
     Standard error of alpha_vs_axial that the scan aims at in every variant, if spacing or
-    directions are auto.
+    directions are auto. auto: for each row the larger of 1e-4 and a twentieth of its
+    alpha_vs_axial_sample_se; in map and calibrate 1e-4.
     """
-    max_chords: float = scan(values.parse_work, default=MAX_CHORDS, metavar="N")
+    max_chords: float | None = scan(values.parse_work, metavar="N")
     """
-    Limit for the work of an auto scan: in each frame it stops before it cuts more than this number
-    of chords from grains (each line also counts as a chord). The default takes one processor one or
-    two minutes.
+    Limit for the work of an auto scan: in each frame the scans of the whole sample and of the RVs
+    each stop before they cut more than this number of chords from grains (each line also counts as
+    a chord). The default, 1e9 with the tolerance auto and else 1e10, takes one processor some ten
+    seconds, or one or two minutes.
     """
     min_contacts: int = sample(values.parse_count, default=2)
     """A grain with fewer contacts (a clump: with fewer neighbours) is a rattler."""
@@ -185,6 +203,14 @@ class Settings:
         lambda name, value: parse_frames(value, name), metavar="A:B:C", first=True
     )
     """Which frames, as a Python slice (default: all)."""
+    reference: int | None = reading(
+        optional(whole("the number of a frame, such as 0 or -1", lambda _: True)), metavar="FRAME"
+    )
+    """
+    The frame from which L0, the RV, the radii behind rmin and the like, and the blocks of a map
+    come: its number in each series; a negative number counts from the end (default: the first frame
+    that has grains).
+    """
     seed: int = scan(values.parse_count, default=0)
     """Seed of the random numbers."""
     workers: int = scan(values.parse_workers, first=True, decides=False)
@@ -307,6 +333,17 @@ class Settings:
                 f"{space}: choose a number of axes, such as 16"
             )
         return rule_of(rule.asked, space)
+
+    def aim(self, sample_error: float | None = None) -> float:
+        """The error that the scan of a row aims at, given the row's error due to the sample."""
+        if self.tolerance is not None:
+            return self.tolerance
+        return max(LEAST_TOLERANCE, OF_SAMPLE * (sample_error or 0.0))
+
+    @property
+    def budget(self) -> float:
+        """Most chords of an auto scan."""
+        return self.max_chords or (MAX_CHORDS_AUTO if self.tolerance is None else MAX_CHORDS)
 
     @property
     def rvs(self) -> tuple[float, ...]:

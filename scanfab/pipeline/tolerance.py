@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ from scanfab.base.errors import Note, SettingsError
 from scanfab.base.spelling import spelt_apart, spelt_time
 from scanfab.fabric.void import void_fabric
 from scanfab.pipeline.plan import NOISE, Plan
+from scanfab.pipeline.settings import MAX_CHORDS
 from scanfab.scan.directions import design_of, rule_of
 from scanfab.scan.following import FollowedTooFarError
 from scanfab.scan.scan import ScanSums, scan_lines
@@ -45,9 +46,6 @@ MARGIN, SIGMAS = 1.1, 2.5
 CLOSEST = 0.05
 # lines are set closer if a larger fraction of the directions of a replicate keeps no segment
 MOST_EMPTY = 0.005
-# FEW_KEPT: a variant that keeps less than this share of its grains is hardly a packing. HELD_BACK:
-# it no longer counts for the tolerance once it needs this many times the lines of the others.
-FEW_KEPT, HELD_BACK = 0.1, 10.0
 
 
 class Errors(NamedTuple):
@@ -59,6 +57,10 @@ class Errors(NamedTuple):
     """Less noisy error for planning."""
     empty: float
     """Fraction of the axes of all replicates that keep no segment."""
+
+    def over(self, aim: float) -> Errors:
+        """The errors relative to the error that a scan aims at."""
+        return Errors(self.reported / aim, self.expected / aim, self.empty)
 
     @property
     def is_patchy(self) -> bool:
@@ -93,16 +95,16 @@ def missing_work(errors: Iterable[Errors], plan: Plan, replicates: int) -> float
     """
     Factor by which the number of lines must grow to meet the tolerance; 1 if it is met.
 
-    Auto scans and calibrations use the same rule.
+    ``errors`` are relative to the tolerance. Auto scans and calibrations use the same rule.
     """
-    margin, tolerance = MARGIN, plan.settings.tolerance
+    margin = MARGIN
     if plan.auto != "replicates" and replicates > 1:
         margin = 1.0 + SIGMAS / math.sqrt(2.0 * (replicates - 1))
     missing = expected = 0.0
     for error in errors:
         if math.isfinite(error.reported):
-            missing = max(missing, (error.reported / tolerance) ** 2)
-            expected = max(expected, (margin * error.expected / tolerance) ** 2)
+            missing = max(missing, error.reported**2)
+            expected = max(expected, (margin * error.expected) ** 2)
         elif error.empty < 1.0 and plan.auto == "replicates" and replicates < 256:
             # more replicates may find segments in directions that have none yet
             return GROWTH
@@ -116,6 +118,7 @@ def missing_work(errors: Iterable[Errors], plan: Plan, replicates: int) -> float
 def scan_to_tolerance(
     solids: Solids,
     plan: Plan,
+    aims: Mapping[str, float],
     where: str = "the frame",
     scan: Callable[..., Any] = scan_variants,
     errors_of: Callable[..., Errors] = variant_errors,
@@ -123,8 +126,9 @@ def scan_to_tolerance(
     """
     Scan one frame as planned; an auto scan continues until the tolerance is met.
 
-    Progress is written to the logger ``scanfab``; ``where`` names the frame there. ``scan`` and
-    ``errors_of`` say what is summed and which error of a variant must meet the tolerance.
+    ``aims`` holds the tolerance of each variant. Progress is written to the logger ``scanfab``;
+    ``where`` names the frame there. ``scan`` and ``errors_of`` say what is summed and which error
+    of a variant must meet the tolerance.
 
     Returns
     -------
@@ -136,8 +140,8 @@ def scan_to_tolerance(
         Notes on tolerances that were not met.
     """
     if not plan.auto:
-        return scan(solids, plan, range(plan.replicates), plan.max_chords), plan, []
-    auto_scan = _AutoScan(solids, _within_budget(plan, solids), scan, errors_of)
+        return scan(solids, plan, range(plan.replicates), MAX_CHORDS), plan, []
+    auto_scan = _AutoScan(solids, _within_budget(plan, solids), aims, scan, errors_of)
     notes = auto_scan.run(where)
     return auto_scan.sums, auto_scan.plan, notes
 
@@ -148,6 +152,8 @@ class _AutoScan:
 
     solids: Solids
     plan: Plan
+    aims: Mapping[str, float]
+    """The tolerance of each variant."""
     scan: Callable[..., Any]
     errors_of: Callable[..., Errors]
     sums: Any = None
@@ -169,8 +175,8 @@ class _AutoScan:
             rest = min(missing, self.plan.max_chords / self.spent) - 1.0
             if rest > 0.0:
                 seconds = spelt_time(rest * (time.perf_counter() - begun))
-                worst = max(self.errors[name].reported for name in counted)
-                reached, tolerance = spelt_apart(worst, self.plan.settings.tolerance)
+                worst = max(counted, key=lambda name: self.errors[name].reported / self.aims[name])
+                reached, tolerance = spelt_apart(self.errors[worst].reported, self.aims[worst])
                 LOGGER.info("%s: error %s of %s, about %s", where, reached, tolerance, seconds)
             # a better plan is of no use if lines already had to be wider than planned
             if start == 0 and self.plan.spacing <= planned:
@@ -181,7 +187,7 @@ class _AutoScan:
             more = math.ceil(max(min(missing, GROWTH), SMALLEST_ROUND) * stop)
             more = min(more, MAX_REPLICATES, int(stop + self.left))
             if missing <= 1.0 or self.plan.auto == "directions" or more <= stop:
-                return list(self._notes(missing, counted))
+                return list(self._notes())
             start, stop = stop, more
 
     def _add_round(self, start: int, stop: int) -> None:
@@ -220,31 +226,23 @@ class _AutoScan:
                 self.plan = replace(self.plan, spacing=wider)
 
     def _missing(self, variants: str) -> float:
-        errors = [self.errors[name] for name in variants]
+        errors = [self.errors[name].over(self.aims[name]) for name in variants]
         return missing_work(errors, self.plan, self.sums.replicates)
 
     def _counted(self) -> str:
         """
         The variants whose errors decide when the scan ends.
 
-        A variant that keeps few grains, or whose tolerance the budget cannot reach, does not
-        decide, so that the others need not wait for it. If no variant remains, all decide.
+        A variant whose tolerance the budget cannot reach does not decide, so that the others need
+        not wait for it. If no variant remains, all decide.
         """
-        missing = {name: self._missing(name) for name in self.plan.variants}
-        few = [name for name in missing if _kept_grains(self.solids, name) < FEW_KEPT]
-        usual = max((missing[name] for name in missing if name not in few), default=math.inf)
         # closer lines reduce the error more than further replicates do; and early estimates of the
         # error are uncertain, hence the factor GROWTH
         across = self.plan.space.dimension - 1
         growth = 1.0 + NOISE[across + 1].growth / across
         reach = GROWTH * (1.0 + self.left / self.sums.replicates) ** growth
-        counted = ""
-        for name in missing:
-            is_patchy = usual < math.inf and self.errors[name].is_patchy
-            held_back = name in few and (missing[name] > HELD_BACK * usual or is_patchy)
-            if not held_back and missing[name] <= reach:
-                counted += name
-        return counted or self.plan.variants
+        within = [name for name in self.plan.variants if self._missing(name) <= reach]
+        return "".join(within) or self.plan.variants
 
     def _better_plan(self, missing: float, counted: str) -> Plan | None:
         """A better plan to start again with after the first round; None if it does not pay."""
@@ -273,32 +271,28 @@ class _AutoScan:
         affordable = affordable and is_affordable(self.solids, better.spacing)
         return better if growth > 1.0 and affordable else None
 
-    def _notes(self, missing: float, counted: str) -> Iterator[Note]:
-        """Notes on a missed tolerance, of the scan and of the variants that did not decide."""
-        aim = self.plan.settings.tolerance
-        if missing > 1.0:
-            text = (
-                f"the scan stopped after {self.spent:.2g} chords before the tolerance {aim:g} was "
-                f"met: alpha_vs_axial_se holds the error that it reached; about {missing:.2g} "
-                f"times as many lines would be needed (`max_chords`, `tolerance`)"
-            )
-            steps, work = self.sums.steps.sum(), self.sums.work.sum()
-            if 2 * steps > work:
-                text += (
-                    f"; {steps / work:.0%} of the work was to follow long void segments through "
-                    f"images of the cell: is it too large, or periodic where the sample is not "
-                    f"(`cell`, `periodic`)?"
-                )
-            yield Note(TOLERANCE_MISSED, text)
+    def _notes(self) -> Iterator[Note]:
+        """A note for each variant that missed its tolerance: what it reached, why, what to do."""
+        steps, work = float(self.sums.steps.sum()), float(self.sums.work.sum())
         for name, errors in self.errors.items():
-            if name in counted or errors.reported <= aim:
+            if (missing := self._missing(name)) <= 1.0:
                 continue
             text = "there is no void fabric yet"
             if math.isfinite(errors.reported):
-                reached, tolerance = spelt_apart(errors.reported, aim)
-                text = f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}"
-            text += ": it keeps few grains, or would need far more lines than the others "
-            yield Note("variant_dropped", f'{text}(`variants="{name}"` scans it alone)', (name,))
+                reached, tolerance = spelt_apart(errors.reported, self.aims[name])
+                text = f"alpha_vs_axial_se is {reached}, where the tolerance is {tolerance}"
+            text += (
+                f": the scan stopped after {self.spent:.2g} chords, and about {missing:.2g} times "
+                f"as many lines would be needed: choose a larger `tolerance` or `max_chords`"
+            )
+            if 2 * steps > work:
+                text += (
+                    f"; {steps / work:.0%} of the work was to follow long void segments through "
+                    f'images of the cell, as along a free surface: `variants="cd"` measures the '
+                    f"RV alone; or is the cell too large, or periodic where the sample is not "
+                    f"(`cell`, `periodic`)?"
+                )
+            yield Note(TOLERANCE_MISSED, text, (name,))
 
 
 def _within_budget(plan: Plan, solids: Solids) -> Plan:
@@ -313,15 +307,3 @@ def _within_budget(plan: Plan, solids: Solids) -> Plan:
             f"replicates, found {plan.max_chords:g}: choose a wider `spacing` or fewer `directions`"
         )
     return replace(plan, spacing=plan.spacing * plan.space.apart(chords / plan.max_chords))
-
-
-def _kept_grains(solids: Solids, variant: str) -> float:
-    """Fraction of the grains in a variant's window that are no removed rattlers."""
-    removed = solids.removed
-    if variant in "ac":
-        return 1.0
-    if variant == "d" and solids.window is not None:
-        removed = removed[solids.window.contains(solids.position)]
-    elif solids.medium is not None:
-        removed = solids.medium.removed
-    return 1.0 - float(removed.mean()) if len(removed) else 1.0

@@ -34,13 +34,17 @@ SHAPES = {
 
 parse_radius = optional(number("a length above 0", lambda value: 0 < value < math.inf))
 parse_share = number("0 or more", lambda value: 0 <= value < math.inf)
-parse_work = number("a number of at least 1", lambda value: value >= 1)
+parse_work = optional(number("a number of at least 1", lambda value: value >= 1))
 parse_count = whole("0 or more", lambda value: value >= 0)
 parse_moment = whole("1 or 2", lambda moment: moment in (1, 2))
 parse_point = optional(numbers("three finite numbers", lambda vector: len(vector) == 3))
-parse_tolerance = number(
-    "a number above 0, from 1e-15 to 1e15", lambda value: 1e-15 <= value <= 1e15
+parse_error = number(
+    "auto, or a number above 0, from 1e-15 to 1e15", lambda value: 1e-15 <= value <= 1e15
 )
+
+
+StandardError = float
+"""A standard error, for options that also take a word in its place."""
 
 
 class Axis(NamedTuple):
@@ -113,6 +117,11 @@ def parse_length(name: str, text: str | float | Length) -> Length:
     unit = next((unit for unit in UNITS if word.endswith(unit)), "")
     parse = number(expected, lambda value: 0 <= value < math.inf)
     return Length(parse(name, word.removesuffix(unit)), unit)
+
+
+def parse_tolerance(name: str, value: Any) -> float | None:
+    """Parse a standard error; ``auto`` gives None."""
+    return None if value is None or value == "auto" else float(parse_error(name, value))
 
 
 def parse_spacing(name: str, value: Any) -> Length | None:

@@ -13,12 +13,12 @@ from scanfab.base.arrays import compressed, in_parts
 from scanfab.base.errors import Note
 from scanfab.fabric import predicted
 from scanfab.fabric.forces import doubts_of_forces
-from scanfab.fabric.measured import BlockedSums, Measured
+from scanfab.fabric.measured import Measured
 from scanfab.fabric.registry import GROUPS, OWN_FABRICS, checked_values
 from scanfab.packing.columns import RV_COLUMN, sample_values
 from scanfab.packing.sample import Variant
 from scanfab.packing.search import near_pairs
-from scanfab.pipeline.measurement import Measurement
+from scanfab.pipeline.measurement import Measurement, blocked_sums
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.state import contact_forces, doubts_of_state, sample_state
 from scanfab.scan.edges import CLIP, ENDS, START
@@ -43,8 +43,8 @@ class VariantColumns:
         self.sample, self.plan, self.sums = measurement.sample, measurement.plan, measurement.sums
         self.window = self.plan.window if variant.in_window else None
         self.cutoff = self.plan.cutoffs[place]
-        self.rv = self.plan.rvs_of(variant.name)[0].fraction
-        """Size of the variant's RV; None unless there are several RVs."""
+        self.rv, _, self.lack = self.plan.rvs_of(variant.name)[0]
+        """Size of the variant's RV, None unless there are several; why it has no void fabric."""
         self.edge = edge_of(variant, self.plan, measurement.solids)
         self.index = "abcd".index(variant.name)
         kept = float(self.sums.segments[:, self.index].sum())
@@ -83,12 +83,11 @@ class VariantColumns:
     def measured(self) -> Measured:
         """Input of the fabrics."""
         sample, plan, measurement = self.sample, self.plan, self.measurement
-        settings, blocked = plan.settings, measurement.blocked
-        words = self.variant.name, self.place, settings.moment
-        length, segments = measurement.kept(self.variant.name, self.place)
+        settings, name = plan.settings, self.variant.name
+        length, segments = measurement.kept(name, self.place)
         count = self.sums.segments[:, self.index].sum()
         if measurement.gaps is not None:
-            count = measurement.gaps.in_blocks(self.variant.name, self.place)[1].sum()
+            count = measurement.gaps.in_blocks(name, self.place)[1].sum()
         chosen = sample.fabric_contacts(self.variant, self.window)
         points = compressed(chosen, sample.contacts.point)
         places = points
@@ -102,12 +101,9 @@ class VariantColumns:
             weights=plan.rule.weights,
             length=length,
             segments=segments,
-            meets_solids=bool(sample.solids(self.variant, self.window).any()),
-            blocked=BlockedSums(
-                blocked.axes,
-                measurement.block_rule.weights,
-                blocked.kept(*words),
-                [blocked.kept(*words, without=part) for part in range(2**plan.space.dimension)],
+            meets_solids=not self.lack and bool(sample.solids(self.variant, self.window).any()),
+            blocked=blocked_sums(
+                measurement.blocked, measurement.block_rule, plan, name, self.place
             ),
             normals=compressed(chosen, sample.contacts.normal),
             points=points,
@@ -122,6 +118,8 @@ class VariantColumns:
     def solid_fraction(self) -> float | None:
         """1 - void length / line length in the window, weighted over the directions."""
         cell, weights = self.sample.packing.cell, self.plan.rule.weights
+        if self.lack:
+            return None
         if self.window is None and not (cell is not None and cell.is_endless):
             return None
         length = float(weights @ self.sums.line_length[:, self.index].sum(axis=0))

@@ -17,7 +17,7 @@ from scanfab.io.series import Series
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import Window
-from scanfab.pipeline.frames import Frames
+from scanfab.pipeline.frames import Frames, doubts_of_frame
 from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import Strains, shear_strain
@@ -134,8 +134,8 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     frames = Frames(series, replace(settings, on_error="skip"))
     frame = series[number]
     sample = frames.read(frame)
-    tell(frames.notes(frame, sample))
-    found = frames.first()
+    tell(doubts_of_frame(frame, sample, settings))
+    found = frames.reference()
     first, plan = None if found is None else found[2], None
     if first is not None:
         with suppress(SettingsError):  # the plan tells what does not fit

@@ -72,18 +72,19 @@ def map_rows(
         Blocks of the whole sample and of the RV.
     """
     assert plan.map_blocks is not None
-    solids = solids_of(sample, plan.window, variants=plan.variants, edge=plan.settings.edge)
     whole = plan.map_blocks.of_whole(sample.packing.cell)
     blocks = whole, whole if plan.window is None else plan.map_blocks.of_window(plan.window)
-    scan = partial(_scan_blocks, blocks)
-    sums, plan, notes = scan_to_tolerance(solids, plan, where, scan, _median_errors)
-    parts = _scan_parts(solids, plan, blocks, sums)
-    rows = []
-    for name in plan.variants:
-        own_blocks = blocks[VARIANTS[name].in_window]
-        mapped = VariantMap(sample, plan, solids, VARIANTS[name], own_blocks, sums, parts[name])
-        rows += [row_of(plan.settings.columns, {**known, **own}) for own in mapped.rows()]
-        notes += mapped.notes()
+    scan, aims = partial(_scan_blocks, blocks), dict.fromkeys(plan.variants, plan.settings.aim())
+    rows, notes = list[Row](), list[Note]()
+    for part in plan.scans():
+        solids = solids_of(sample, part.window, variants=part.variants, edge=part.settings.edge)
+        sums, final, missed = scan_to_tolerance(solids, part, aims, where, scan, _median_errors)
+        parts, notes = _scan_parts(solids, final, blocks, sums), [*notes, *missed]
+        for name in part.variants:
+            variant, own = VARIANTS[name], blocks[VARIANTS[name].in_window]
+            mapped = VariantMap(sample, final, solids, variant, own, sums, parts[name])
+            rows += [row_of(plan.settings.columns, {**known, **row}) for row in mapped.rows()]
+            notes += mapped.notes()
     return rows, joined(notes), blocks
 
 
@@ -146,7 +147,7 @@ def _scan_parts(
     """Scan fewer lines, with blocks in eight parts, for errors due to the sample and the void."""
     rule, replicates = design_of(PART_AXES), []
     most = min(MOST_CHORDS, plan.max_chords)
-    spacing = coarse_spacing(solids, PART_REPLICATES * len(rule), before, plan, most)
+    spacing = coarse_spacing(solids, PART_REPLICATES * len(rule), plan, most, before)
     finer, cutoffs = (blocks[0].finer(), blocks[1].finer()), [0.0, plan.cutoff]
     for replicate in range(PART_REPLICATES):
         words = {"spacing": spacing, "replicates": [replicate]}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from scanfab.base.option import numbers, optional, sample, whole
-from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.settings import MAX_CHORDS, Settings
 from scanfab.pipeline.values import parse_variants
 
 if TYPE_CHECKING:
@@ -76,6 +76,11 @@ class MapSettings(Settings):
         if self.with_:
             groups = ", ".join(self.with_)
             yield f"with_: a map has no further columns, found {groups}: use `compute`"
+
+    @property
+    def budget(self) -> float:
+        """Most chords of an auto scan, which has the lines of all blocks."""
+        return self.max_chords or MAX_CHORDS
 
     @property
     def blocks(self) -> int:

@@ -358,15 +358,18 @@ def _numbers(vector: Any) -> str:
 
 def _pictures(rows: list[dict[str, Any]], series: Series, settings: Settings) -> list[Picture]:
     """Of the first and the last frame, all from one scan."""
-    rougher, tolerance = "", settings.tolerance
+    # the least tolerance of a row, which may follow from the sample's error
+    errors = numbers_of(rows, "alpha_vs_axial_sample_se")
+    rougher, asked = "", settings.aim(min(errors, default=None))
+    tolerance = asked
     if settings.spacing is None or settings.directions is None:
         # as much rougher as makes the scan short enough to wait for
         most = max(numbers_of(rows, "segments"), default=0.0)
         tolerance *= max(1.0, most / MOST_SEGMENTS) ** 0.5
-    if tolerance > settings.tolerance:
+    if tolerance > asked:
         rougher = (
             f"Scanned to a standard error of {tolerance:.2g} instead of the table's "
-            f"{settings.tolerance:.2g}, which would take too long for a picture."
+            f"{asked:.2g}, which would take too long for a picture."
         )
     frames = ScannedFrames(series, replace(settings, tolerance=tolerance), rows, rougher)
     # pixels, as the disks are pixels anyway, and few of them

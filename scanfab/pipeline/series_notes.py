@@ -1,0 +1,153 @@
+"""What a run says of a series: each note once, and at the end the frames that it holds for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from typing import NamedTuple
+
+import numpy as np
+
+from scanfab.base.errors import SKIPPED, Note, ScanfabNote, tell
+from scanfab.base.spelling import spelt_place
+from scanfab.base.typing import FloatArray
+from scanfab.packing.bodies import Grouping, regrouped
+from scanfab.packing.cell import Cell
+from scanfab.packing.sample import Sample
+from scanfab.packing.window import SurfaceBox
+from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.strain import Flips
+from scanfab.pipeline.values import AXES
+from scanfab.table.curves import is_turned
+from scanfab.table.row import Row
+
+# least relative changes of radii and of extents that are worth a note
+GROWTH, STRAIN = 0.01, 0.001
+# cosine of the angle within which the axis of the contact fabric counts as x, y or z
+ALONG = 0.95
+
+
+class Facts(NamedTuple):
+    """Facts about a frame that has grains, which are compared with those of other frames."""
+
+    smallest: float
+    """Radius of the smallest grain, dump's length unit."""
+    extents: FloatArray
+    """Extents of the grains' surfaces (of the cell, where it is periodic), shape (3,)."""
+    cell: Cell | None
+    grouping: Grouping | None
+    """The clumps; None if each sphere is a grain."""
+
+    @classmethod
+    def of(cls, sample: Sample) -> Facts:
+        """The facts about a sample."""
+        packing, grouping = sample.packing, None
+        if packing.bodies is not None:
+            grouping = Grouping(packing.id, packing.id[packing.bodies.head])
+        extents = SurfaceBox.of(packing, sample.gathered).extents
+        return cls(float(packing.radius[sample.grains].min()), extents, packing.cell, grouping)
+
+
+class SeriesNotes:
+    """
+    Issues the notes on the frames of one series, which come in their order.
+
+    A note is issued at the first frame that it holds for. If it holds for several frames, one more
+    line names them at the end.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self._frames: list[int] = []
+        self._held: dict[tuple[str, tuple[str, ...]], tuple[Note, list[int]]] = {}
+        """The first note of each kind, and the places of its frames among all frames."""
+        self._flips = Flips(settings.frames.step)
+        self._grouping: tuple[int, Grouping] | None = None
+        self._facts: list[Facts] = []
+        self._rows: list[Row] = []
+
+    def add(
+        self, number: int, rows: Sequence[Row], notes: Sequence[Note], facts: Facts | None
+    ) -> None:
+        """Issue the notes on a frame that no frame before had."""
+        found = [*notes, *self._flips.notes(number, facts and facts.cell)]
+        if facts is not None:
+            self._facts.append(facts._replace(grouping=None))
+            if facts.grouping is not None:
+                self._grouping = self._grouping or (number, facts.grouping)
+                found += filter(None, [regrouped(*self._grouping, facts.grouping)])
+        self._rows += rows
+        self._frames.append(number)
+        for note in found:
+            _, places = self._held.setdefault((note.code, note.variants), (note, []))
+            if not places or note.code == SKIPPED:
+                tell([note], f"frame {number}")
+            places.append(len(self._frames) - 1)
+
+    def ranges(self) -> Iterator[tuple[Note, str]]:
+        """The notes that hold for several frames, in short, and these frames in words."""
+        for note, places in self._held.values():
+            if len(places) > 1 and note.code != SKIPPED:
+                # consecutive places have the same difference to their number in the list
+                runs = (
+                    [self._frames[place] for _, place in run]
+                    for _, run in groupby(enumerate(places), lambda pair: pair[1] - pair[0])
+                )
+                spelt = ", ".join(
+                    f"{run[0]} to {run[-1]}" if run[1:] else f"{run[0]}" for run in runs
+                )
+                yield note._replace(text=note.text.split(": ")[0]), f"frames {spelt}"
+
+    def end(self, reference: tuple[int, float] | None) -> None:
+        """
+        Issue the lines at the end of a series.
+
+        ``reference`` is the number of the reference frame and its smallest radius.
+        """
+        for note, where in self.ranges():
+            tell([note], where)
+        tell(self._of_series(reference))
+
+    def _of_series(self, reference: tuple[int, float] | None) -> Iterator[Note]:
+        """Notes that only all frames together show."""
+        smallest = np.array([facts.smallest for facts in self._facts])
+        if reference is not None and np.any(np.abs(smallest / reference[1] - 1.0) > GROWTH):
+            yield Note(
+                "radii_change",
+                f"the smallest radius lies between {smallest.min():.4g} and {smallest.max():.4g}, "
+                f"but 1rmin is {reference[1]:.4g} in all frames, as in frame {reference[0]}: "
+                f"`reference` chooses another frame for the lengths of the series",
+                kind=ScanfabNote,
+            )
+        extents = np.array([facts.extents for facts in self._facts]).reshape(-1, 3)
+        lacks_strain = all(row.get("strain") is None for row in self._rows)
+        if len(extents) > 1 and lacks_strain and self.settings.strain == "auto":
+            change = float(np.max(np.ptp(extents, axis=0) / extents.max(axis=0)))
+            if change > STRAIN:
+                yield Note(
+                    "no_strain",
+                    f"the column strain is empty, since there is neither a periodic cell nor a "
+                    f"boundary, but the extents of the grains change by {change:.2g}: "
+                    f'`strain="grains"` measures the strain by them',
+                    kind=ScanfabNote,
+                )
+        yield from self._turned()
+
+    def _turned(self) -> Iterator[Note]:
+        """A note if the loading axis is not the axis of the contact fabric."""
+        rows = [row for row in self._rows if row.get("gc_axis_x") is not None]
+        if not rows or not is_turned(rows):
+            return
+        clearest = max(rows, key=lambda row: row["alpha_c"] / (row["alpha_c_axial_se"] or np.inf))
+        axis = [clearest[f"gc_axis_{name}"] for name in "xyz"]
+        near = [name for name, part in zip(AXES, axis, strict=True) if abs(part) > ALONG]
+        where = (
+            f'is along {near[0]}: `axis="{near[0]}"` loads along it'
+            if near
+            else (f"is {spelt_place(axis)}: `axis` can be any direction X,Y,Z")
+        )
+        yield Note(
+            "turned_axis",
+            f"the loading axis is not the axis of the contact fabric, which {where}",
+            kind=ScanfabNote,
+        )
