@@ -10,19 +10,13 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.option import (
-    number,
-    numbers,
-    one_of,
-    optional,
-    options_of,
-    reading,
-    unusable,
-    whole,
-)
+from scanfab.base import option
+from scanfab.base.option import options_of, reading, unusable
 
-parse_positive = optional(number("a number above 0", lambda value: 0 < value < math.inf))
-parse_skip = whole("how many lines to skip, 0 or more", lambda value: 0 <= value < 2**31)
+parse_positive = option.optional(
+    option.number("a number above 0", lambda value: 0 < value < math.inf)
+)
+parse_skip = option.whole("how many lines to skip, 0 or more", lambda value: 0 <= value < 2**31)
 
 
 def _reader_names() -> Iterable[str]:
@@ -78,7 +72,9 @@ def parse_cell(name: str, value: Any) -> tuple[float, ...] | str | PathLike[str]
         "three lengths LX LY LZ above 0, or six numbers LX LY LZ XY XZ YZ, or a CSV file with the "
         "cell of each frame"
     )
-    return numbers(expected, lambda cell: len(cell) in (3, 6) and min(cell[:3]) > 0)(name, value)
+    return option.numbers(expected, lambda cell: len(cell) in (3, 6) and min(cell[:3]) > 0)(
+        name, value
+    )
 
 
 def parse_frames(text: str | int | slice | None, name: str = "frames") -> slice:
@@ -108,7 +104,7 @@ def parse_periodic(name: str, value: Any) -> str | None:
 
 def parse_dim(name: str, value: Any) -> str | int:
     """``auto``, 2 or 3."""
-    word = one_of("auto", "2", "3")(name, str(value))
+    word = option.one_of("auto", "2", "3")(name, str(value))
     return word if word == "auto" else int(word)
 
 
@@ -174,6 +170,6 @@ def take_reading(options: dict[str, Any]) -> dict[str, Any]:
         If a value is not valid.
     """
     return {
-        option.name: option.parse(option.name, options.pop(option.name, option.default))
-        for option in READING_OPTIONS
+        known.name: known.parse(known.name, options.pop(known.name, known.default))
+        for known in READING_OPTIONS
     }
