@@ -7,7 +7,6 @@ import bz2
 import gzip
 import struct
 import sys
-import tempfile
 import zlib
 from pathlib import Path
 
@@ -121,18 +120,6 @@ def test_rows_that_cannot_be_those_counted_are_not_parsed(tmp_path, monkeypatch,
     path.write_bytes(gzip.compress(text.encode() + ROWS))
     with pytest.raises(ReadError, match=told):
         scanfab.read(path)
-
-
-def test_a_folder_for_copies_that_cannot_be_used_is_named(tmp_path, monkeypatch):
-    path = tmp_path / "dump.gz"
-    path.write_bytes(gzip.compress(dump_text().encode()))
-    gone = tmp_path / "gone"
-    # made by this process, and removed by someone else since
-    monkeypatch.setattr(files, "_folder", lambda process: str(gone / "scanfab-1"))
-    monkeypatch.setattr(tempfile, "tempdir", str(gone))
-    told = rf"^dump: cannot be written to {gone}: No such file .* by TMPDIR"
-    with pytest.raises(ReadError, match=told):
-        files.plain(path)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of a process are POSIX")

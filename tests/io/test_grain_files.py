@@ -49,14 +49,6 @@ def test_one_file_is_read_with_its_contacts_as_its_folder_is(folder, recwarn):
     assert not recwarn
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
-def test_of_two_series_each_has_the_contacts_of_its_own_prefix(folder):
-    series(folder, "run1_dump", "run1_contacts", 9, PAIRS[:1])
-    series(folder, "run2_dump", "run2_contacts", 9)
-    assert contacts_of(folder / "run1_dump_9.txt") == [1]
-    assert contacts_of(folder / "run2_dump_9.txt") == [2]
-
-
 def test_contacts_that_may_be_another_s_are_not_taken(folder):
     write(folder / "cloud_9.txt", dump_text(step=9))
     with pytest.warns(ScanfabNote, match=r"contacts_9.txt.*neither step nor name.*`contacts`"):

@@ -93,20 +93,6 @@ def test_contacts_may_be_named(tmp_path, named):
     assert id_pairs(packing) == set(PAIRS)
 
 
-def test_named_contacts_are_required_for_the_frame_that_is_read_only():
-    packing = scanfab.read(FLOOR / "multi.txt", contacts=FLOOR / "pairs_id_force.txt", frame=2)
-    assert len(packing.contacts) == 368
-
-
-def test_two_contact_lists_for_a_frame_are_an_error_that_names_both(folder):
-    for step in STEPS:
-        write(folder / f"again_{step}.txt", pairs_text(step=step))
-    with pytest.raises(
-        ReadError, match=r"two contact lists for one frame: .*again_9.*pairs_9.*`con"
-    ):
-        frames_of(folder)
-
-
 def test_unknown_files_are_passed_over_with_one_note(folder):
     for name in ("log.liggghts", "in.deck", "floor.stl", "README.md", "a.png", "b.pdf", "c.xyz"):
         write(folder / name, "hello\n")

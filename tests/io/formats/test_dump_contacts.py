@@ -54,6 +54,12 @@ APART = [*ROWS[:2], (3, 2, 0.61, 0.5, 0.5, 0.1)]
             [(*pair, 0, -1, 0, 0, *[7] * 5, 0.5) for pair in PAIRS],
             *(ROWS, "contactArea id force history:5", None, PAIRS, [1, 0, 0]),
         ),
+        # normal and tangential parts add up
+        (
+            [(*pair, 0, -2, 0, 0, 0, 3, 1) for pair in PAIRS],
+            *(ROWS, "id force_normal force_tangential", None, PAIRS, [2, -3, -1]),
+        ),
+        ([(*pair, 0, -2, 0, 0) for pair in PAIRS], ROWS, "id force_normal", None, PAIRS, None),
         # columns of any compute: a number, both ids apart, the force; no periodic flag
         ([(0.5, a, 7, b, -1.5, 0, 2) for a, b in PAIRS], ROWS, NAMED, None, PAIRS, [1.5, 0, -2]),
         # of pairs within a cut-off those are left that overlap, or have a force
@@ -72,6 +78,8 @@ def test_columns_are_found_or_named(tmp_path, local, rows, columns, format, pair
     packing = joined(tmp_path, local_text(local), rows, columns, format)
     expected = [tuple(sorted((int(float(one)), int(float(two))))) for one, two, *_ in local]
     assert id_pairs(packing) == set(expected if pairs is None else pairs)
+    if "force_normal" in (columns or ""):
+        np.testing.assert_array_equal(packing.contacts.force_n, 2)
     if force is None:
         assert packing.contacts.force is None
     else:

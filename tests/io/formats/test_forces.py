@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from tests.helpers.dumps import dump_text, local_text, write, yade_lines, yade_spheres
+from tests.helpers.dumps import write, yade_lines, yade_spheres
 from tests.helpers.truth import BOX, CELL, SHEAR, YADE, csv_rows
 
 LAMMPS = (
@@ -125,23 +125,6 @@ def test_files_of_yade_have_the_normal_force(grains, contacts, rtol):
         forces.update(zip(pairs, one.contacts.force_n.tolist(), strict=True))
     scale = np.mean(list(expected.values()))
     assert found == pytest.approx(expected, rel=20 * rtol, abs=rtol * scale)
-
-
-@pytest.mark.parametrize(
-    ("columns", "row", "force"),
-    [
-        ("id force_normal force_tangential", (1, 2, 0, -2, 0, 0, 0, 3, 1), [[2, -3, -1]]),
-        ("id force_normal", (1, 2, 0, -2, 0, 0), None),
-    ],
-)
-def test_parts_of_the_force_of_liggghts_add_up(tmp_path, columns, row, force):
-    rows = [(1, 4, 5, 5, 1), (2, 5.9, 5, 5, 1)]
-    text = dump_text(rows, "id x y z radius", box=((0, 10),) * 3)
-    grains = write(tmp_path / "dump_0.txt", text)
-    pairs = write(tmp_path / "pairs_0.txt", local_text([row]))
-    contacts = scanfab.read(grains, contacts=pairs, contact_columns=columns).contacts
-    assert force == (None if contacts.force is None else contacts.force.tolist())
-    np.testing.assert_array_equal(contacts.force_n, [2])
 
 
 def test_a_file_with_another_number_of_forces_is_refused(tmp_path):
