@@ -193,14 +193,12 @@ def _family_of(
             clash = f"two files for one step: {files[step]} and {file}: name one of them"
     pattern = _glob([file for _, file in members], among)
     family = Family(pattern, files, None, "other", None, clash, has_steps)
-    reader = None
     try:
-        reader = reader_for(family.largest, options)
-        kind = "other" if reader is None else reader.kind(family.largest)
+        family = replace(family, reader=reader_for(family.largest, options))
+        return replace(family, kind=family.reader.kind(family.largest)) if family.reader else family
     except ReadError as error:
         # kept, not raised: a folder is read without its damaged files
-        return replace(family, reader=reader, problem=str(error))
-    return replace(family, reader=reader, kind=kind)
+        return replace(family, problem=str(error))
 
 
 def _glob(members: list[Path], among: Iterable[Path]) -> str:

@@ -34,8 +34,8 @@ def test_the_content_tells_the_format(tmp_path, text):
     [
         (None, "cannot be read: No such file"),
         (b"", "expected a table, found an empty file"),
-        (b"a,b\n1,2\n1\n", "line 3: expected 2 cells, found 1"),
-        (b"a,b\n1,2,3\n", "line 2: expected 2 cells, found 3"),
+        (b"a,b\n1,2\n1\n", "line 3: expected 2 cells as in line 1, found 1: is"),
+        (b"a,b\n1,2,3\n", "line 2: expected 2 cells as in line 1, found 3"),
         (b'{"a": 1}\n{"a": \n', "cannot be read as JSON"),
         (b"[{]", "cannot be read as JSON"),
         (b"[1, 2]", "expected JSON objects, one for each row"),
