@@ -22,22 +22,18 @@ import re
 import subprocess
 import sys
 import tempfile
-import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-# in the place of this folder, whose coverage.py is not the package of that name; the base's tree
-# where its helpers make the sound files
-sys.path[:1] = [str(Path.cwd()), str(ROOT)]
+# in the place of this folder, whose coverage.py is not the package of that name
+sys.path[0] = str(ROOT)
 
-from tests.helpers import versions  # noqa: E402
-
-# each version is the one that its environment has installed, not the one of this tree
-del sys.path[:2]
+from scanfab.io.writer import installed_writers, writer_named  # noqa: E402
+from tests.helpers import fuzzing, sound_files, versions  # noqa: E402
+from tests.helpers.versions import Reading  # noqa: E402
 
 DATA = "sample_data"
 
@@ -163,75 +159,6 @@ def unnamed_options(base: Path) -> set[str]:
 MAIN = "from scanfab.cli.main import main; main()"
 
 
-# --- the tasks, in the environment of either version
-
-
-def outcome(action: Callable[[], Any]) -> Any:
-    """What an action gives, without its warnings, or the kind of its error."""
-    import scanfab
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            return action()
-        except scanfab.ScanfabError as error:
-            return type(error).__name__
-        except Exception as error:
-            return f"TRACEBACK {error!r}"
-
-
-def read_all(source: str, **options: Any) -> Any:
-    """The packings of a source as digests, or the kind of its error."""
-    import scanfab
-
-    return outcome(
-        lambda: [versions.packed(one.read()) for one in scanfab.read_series(source, **options)]
-    )
-
-
-def task_read(*files: str) -> dict[str, Any]:
-    """Each source, as it is and with a format's name where there is one behind a tab."""
-    found = {}
-    for line in files:
-        source, _, format = line.partition("\t")
-        found[line] = read_all(source, **({"format": format} if format else {}))
-    return found
-
-
-def task_convert(folder: str, *sources: str) -> dict[str, Any]:
-    """Each source in every format; what is read back from each, or the error of writing it."""
-    import scanfab
-
-    found: dict[str, Any] = {}
-    special = {"on-dem": "vtkhdf", "lammps": "lammpstrj", "lammps-data": "data"}
-    for k, source in enumerate(sources):
-        for name in sorted(one.name for one in entry_points(group="scanfab.writers")):
-            out = Path(folder) / f"{k}_{name}" / f"frame.{special.get(name, name)}"
-            out.parent.mkdir(parents=True, exist_ok=True)
-
-            def convert(source: str = source, out: Path = out, name: str = name) -> None:
-                scanfab.convert(scanfab.read_series(source)[-1].read(), out, to=name)
-
-            found[f"{source} {name}"] = outcome(convert) or read_all(str(out))
-    return found
-
-
-def task_sound(folder: str) -> list[str]:
-    """The sound files of the tests, each format in a folder of its own; run in the base's tree."""
-    sys.path.insert(0, str(Path.cwd()))
-    from tests.helpers import fuzzing, sound_files
-
-    files = []
-    for name in fuzzing.READERS:
-        own = Path(folder) / name
-        own.mkdir(parents=True)
-        with tempfile.TemporaryDirectory() as made:
-            for file, content in sound_files.seeds(name, Path(made)):
-                (own / file).write_bytes(content)
-        files += [f"{path}\t{name}" for path in sorted(own.iterdir())]
-    return files
-
-
 # --- holding the answers against one another
 
 
@@ -338,48 +265,60 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, default=ROOT / "build" / "same_tables")
     parser.add_argument("--also", type=Path, nargs="*", default=[])
     parser.add_argument("--only", nargs="+", default=["read", "converted", "commands"])
-    parser.add_argument("--task", help=argparse.SUPPRESS)
     given = parser.parse_args()
-    if given.task:
-        tasks = {"read": task_read, "convert": task_convert, "sound": task_sound}
-        print(json.dumps(tasks[given.task](*json.load(sys.stdin))))
-        return
-    checkout, base = versions.installed_base(given.base, given.keep.resolve())
-    this = Path(sys.executable)
+    base = versions.installed_base(given.base, given.keep.resolve())
+    pythons = base, Path(sys.executable)
     found: list[str] = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        if {"read", "converted"} & set(given.only):
-            sources = every_source(checkout, base, folder, given.also)
+        sources = every_source(folder / "sound", given.also) if {*given.only} - {"commands"} else []
         if "read" in given.only:
-            answers = [versions.ask(python, __file__, "read", *sources) for python in (base, this)]
-            found += differences("read", *answers)
+            answers = [versions.answers(python, sources) for python in pythons]
+            for source, *pair in zip(sources, *answers, strict=True):
+                name = f"{source.source} {source.options.get('format', '')}".strip()
+                found += differences(name, *(one.found for one in pair))
             print(f"read: {len(sources)} sources", flush=True)
         if "converted" in given.only:
-            plain = [one for one in sources if "\t" not in one and not one.endswith(PACKED)]
+            # files that are there unpacked as well, or are like others, are not converted
+            plain = {one.source: 0 for one in sources if not one.source.endswith(PACKED)}
+            listed = [(source, name) for source in plain for name in installed_writers()]
             answers = [
-                versions.ask(python, __file__, "convert", str(folder / f"converted_{k}"), *plain)
-                for k, python in enumerate((base, this))
+                versions.answers(python, conversions(listed, folder / f"converted_{k}"))
+                for k, python in enumerate(pythons)
             ]
-            found += differences("converted", *answers)
-            print(f"converted: {len(answers[0])} conversions", flush=True)
+            for (source, name), *pair in zip(listed, *answers, strict=True):
+                found += differences(f"converted: {source} {name}", *(one.found for one in pair))
+            print(f"converted: {len(listed)} conversions", flush=True)
         if "commands" in given.only:
-            found += held_commands(this, base, folder / "commands")
+            found += held_commands(pythons[1], base, folder / "commands")
     report(found)
 
 
 PACKED = (".gz", ".bz2", ".xz", ".lz4", ".zst")
-"""Of files that are there unpacked as well, or like others, only one is converted."""
 
 
-def every_source(checkout: Path, base: Path, folder: Path, also: list[Path]) -> list[str]:
-    """Folders and files to read, with the name of a format where it is known."""
-    sound = versions.ask(base, __file__, "sound", str(folder / "sound"), tree=checkout)
-    samples = sorted((ROOT / DATA).rglob("*"))
-    folders = [str(path) for path in sorted((ROOT / DATA).iterdir()) if path.is_dir()]
-    files = [str(path) for path in samples if path.is_file() and path.parent.name != "paper"]
-    others = [str(path) for top in also for path in sorted(top.rglob("*")) if path.is_file()]
-    return [*folders, *files, *sound, *(one.partition("\t")[0] for one in sound), *others]
+def every_source(folder: Path, also: list[Path]) -> list[Reading]:
+    """Samples, and sound files as any format and as their own."""
+    sources = [path for path in sorted((ROOT / DATA).iterdir()) if path.is_dir()]
+    for top in (ROOT / DATA, *also):
+        sources += [x for x in sorted(top.rglob("*")) if x.is_file() and x.parent.name != "paper"]
+    found = [Reading(str(path)) for path in sources]
+    for name in fuzzing.READERS:
+        own = folder / name
+        own.mkdir(parents=True)
+        for file, content in sound_files.seeds(name, own):
+            (own / file).write_bytes(content)
+        for path in sorted(own.iterdir()):
+            found += [Reading(str(path)), Reading(str(path), {"format": name})]
+    return found
+
+
+def conversions(listed: list[tuple[str, str]], folder: Path) -> list[Reading]:
+    """Each source in a format, in a folder of its own."""
+    return [
+        Reading(source, {}, (str(folder / f"{k}/a{writer_named(name).extensions[0]}"), name))
+        for k, (source, name) in enumerate(listed)
+    ]
 
 
 def report(found: list[str]) -> None:
