@@ -289,6 +289,8 @@ def join_table(path: Path, grains: GrainTable, columns: Columns) -> JoinedContac
     force = _force(path, grains, rows, columns) if (rows >= 0).all() else None
     force_n = columns.get("fn") if force is None else None
     if force_n is not None:
+        if force_n.dtype.kind not in "biuf":
+            raise ReadError(f"{path}: expected numbers in the column fn, found text")
         # compression is positive, and nearly all contacts are under compression
         doubt = "are above 0, so it is unclear which sign means compression"
         sign = _sign(doubles(force_n), f"{path}: the normal forces are left out", doubt)
