@@ -72,8 +72,7 @@ def rvs_of(settings: Settings, sample: Sample | None = None) -> tuple[RV, ...]:
             center[space.across] = packing.place_across
         if 0.5 * (shape.high - shape.low)[list(space.along)].min() < SMALLEST * smallest:
             raise SettingsError(
-                f"rv: the {shape} is far too small for the smallest grain (radius {smallest:g}): "
-                f"choose a larger `rv`, `rv_radius` or `rv_size`"
+                f"rv: the {shape} is far too small for grains of radius {smallest:g}"
             )
         rvs[place] = RV(rvs[place].fraction, Window(center, shape))
     return tuple(rvs)
@@ -95,8 +94,8 @@ def _shape(settings: Settings, part: FloatArray, space: Space) -> tuple[Convex, 
     try:
         return shapes.polyhedron(*read_surface(Path(kind)))
     except SettingsError as error:
-        text = f"rv_shape: {kind}: {error}: expected a closed convex surface"
-        raise SettingsError(text) from None
+        text = f"{error}: expected a closed convex surface"
+        raise SettingsError(f"rv_shape: {kind}: {text}") from None
 
 
 def _cylinder_within(half: FloatArray, axis: Vector) -> tuple[float, float]:
@@ -129,23 +128,18 @@ def doubts_of_rv(window: Window, sample: Sample) -> list[Note]:
     meets = window.may_meet(packing.position, packing.radius, packing)
     if not np.any(meets & sample.grains):
         raise SettingsError(
-            f"the {window} holds no grain: choose another `rv_center`, or a larger RV "
-            f"(`rv_radius`, `rv_size`)"
+            f"the {window} holds no grain: choose another `rv_center` or a larger RV"
         )
     if room < -2 * largest:
         raise SettingsError(
-            f"the {window} reaches {-room:g} beyond the sample, which is more than twice the "
-            f"largest radius ({largest:g}): choose another `rv_center` or a smaller `rv`, "
-            f"{RV_MEANING}" + ("" if window.shape.is_sphere else ", or a smaller `rv_size`")
+            f"the {window} reaches {-room:g} beyond the sample, over twice the largest radius "
+            f"{largest:g}: choose another `rv_center`, or a smaller `rv_size` or `rv`, {RV_MEANING}"
         )
-    if room >= largest:
-        return []
     text = (
         f"the {window} comes closer to the sample's surface than the largest radius ({largest:g}), "
-        f"so it cuts the outermost layer of grains, which the boundary arranges: choose a smaller "
-        f"`rv`, or use more grains"
+        f"so it cuts the outermost grains, which the boundary arranges: choose a smaller `rv`"
     )
-    return [Note("rv_at_surface", text)]
+    return [Note("rv_at_surface", text)] if room < largest else []
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,10 +172,8 @@ class Deformation:
         """
         mode = strain_mode(sample, mode, axis)
         if not mode:
-            raise SettingsError(
-                "rv_follows: there is neither a periodic cell nor a boundary to measure how the "
-                'sample deforms: choose `strain="grains"`, or leave out `rv_follows`'
-            )
+            text = "there is neither a periodic cell nor a boundary to follow"
+            raise SettingsError(f'rv_follows: {text}: choose `strain="grains"`')
         origin, edges = _edges(sample, mode)
         space = sample.packing.space
         scale = float(np.abs(edges[list(space.along)]).max())
