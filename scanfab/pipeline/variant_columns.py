@@ -144,14 +144,15 @@ class VariantColumns:
     def window_alpha(self) -> float | None:
         """Anisotropy due to the window alone; 0 if the edge rule cuts no segments."""
         fabric, settings = self.measured.void, self.plan.settings
-        if self.window is None or fabric is None:
+        if (
+            self.window is None
+            or fabric is None
+            or (settings.edge == CLIP and settings.moment != 1)
+        ):
             return None
         if settings.edge != CLIP:
             return 0.0
-        if settings.moment != 1:
-            return None
-        shape = self.window.shape
-        return predicted.window_alpha(shape, fabric, self.cutoff, self.measured.axis)
+        return predicted.window_alpha(self.window.shape, fabric, self.cutoff, self.measured.axis)
 
     def notes(self) -> Iterator[Note]:
         """Notes on a missing or doubtful fabric, and on lines that meet no grain."""
