@@ -286,8 +286,8 @@ class _AutoScan:
             if 2 * steps > work:
                 text += (
                     f"; {steps / work:.0%} of the work was to follow long void segments through "
-                    f"images of the cell: is it too large, or periodic where the sample is not "
-                    f"(`cell`, `periodic`)?"
+                    f"the images of the cell: is the cell too large, or periodic where the sample "
+                    f"is not (`cell`, `periodic`)?"
                 )
             yield Note(TOLERANCE_MISSED, text)
         for name, errors in self.errors.items():

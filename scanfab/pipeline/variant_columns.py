@@ -29,8 +29,8 @@ from scanfab.table.columns import installed_fabrics
 # the user is warned if a larger fraction of the segments leaves the sample
 MOST_LEFT_OUT = 0.01
 NO_INNER_WINDOW = (
-    "the sample is flat or too small for `edge=ends`: no ellipsoid fits that lies one largest "
-    "radius inside the hull of the grain centres"
+    "the sample is flat or too small for `edge=ends`: the whole is then measured in an ellipsoid "
+    "that lies one largest radius inside the hull of the grain centres, and none fits"
 )
 
 
@@ -217,6 +217,7 @@ def doubts_of_lines(sums: ScanSums, variant: Variant, left_out: float | None) ->
     if left_out is not None and left_out > MOST_LEFT_OUT:
         texts["left_out"] = (
             f"{left_out:.1%} of the void segments of the RV leave the sample and are left out: "
-            f"the longest, so the mean length is too small: choose a smaller `rv`, or `edge=ends`"
+            f"these are long segments, so the mean length is too small: choose a smaller `rv`, or "
+            f"`edge=ends`, which needs nothing outside the RV"
         )
     return texts
