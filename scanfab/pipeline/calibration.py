@@ -8,7 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from itertools import groupby
+from itertools import chain, groupby
 from typing import Annotated, Any
 
 from scanfab.base.column import LENGTH
@@ -21,7 +21,7 @@ from scanfab.pipeline.frames import Frames, Source
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import make_plan
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.tolerance import TOLERANCE_MISSED, Goal, missing_work
+from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work, variant_errors
 from scanfab.pipeline.values import SHAPES, Length
 from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.directions import direction_rule, rule_of, usual_rule
@@ -178,7 +178,7 @@ def calibrate(
     if settings.lists_gaps or len(settings.rvs) > 1:
         raise SettingsError("calibrate: leave out `cutoffs`, `moment` and all but one `rv`")
     one_frame = _OneFrame(source, settings, frame)
-    settings, cutoffs = one_frame.settings, one_frame.cutoffs()
+    cutoffs = one_frame.cutoffs()
     spacings, directions, rvs = (one_frame.ladder(name) for name in ("spacing", "directions", "rv"))
     ladders = {"spacing": spacings, "directions": directions, "cutoff": cutoffs, "rv": rvs}
     cutoff = settings.cutoff.value if settings.cutoff.unit == "rmin" else PAPER_CUTOFF
@@ -195,8 +195,7 @@ def calibrate(
         f"recommended: error of the scan {reached} (wanted {target:.2g}; of the sample {own}) "
         f"in {best[0].seconds:.2g} s"
     )
-    rows = [row for ladder in ladders.values() for row in ladder]
-    return Calibration((*rows, *best), tuple(findings), recommended)
+    return Calibration((*chain(*ladders.values()), *best), tuple(findings), recommended)
 
 
 class _OneFrame:
@@ -204,7 +203,7 @@ class _OneFrame:
 
     def __init__(self, source: Source, settings: Settings, frame: int) -> None:
         frames = Frames(source, replace(settings, frames=parse_frames(frame, "frame")))
-        self.number, wanted = frames.one()
+        self.name, (self.number, wanted) = frames.name, frames.one()
         # the first frame of the series that has grains makes the plan
         first = frames.first()
         if first is None:
@@ -214,7 +213,7 @@ class _OneFrame:
         sample = self.first if number == self.number else frames.sample(self.number, wanted)
         if sample is None or not sample.grains.any():
             raise PackingError(f"frame {self.number} has no grains: choose another frame")
-        self.name, self.sample, self.space = frames.name, sample, self.first.packing.space
+        self.sample, self.space = sample, self.first.packing.space
         self.settings = settings_in(settings, self.space)
         tell(sample.doubts_of_escaped(), f"frame {self.number}")
         # these notes hold for every step
@@ -226,8 +225,8 @@ class _OneFrame:
         steps: dict[float, dict[str, Any]] = {}
         if name == "spacing":
             rule = settings.directions or usual_rule(space)
-            for value in SPACINGS:
-                steps[value] = {"spacing": Length(value, "rmin"), "directions": rule}
+            spacings = {value: Length(value, "rmin") for value in SPACINGS}
+            steps = {value: {"spacing": one, "directions": rule} for value, one in spacings.items()}
         elif name == "directions":
             spacing = settings.spacing or Length(FIXED_SPACING, "rmin")
             rules = [direction_rule(f"lebedev:{degree}") for degree in DEGREES]
@@ -242,7 +241,7 @@ class _OneFrame:
         rows: list[StepRow] = []
         for value, changed in steps.items():
             try:
-                rows += self.measured(name, value, replace(settings, **changed))[0]
+                rows += self.step(name, value, replace(settings, **changed))[0]
             except SettingsError as error:
                 tell([Note("step_left_out", f"{name} {value:g} is skipped: {error}")])
         return judged(rows, space.dimension)
@@ -250,37 +249,33 @@ class _OneFrame:
     def cutoffs(self) -> list[StepRow]:
         """Scan once for all cut-offs; SettingsError if a variant has no void fabric at any."""
         lengths = tuple(Length(value, "rmin") for value in CUTOFFS)
-        rows, _ = self.measured("cutoff", None, replace(self.settings, cutoffs=lengths))
+        rows, _ = self.step("cutoff", None, replace(self.settings, cutoffs=lengths))
         for variant in self.settings.variants:
             if all(row.alpha_vs_axial is None for row in rows if row.variant == variant):
-                raise SettingsError(
-                    f"frame {self.number}: variant {variant} has no void fabric at any cut-off: "
-                    f"it has too few grains, only rattlers, or no voids"
-                )
+                text = f"variant {variant} has no void fabric at any cut-off"
+                raise SettingsError(f"frame {self.number}: {text}: it has too few grains or voids")
         return rows
 
-    def measured(
+    def step(
         self, ladder: str, value: float | None, settings: Settings
     ) -> tuple[list[StepRow], Measurement]:
         """Scan one step: its rows and its measurement. Without a value, rows take their cut-off."""
         begun = time.perf_counter()
-        plan = make_plan(settings, self.first)
-        shadow = self.space.shadow(self.sample.packing.radius[self.sample.grains])
+        plan, radius = make_plan(settings, self.first), self.sample.packing.radius
+        shadow = self.space.shadow(radius[self.sample.grains])
         chords = self.space.lines(shadow, plan.spacing) * plan.replicates * len(plan.rule)
         if ladder in ("spacing", "directions") and chords > settings.max_chords:
-            raise SettingsError(
-                f"it would cut {chords:.2g} chords from grains, more than `max_chords` allows "
-                f"({settings.max_chords:g})"
-            )
+            allowed = f"more than `max_chords` allows ({settings.max_chords:g})"
+            raise SettingsError(f"it would cut {chords:.2g} chords from grains, {allowed}")
         result = compute_frame(self.sample, plan, number=self.number, source=self.name)
         seconds = time.perf_counter() - begun
         LOGGER.info("%s %s: %.2g s", ladder, "" if value is None else f"{value:g}", seconds)
         r_min = float(self.first.packing.radius[self.first.grains].min())
-        rows, window = [], plan.window
+        rows = []
         for row in result.rows:
             # notes on errors at other cut-offs are dropped: each row has its own error
             own = [n for n in result.notes if row.variant in n.variants and n.code != OTHER_CUTOFFS]
-            whole = [note for note in result.notes if note.code == TOLERANCE_MISSED]
+            own += [note for note in result.notes if note.code == TOLERANCE_MISSED]
             step = StepRow(
                 **{field.name: row[field.name] for field in fields(StepRow) if field.name in row},
                 ladder=ladder,
@@ -288,10 +283,10 @@ class _OneFrame:
                 rule=plan.rule.name,
                 degree=plan.rule.degree,
                 rule_bias=plan.rule.bias,
-                rv_radius=window.radius if window and row.variant in "cd" else None,
+                rv_radius=plan.window.radius if plan.window and row.variant in "cd" else None,
                 seconds=seconds,
                 steady=None,
-                note="; ".join(note.text for note in (*own, *whole)),
+                note="; ".join(note.text for note in own),
             )
             rows.append(step)
         return rows, result.measurements[0]
@@ -310,12 +305,9 @@ class _OneFrame:
         other_lines = replace(self.settings, tolerance=target, seed=self.settings.seed + 1)
         for _ in range(ROUNDS):
             trial = replace(other_lines, spacing=Length(spacing, "rmin"), directions=rule)
-            _, measurement = self.measured("recommended", len(rule), trial)
-            errors = [
-                Goal().errors(measurement.sums, measurement.plan, name)
-                for name in measurement.plan.variants
-            ]
-            missing = missing_work(errors, measurement.plan, measurement.sums.replicates)
+            _, found = self.step("recommended", len(rule), trial)
+            errors = [variant_errors(found.sums, found.plan, name) for name in found.plan.variants]
+            missing = missing_work(errors, found.plan, found.sums.replicates)
             if missing <= 1.0:
                 break
             wanted = len(rule) * missing
@@ -323,7 +315,7 @@ class _OneFrame:
                 spacing = float(f"{spacing * self.space.apart(MOST_DIRECTIONS / wanted):.2g}")
             rule = rule_of(min(math.ceil(wanted), MOST_DIRECTIONS), self.space)
         best = replace(self.settings, spacing=Length(spacing, "rmin"), directions=rule)
-        rows, _ = self.measured("recommended", len(rule), best)
+        rows, _ = self.step("recommended", len(rule), best)
         return rows, {"spacing": f"{spacing:g}rmin", "directions": rule.name}
 
 
@@ -343,7 +335,7 @@ def judged(rows: Sequence[StepRow], dimension: int = 3) -> list[StepRow]:
     return judged_rows[::-1]
 
 
-def _agree(row: StepRow, other: StepRow, most: float, dimension: int) -> bool:
+def _agree(row: StepRow, later: StepRow, most: float, dimension: int) -> bool:
     """
     Whether two values differ by at most ``most`` standard errors of their difference.
 
@@ -352,15 +344,15 @@ def _agree(row: StepRow, other: StepRow, most: float, dimension: int) -> bool:
     difference of both variances, which follow from the error of the larger RV, as it is better
     known.
     """
-    if row.alpha_vs_axial is None or other.alpha_vs_axial is None:
+    if row.alpha_vs_axial is None or later.alpha_vs_axial is None:
         return False
     nested = 0.0
-    if row.ladder == "rv":
-        small, large = sorted((row, other), key=lambda step: step.rv_radius or 0.0)
-        more = ((large.rv_radius or 0.0) / (small.rv_radius or 1.0)) ** dimension
-        nested = (large.alpha_vs_axial_sample_se or 0.0) * math.sqrt(max(more - 1.0, 0.0))
-    error = math.hypot(row.alpha_vs_axial_se or 0.0, other.alpha_vs_axial_se or 0.0, nested)
-    return abs(row.alpha_vs_axial - other.alpha_vs_axial) <= most * error
+    if row.ladder == "rv" and row.rv_radius and later.rv_radius:
+        # RVs ascend, so the later one is the larger
+        more = (later.rv_radius / row.rv_radius) ** dimension
+        nested = (later.alpha_vs_axial_sample_se or 0.0) * math.sqrt(more - 1.0)
+    error = math.hypot(row.alpha_vs_axial_se or 0.0, later.alpha_vs_axial_se or 0.0, nested)
+    return abs(row.alpha_vs_axial - later.alpha_vs_axial) <= most * error
 
 
 def first_steady(rows: Sequence[StepRow]) -> float | None:
@@ -388,11 +380,10 @@ def _finding(ladder: str, rows: list[StepRow]) -> str:
     variant = rows[0].variant
     own = {row.value: row.alpha_vs_axial or 0.0 for row in rows if row.variant == variant}
     best = max(own, key=lambda value: abs(own[value]))
-    text = (
+    paper = ""
+    if own.get(PAPER_CUTOFF):
+        paper = f"; at the paper's 1 r_min it is {own[PAPER_CUTOFF] / own[best]:.0%} of that"
+    return (
         f"cut-off: it decides what is measured; in variant {variant} the anisotropy is largest "
-        f"({own[best]:.2g}) at {best:g} r_min"
+        f"({own[best]:.2g}) at {best:g} r_min{paper}"
     )
-    paper = own.get(PAPER_CUTOFF)
-    if paper:
-        text += f"; at the paper's 1 r_min it is {paper / own[best]:.0%} of that"
-    return text

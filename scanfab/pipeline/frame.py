@@ -9,20 +9,19 @@ from typing import Any
 
 from scanfab.base.errors import Note, PackingError, joined
 from scanfab.base.spelling import spelt_apart
-from scanfab.fabric.state import VOLUMETRIC_STRAIN
 from scanfab.io.frame import Frame
 from scanfab.io.series import other_space
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample
-from scanfab.pipeline.frames import packing_of
+from scanfab.pipeline.frames import packing_of, sample_rule
 from scanfab.pipeline.maps.rows import map_rows
 from scanfab.pipeline.measurement import Measurement, measure
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.state import refuse_forces
-from scanfab.pipeline.variant_columns import VariantColumns, no_columns
+from scanfab.pipeline.variant_columns import VariantColumns
 from scanfab.scan.blocks import Blocks
-from scanfab.table.columns import complete_row, row_of
+from scanfab.table.columns import row_of
 from scanfab.table.row import Row
 
 OTHER_CUTOFFS = "error_at_other_cutoffs"
@@ -85,7 +84,9 @@ def compute_frame(
     ScanfabError
         If the frame cannot be read or measured.
     """
-    sample = frame if isinstance(frame, Sample) else plan.samples.sample(packing_of(frame))
+    sample = (
+        frame if isinstance(frame, Sample) else sample_rule(plan.settings).sample(packing_of(frame))
+    )
     try:
         return _computed(sample, plan, number, source)
     except PackingError as error:
@@ -99,12 +100,13 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
     known = _frame_values(frame, plan, number, source)
     if not has_grains:
         return FrameResult(source, number, frame, (), list(_empty_rows(known, plan)))
-    if plan.map_settings is not None:
+    if plan.map_blocks is not None:
         mapped, told, blocks = map_rows(frame, plan.in_frame(frame), known, f"frame {number}")
         notes = (*frame.doubts_of_escaped(), *told)
         return FrameResult(source, number, frame, (), mapped, notes, blocks)
-    if "forces" in plan.groups or "state" in plan.groups:
-        refuse_forces(frame, plan.groups)
+    groups, columns = plan.settings.with_, plan.settings.columns
+    if "forces" in groups or "state" in groups:
+        refuse_forces(frame, groups)
     measurements = measure(frame, plan.in_frame(frame), f"frame {number}")
     rows: list[Row] = []
     doubts: list[Note] = []
@@ -114,7 +116,7 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
                 # one at a time, as each holds the contacts of its variant
                 one = VariantColumns(measurement, VARIANTS[variant], place)
                 values = {**known, "variant": variant, **one.columns()}
-                rows.append(complete_row(values, plan.more_columns))
+                rows.append(row_of(columns, values))
                 doubts += one.notes()
     notes = (
         *frame.doubts_of_escaped(),
@@ -127,30 +129,22 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
 
 def _empty_rows(known: Mapping[str, Any], plan: Plan) -> Iterator[Row]:
     """The rows of a frame without grains."""
-    empty = {**no_columns(plan.more_columns), **known}
-    if plan.map_settings is not None:
-        for variant, block in product(plan.variants, range(plan.map_settings.blocks)):
-            yield row_of(plan.map_settings.columns, {**empty, "variant": variant, "block": block})
-        return
+    empty, settings = {**known, "grains": 0, "rattlers": 0, "contacts": 0}, plan.settings
     for variant in plan.variants:
-        for rv in plan.rvs_of(variant):
-            own = {RV_COLUMN.name: rv.fraction} if RV_COLUMN.name in plan.more_columns else {}
-            row = complete_row({**empty, "variant": variant, **own}, plan.more_columns)
-            yield from [row] * len(plan.cutoffs)
+        for rv, block in product(plan.rvs_of(variant), range(settings.blocks)):
+            own = {"variant": variant, RV_COLUMN.name: rv.fraction, "block": block}
+            yield from [row_of(settings.columns, {**empty, **own})] * len(plan.cutoffs)
 
 
 def _frame_values(sample: Sample, plan: Plan, number: int, source: str) -> dict[str, Any]:
     """The columns that are the same in all rows of a frame."""
-    strains = plan.strains.at(number, sample)
-    if VOLUMETRIC_STRAIN.name not in plan.more_columns:
-        del strains[VOLUMETRIC_STRAIN.name]
     return {
         "source": source,
         "frame": number,
         "step": sample.packing.step,
         "time": sample.packing.time,
         "contacts_from": sample.contacts.source,
-        **strains,
+        **plan.strains.at(number, sample),
     }
 
 
@@ -158,8 +152,9 @@ def _large_errors(rows: list[Row], plan: Plan) -> Iterator[Note]:
     """Other cut-offs, RVs and the second moment are measured along lines chosen for one."""
     worst = max(rows, key=lambda row: row.alpha_vs_axial_se or 0.0)
     error, rv = worst.alpha_vs_axial_se or 0.0, worst.get(RV_COLUMN.name)
-    if plan.auto and (plan.lists_gaps or len(plan.rvs) > 1) and error > plan.tolerance:
-        reached, tolerance = spelt_apart(error, plan.tolerance)
+    aim, others = plan.settings.tolerance, plan.settings.lists_gaps or len(plan.rvs) > 1
+    if plan.auto and others and error > aim:
+        reached, tolerance = spelt_apart(error, aim)
         where = f"at the cut-off {worst.cutoff:g}{f' in the RV {rv:g}' if rv else ''}"
         met = f"which holds at {plan.cutoff:g}{f' in {plan.rvs[0].fraction:g}' if rv else ''}"
         text = f"{where} alpha_vs_axial_se is {reached}, above the tolerance {tolerance}, {met}"

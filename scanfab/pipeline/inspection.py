@@ -16,7 +16,7 @@ from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impo
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import Frames, boundary_hints
-from scanfab.pipeline.rv import windows_of
+from scanfab.pipeline.rv import rvs_of
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.window_settings import settings_in
 from scanfab.table.row import Record
@@ -97,8 +97,8 @@ def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
             warnings.warn(warning.message, stacklevel=2)
         else:
             doubts.append(str(warning.message))
-    if len(sample.packing):
-        doubts += [doubt.text for doubt in boundary_hints(sample, frames.settings)]
+    notes = boundary_hints(sample, frames.settings) if len(sample.packing) else []
+    doubts += [doubt.text for doubt in notes]
     try:
         refuse_impossible(sample)
     except PackingError as error:
@@ -108,8 +108,7 @@ def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
         doubts.append(no_cell)
     elif hint := cell_hint(sample, frame.carries):
         note(hint)
-    doubts += [doubt.text for doubt in sample.doubts_of_escaped()]
-    return sample, doubts
+    return sample, [*doubts, *(doubt.text for doubt in sample.doubts_of_escaped())]
 
 
 def _rv(frames: Frames, sample: Sample) -> Window | None:
@@ -117,7 +116,7 @@ def _rv(frames: Frames, sample: Sample) -> Window | None:
     if not sample.grains.any():
         return None
     tell(frames.check_boundary(sample))
-    return windows_of(sample, settings_in(frames.settings, sample.packing.space))[-1]
+    return rvs_of(settings_in(frames.settings, sample.packing.space), sample)[-1].window
 
 
 def _report(

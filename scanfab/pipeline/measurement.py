@@ -65,7 +65,7 @@ class Measurement:
         """Sums of kept segments as :meth:`GapSums.kept`, at the plan's cut-off number ``place``."""
         if self.gaps is None:
             return self.sums.kept(variant)
-        return self.gaps.kept(variant, place, self.plan.moment)
+        return self.gaps.kept(variant, place, self.plan.settings.moment)
 
     def spheres_of(self, variant: Variant) -> tuple[FloatArray, FloatArray, Convex | None]:
         """
@@ -74,10 +74,9 @@ class Measurement:
         Returns the positions (N, 3) from the solids' origin, the radii (N,), and the region that
         clips the lines, if any. A periodic whole is shown in part, within a sphere.
         """
-        solids, medium = self.solids, self.solids.medium
+        solids, medium, cell = self.solids, self.solids.medium, self.sample.packing.cell
         position, radius, removed = solids.position, solids.radius, solids.removed
         window = solids.window if variant.in_window else None
-        cell = self.sample.packing.cell
         if medium is not None and cell is not None and not variant.in_window:
             window = sphere(0.5 * float(np.linalg.norm(medium.vectors, axis=1).max()))
             position, row = cell.images_near_origin(medium.position, medium.radius + window.reach)
@@ -87,7 +86,7 @@ class Measurement:
 
     def at_cutoffs(self, cutoffs: Iterable[float]) -> Measurement:
         """The measurement of the same lines at other cut-offs, in the dump's unit."""
-        plan = replace(self.plan, cutoffs=tuple(sorted(cutoffs)), lists_gaps=True)
+        plan = replace(self.plan, cutoffs=tuple(sorted(cutoffs)))
         return _with_gaps(self.sample, self.solids, self.sums, plan, self.notes)
 
 
@@ -103,7 +102,7 @@ def measure(sample: Sample, plan: Plan, where: str = "the frame") -> tuple[Measu
 
 
 def _measure(sample: Sample, plan: Plan, where: str) -> Measurement:
-    solids = solids_of(sample, plan.window, variants=plan.variants, edge=plan.edge)
+    solids = solids_of(sample, plan.window, variants=plan.variants, edge=plan.settings.edge)
     sums, plan, notes = scan_to_tolerance(solids, plan, where)
     return _with_gaps(sample, solids, sums, plan, tuple(notes))
 
@@ -112,14 +111,12 @@ def _with_gaps(
     sample: Sample, solids: Solids, sums: ScanSums, plan: Plan, notes: tuple[Note, ...]
 ) -> Measurement:
     """Add the gaps of all lines, if the plan needs them, and gaps by octant of a second scan."""
-    blocks = _octants(sample, plan)
+    blocks, gaps = _octants(sample, plan), None
     scan = gap_scan(solids, plan, blocks, plan.cutoffs)
-    gaps = None
-    if plan.lists_gaps:
+    if plan.settings.lists_gaps or len(plan.cutoffs) > 1:
         gaps = scan(plan.rule, spacing=plan.spacing, replicates=range(sums.replicates))
     # the directions of an auto scan, or more directions for few grains
-    count = len(solids.grain_radius)
-    rule = usual_rule(solids.space)
+    count, rule = len(solids.grain_radius), usual_rule(solids.space)
     if len(rule) * count < AXES_TIMES_GRAINS:
         rule = design_of(AXES_TIMES_GRAINS / max(count, 1), solids.space)
     most = min(max(CHORDS_A_GRAIN * count, FEWEST_CHORDS), MOST_CHORDS)
@@ -140,25 +137,25 @@ def gap_scan(
     return partial(
         scan_gaps, solids,
         cutoffs=cutoffs, blocks=(blocks[0].moved(solids.origin), blocks[1].moved(solids.origin)),
-        variants=plan.variants, seed=plan.seed, workers=plan.workers, most_steps=math.inf,
+        variants=plan.variants, seed=plan.settings.seed, workers=plan.workers, most_steps=math.inf,
     )  # fmt: skip
 
 
 def _octants(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
     """Octants about the middle of the sample or its cell, and about the centre of the RV."""
-    packing, cell = sample.packing, sample.packing.cell
-    position = compressed(sample.gathered, packing.position)
-    low, high = position.min(axis=0), position.max(axis=0)
-    radius = float(packing.radius.max())
-    reach = float(np.linalg.norm(high - low)) + radius
-    whole = Blocks.about(0.5 * (low + high), reach, plan.axis, plan.space)
+    packing, cell, window = sample.packing, sample.packing.cell, plan.window
+    position, largest = compressed(sample.gathered, packing.position), float(packing.radius.max())
+    axis, space = plan.settings.axis, plan.space
     if cell is not None and packing.is_periodic:
         periodic = np.array(cell.periodic)
-        whole = Blocks.of_periods(cell.vectors, cell.origin, periodic, position, plan.space)
-    if plan.window is None:
+        whole = Blocks.of_periods(cell.vectors, cell.origin, periodic, position, space)
+    else:
+        low, high = position.min(axis=0), position.max(axis=0)
+        reach = float(np.linalg.norm(high - low)) + largest
+        whole = Blocks.about(0.5 * (low + high), reach, axis, space)
+    if window is None:
         return whole, whole
-    reach = plan.window.radius + radius
-    return whole, Blocks.about(plan.window.center, reach, plan.axis, plan.space)
+    return whole, Blocks.about(window.center, window.radius + largest, axis, space)
 
 
 def coarse_spacing(solids: Solids, axes: int, before: ScanSums, plan: Plan, most: float) -> float:

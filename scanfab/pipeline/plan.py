@@ -12,23 +12,16 @@ from scanfab.base.errors import Note, SettingsError
 from scanfab.base.shapes import sphere
 from scanfab.base.space import SPACE, Space
 from scanfab.packing.doubts import refuse_impossible
-from scanfab.packing.sample import VARIANTS, Sample, SampleRule
+from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
-from scanfab.pipeline.frames import sample_rule
 from scanfab.pipeline.maps.blocks import MapBlocks
 from scanfab.pipeline.maps.settings import MapSettings
-from scanfab.pipeline.rv import RV, Deformation, doubts_of_rv, sizes_of, windows_of
+from scanfab.pipeline.rv import RV, Deformation, doubts_of_rv, rvs_of
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import Strains
-from scanfab.pipeline.values import Vector
 from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.directions import DirectionRule, usual_rule
 
-# settings that a plan copies unchanged
-AS_ASKED = (
-    "variants", "axis", "moment", "seed", "workers", "tolerance", "max_chords", "more_columns",
-    "edge", "lists_gaps",
-)  # fmt: skip
 # number of replicates of a fixed scan, and least number of an auto scan
 REPLICATES = 16
 # most replicates of a scan that adds directions until the error between replicates is small
@@ -64,44 +57,25 @@ NOISE = {3: Noise(0.068, 0.75, 0.3), 2: Noise(0.032, 0.8, 0.1)}
 class Plan:
     """Everything that is needed to compute the frames of a series; lengths in the dump's unit."""
 
-    samples: SampleRule
-    """The rules that find boundary particles and rattlers."""
+    settings: Settings
+    """Settings as users made them, adapted to the plane of discs."""
+    space: Space
+    """The plane of the grains, if they are discs."""
     strains: Strains
     variants: str
-    axis: Vector
-    """Loading axis, a unit vector."""
-    moment: int
-    """1: ℓ is the mean length; 2: ℓ is the mean squared length over the mean length."""
-    seed: int
     workers: int
     """Number of threads for the scan of a frame."""
-    tolerance: float
-    """Standard error of alpha_vs_axial that an auto scan aims at."""
     max_chords: float
     """An auto scan stops before it cuts more chords."""
+    rule: DirectionRule
     rvs: tuple[RV, ...]
     """
     The RVs in ascending order, as they lie in the first frame that has grains, or, after
     :meth:`in_frame`, in another frame. The first RV is scanned until its tolerance is met; the
     others are scanned along the same lines.
     """
-    more_columns: tuple[str, ...]
-    """Names of columns beyond those of every table."""
-    groups: tuple[str, ...]
-    """Groups of further columns, from :data:`scanfab.fabric.registry.GROUPS`."""
     cutoffs: tuple[float, ...]
     """Cut-offs of the table's rows, in ascending order."""
-    rule: DirectionRule
-    rule_is_asked_for: bool
-    """Whether the user chose the rule; then an auto scan keeps it."""
-    edge: str
-    """What counts at the window's surface, see :mod:`scanfab.scan.edges`."""
-    lists_gaps: bool
-    """Whether all gaps must be listed, for several cut-offs or another moment."""
-    map_settings: MapSettings | None
-    """The settings of a map; None for other tables."""
-    space: Space
-    """The plane of the grains, if they are discs."""
     # the fields below are unknown for a series without grains
     cutoff: float = math.nan
     """Cut-off at which the scan must meet the tolerance."""
@@ -136,9 +110,7 @@ class Plan:
         """The plan with the windows as they lie in a frame."""
         if self.deformation is None:
             return self
-        windows = self.deformation.windows_in(sample, self.windows)
-        rvs = zip(self.rvs, windows, strict=True)
-        return replace(self, rvs=tuple(RV(rv.fraction, window) for rv, window in rvs))
+        return replace(self, rvs=self.deformation.rvs_in(sample, self.rvs))
 
     def along(self, replicates: int) -> Iterator[Plan]:
         """A plan for each further RV, with the same lines as for the first."""
@@ -147,23 +119,23 @@ class Plan:
             yield replace(self, rvs=(rv,), variants=variants, replicates=replicates, auto="")
 
 
-def plan_without_grains(settings: Settings, space: Space = SPACE) -> Plan:
+def plan_without_grains(settings: Settings, sample: Sample | None = None) -> Plan:
     """
-    The part of a plan that the settings alone decide.
+    The plan of a series without grains: its frames have rows, but nothing is scanned.
 
-    It is the whole plan of a series without grains: its frames have rows, but nothing is scanned.
+    With a ``sample``, the first frame that has grains, it is what :func:`make_plan` starts from.
     """
+    space = SPACE if sample is None else sample.packing.space
     return Plan(
-        samples=sample_rule(settings),
-        strains=Strains.of(settings),
-        rvs=sizes_of(settings),
-        groups=settings.with_,
-        cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),
-        rule=settings.directions or usual_rule(space),
-        rule_is_asked_for=settings.directions is not None,
-        map_settings=settings if isinstance(settings, MapSettings) else None,
+        settings=settings,
         space=space,
-        **{name: getattr(settings, name) for name in AS_ASKED},
+        strains=Strains.of(settings, sample),
+        variants=settings.variants,
+        workers=settings.workers,
+        max_chords=settings.max_chords,
+        rule=settings.directions or usual_rule(space),
+        rvs=rvs_of(settings, sample),
+        cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),
     )
 
 
@@ -186,41 +158,34 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
         If the packing cannot be measured.
     """
     refuse_impossible(sample)
-    packing, space = sample.packing, sample.packing.space
-    settings = settings_in(settings, space)
-    plan = plan_without_grains(settings, space)
+    packing = sample.packing
+    settings = settings_in(settings, packing.space)
+    plan = plan_without_grains(settings, sample)
     radii = packing.radius[sample.grains]
     lengths = {"rmin": float(radii.min()), "rmean": float(radii.mean()), "rmax": float(radii.max())}
     box = SurfaceBox.of(packing, sample.gathered)
-    windows = windows_of(sample, settings) if settings.needs_window else []
-    notes = [
-        note for window in windows for note in doubts_of_rv(window, sample, box, lengths["rmax"])
-    ]
-    blocks: MapBlocks | None = None
+    window, windows = plan.window, plan.windows
+    notes = [note for one in windows for note in doubts_of_rv(one, sample)]
+    blocks = deformation = None
     if isinstance(settings, MapSettings):
         blocks = MapBlocks.of(settings, sample)
-        notes += blocks.doubts(sample, windows[0] if windows else None, lengths["rmean"])
+        notes += blocks.doubts(sample, window)
     if plan.rule.bias > 0.1 * settings.tolerance:
         name, bias = plan.rule.name, plan.rule.bias
         text = f"directions {name}: an isotropic sample would get alpha = {bias:.2g}"
         notes.append(Note("biased_directions", text))
-    deformation = None
-    if settings.rv_follows != "none" and settings.needs_window:
+    if settings.rv_follows != "none" and windows:
         deformation = Deformation.since(sample, settings.strain, settings.axis)
-    cutoff = settings.cutoff.resolve(lengths)
     # The limit of chords holds for all RVs together. The first RV gets the fraction that its scan
-    # needs at least: its part of the total volume.
-    share = 1.0
-    if len(windows) > 1:
-        volumes = [window.shape.volume for window in windows]
-        share = volumes[0] / sum(volumes)
-        if any(not VARIANTS[name].in_window for name in settings.variants):
-            # the scan of the first RV is also that of the whole sample
-            share = 1.0 / len(windows)
+    # needs at least: its part of the total volume. With variants of the whole sample, this scan
+    # is also that of the whole.
+    share, volumes = 1.0, [one.shape.volume for one in windows]
+    if windows:
+        is_whole = any(not VARIANTS[name].in_window for name in settings.variants)
+        share = 1.0 / len(windows) if is_whole else volumes[0] / sum(volumes)
+    cutoff = settings.cutoff.resolve(lengths)
     return replace(
         plan,
-        rvs=tuple(RV(rv.fraction, window) for rv, window in zip(plan.rvs, windows, strict=True)),
-        strains=plan.strains.since(sample),
         deformation=deformation,
         max_chords=plan.max_chords * share,
         cutoff=cutoff,
@@ -228,7 +193,7 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
         cutoffs=tuple(sorted(length.resolve(lengths) for length in settings.cutoffs)) or (cutoff,),
         map_blocks=blocks,
         notes=tuple(notes),
-        **_lines(settings, len(plan.rule), box, windows[0].shape if windows else None, lengths),
+        **_lines(settings, len(plan.rule), box, window.shape if window else None, lengths),
     )
 
 
@@ -252,9 +217,8 @@ def _lines(
     spacing = settings.spacing.resolve(lengths)
     if not CLOSEST * reach <= spacing <= 2.0 * reach:
         raise SettingsError(
-            f"spacing: expected a length from {CLOSEST * reach:.2g} to {2.0 * reach:.4g}, the "
-            f"width of the scanned region, found {spacing:g}: lengths are in the dump's unit; did "
-            f"you mean 1rmin ({lengths['rmin']:g})?"
+            f"spacing: expected a length from {CLOSEST * reach:.2g} to {2.0 * reach:.4g}, found "
+            f"{spacing:g}: lengths have the dump's unit; did you mean 1rmin ({lengths['rmin']:g})?"
         )
     auto = "directions" if settings.directions is None else ""
     fewest, most = (REPLICATES, MOST_REPLICATES) if auto else (1, REPLICATES)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -35,16 +35,11 @@ class RV(NamedTuple):
     """Place and shape; None in a series without grains."""
 
 
-def sizes_of(settings: Settings) -> tuple[RV, ...]:
-    """The RVs of a series without their windows; empty if no variant needs an RV."""
-    if not settings.needs_window:
-        return ()
-    return tuple(RV(fraction if len(settings.rvs) > 1 else None) for fraction in settings.rvs)
-
-
-def windows_of(sample: Sample, settings: Settings) -> list[Window]:
+def rvs_of(settings: Settings, sample: Sample | None = None) -> tuple[RV, ...]:
     """
-    Windows of the RVs in the first frame that has grains, in ascending order.
+    The RVs in ascending order; empty if no variant needs an RV.
+
+    ``sample`` is the first frame that has grains; without it the RVs have no windows.
 
     Raises
     ------
@@ -54,12 +49,15 @@ def windows_of(sample: Sample, settings: Settings) -> list[Window]:
     ReadError
         If the file of the surface cannot be read.
     """
+    sizes = settings.rvs if settings.needs_window else ()
+    rvs = [RV(size if len(sizes) > 1 else None) for size in sizes]
+    if sample is None:
+        return tuple(rvs)
     packing, space = sample.packing, sample.packing.space
     surfaces = SurfaceBox.of(packing, sample.gathered)
     smallest = float(packing.radius[sample.grains].min())
-    windows = []
-    for fraction in settings.rvs:
-        shape, center = _shape(settings, fraction * (0.5 * surfaces.extents), space)
+    for place, size in enumerate(sizes):
+        shape, center = _shape(settings, size * (0.5 * surfaces.extents), space)
         if settings.rv_center is not None:
             center = np.array(settings.rv_center, dtype=float)
         elif center is None:
@@ -74,26 +72,21 @@ def windows_of(sample: Sample, settings: Settings) -> list[Window]:
             center[space.across] = packing.place_across
         if 0.5 * (shape.high - shape.low)[list(space.along)].min() < SMALLEST * smallest:
             raise SettingsError(
-                f"rv: the {shape} is far too small for the smallest grain (radius {smallest:g}): "
-                f"choose a larger `rv`, `rv_radius` or `rv_size`"
+                f"rv: the {shape} is far too small for grains of radius {smallest:g}"
             )
-        windows.append(Window(center, shape))
-    return windows
+        rvs[place] = RV(rvs[place].fraction, Window(center, shape))
+    return tuple(rvs)
 
 
 def _shape(settings: Settings, part: FloatArray, space: Space) -> tuple[Convex, FloatArray | None]:
     """The shape (flat in a plane), and its centre if a file gives it, else None."""
-    kind, sizes = settings.rv_shape, settings.rv_size
-    part = part[sorted(space.along)]
+    kind, sizes, part = settings.rv_shape, settings.rv_size, part[sorted(space.along)]
     if kind == "sphere":
-        radius = settings.rv_radius or float(part.min())
-        return shapes.sphere(radius, space), None
+        return shapes.sphere(settings.rv_radius or float(part.min()), space), None
     if kind == "box":
-        edges = sizes or 2.0 * part
-        return shapes.box(edges, None, space), None
+        return shapes.box(sizes or 2.0 * part, None, space), None
     if kind == "ellipsoid":
-        axes = sizes or part
-        return shapes.ellipsoid(axes, None, space), None
+        return shapes.ellipsoid(sizes or part, None, space), None
     if kind == "cylinder":
         axis = settings.rv_axis or settings.axis
         radius, height = sizes or _cylinder_within(part, axis)
@@ -101,8 +94,8 @@ def _shape(settings: Settings, part: FloatArray, space: Space) -> tuple[Convex, 
     try:
         return shapes.polyhedron(*read_surface(Path(kind)))
     except SettingsError as error:
-        text = f"rv_shape: {kind}: {error}: expected a closed convex surface"
-        raise SettingsError(text) from None
+        text = f"{error}: expected a closed convex surface"
+        raise SettingsError(f"rv_shape: {kind}: {text}") from None
 
 
 def _cylinder_within(half: FloatArray, axis: Vector) -> tuple[float, float]:
@@ -120,7 +113,7 @@ def _cylinder_within(half: FloatArray, axis: Vector) -> tuple[float, float]:
     return fits * radius, 2.0 * fits * length
 
 
-def doubts_of_rv(window: Window, sample: Sample, box: SurfaceBox, largest: float) -> list[Note]:
+def doubts_of_rv(window: Window, sample: Sample) -> list[Note]:
     """
     Check the place of an RV, and add a note if it lies near the surface of the sample.
 
@@ -129,29 +122,24 @@ def doubts_of_rv(window: Window, sample: Sample, box: SurfaceBox, largest: float
     SettingsError
         If the RV holds no grain, reaches too far beyond the sample, or overlaps its own image.
     """
-    packing, grains = sample.packing, sample.grains
+    packing, largest = sample.packing, float(sample.packing.radius[sample.grains].max())
     window.check_fits(packing)
-    room = box.room_around(window)
+    room = SurfaceBox.of(packing, sample.gathered).room_around(window)
     meets = window.may_meet(packing.position, packing.radius, packing)
-    if not np.any(meets & grains):
+    if not np.any(meets & sample.grains):
         raise SettingsError(
-            f"the {window} holds no grain: choose another `rv_center`, or a larger RV "
-            f"(`rv_radius`, `rv_size`)"
+            f"the {window} holds no grain: choose another `rv_center` or a larger RV"
         )
     if room < -2 * largest:
         raise SettingsError(
-            f"the {window} reaches {-room:g} beyond the sample, which is more than twice the "
-            f"largest radius ({largest:g}): choose another `rv_center` or a smaller `rv`, "
-            f"{RV_MEANING}" + ("" if window.shape.is_sphere else ", or a smaller `rv_size`")
+            f"the {window} reaches {-room:g} beyond the sample, over twice the largest radius "
+            f"{largest:g}: choose another `rv_center`, or a smaller `rv_size` or `rv`, {RV_MEANING}"
         )
-    if room >= largest:
-        return []
     text = (
         f"the {window} comes closer to the sample's surface than the largest radius ({largest:g}), "
-        f"so it cuts the outermost layer of grains, which the boundary arranges: choose a smaller "
-        f"`rv`, or use more grains"
+        f"so it cuts the outermost grains, which the boundary arranges: choose a smaller `rv`"
     )
-    return [Note("rv_at_surface", text)]
+    return [Note("rv_at_surface", text)] if room < largest else []
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,10 +172,8 @@ class Deformation:
         """
         mode = strain_mode(sample, mode, axis)
         if not mode:
-            raise SettingsError(
-                "rv_follows: there is neither a periodic cell nor a boundary to measure how the "
-                'sample deforms: choose `strain="grains"`, or leave out `rv_follows`'
-            )
+            text = "there is neither a periodic cell nor a boundary to follow"
+            raise SettingsError(f'rv_follows: {text}: choose `strain="grains"`')
         origin, edges = _edges(sample, mode)
         space = sample.packing.space
         scale = float(np.abs(edges[list(space.along)]).max())
@@ -195,18 +181,18 @@ class Deformation:
             raise SettingsError(f"rv_follows: the {mode} to follow has no volume")
         return cls(mode, origin, edges)
 
-    def windows_in(self, sample: Sample, windows: Sequence[Window]) -> list[Window]:
-        """The windows of the first frame as they lie in another frame."""
+    def rvs_in(self, sample: Sample, rvs: Iterable[RV]) -> tuple[RV, ...]:
+        """The RVs of the first frame as they lie in another frame."""
         origin, edges = _edges(sample, self.mode)
         if np.array_equal(origin, self.origin) and np.array_equal(edges, self.edges):
-            return list(windows)
+            return tuple(rvs)
         gradient = edges @ np.linalg.inv(self.edges)
-        return [
-            Window(
-                origin + gradient @ (window.center - self.origin), window.shape.deformed(gradient)
-            )
-            for window in windows
-        ]
+        found = []
+        for size, window in rvs:
+            assert window is not None
+            center = origin + gradient @ (window.center - self.origin)
+            found.append(RV(size, Window(center, window.shape.deformed(gradient))))
+        return tuple(found)
 
 
 def _edges(sample: Sample, mode: str) -> tuple[FloatArray, FloatArray]:

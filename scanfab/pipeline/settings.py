@@ -297,9 +297,9 @@ class Settings:
 
     @property
     def rows_per_frame(self) -> int:
-        """Number of rows per frame: one for each variant, RV and cut-off."""
+        """Number of rows per frame: one for each variant, RV, cut-off and block."""
         windows = sum(len(self.rvs) if variant in "cd" else 1 for variant in self.variants)
-        return windows * max(len(self.cutoffs), 1)
+        return windows * max(len(self.cutoffs), 1) * self.blocks
 
     @property
     def needs_window(self) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection
 from functools import partial
 
@@ -29,18 +28,17 @@ CHUNK = 256
 
 def refuse_forces(sample: Sample, groups: Collection[str]) -> None:
     """Raise PackingError if needed forces are missing, or if a force is not a finite number."""
-    contacts = sample.contacts
-    if contacts.force_n is not None and not np.isfinite(contacts.force_n).all():
-        first, second = sample.packing.id[contacts.pairs[np.argmin(np.isfinite(contacts.force_n))]]
+    contacts, force = sample.contacts, sample.contacts.force_n
+    if force is not None and not np.isfinite(force).all():
+        first, second = sample.packing.id[contacts.pairs[np.argmin(np.isfinite(force))]]
         raise PackingError(
             f"the contact of the grains {first} and {second} has a force that is no finite number"
         )
-    if contacts.force_n is None and len(contacts) and "forces" in groups:
+    if force is None and len(contacts) and "forces" in groups:
         found = "are found by geometry" if contacts.source == "geometric" else "have none"
         raise PackingError(
             f'`with_="forces"` needs the forces of contacts, but these {found}: name a file that '
-            f"lists contacts with their forces (`contacts`), or the columns that hold the forces "
-            f"(`contact_columns`)"
+            f"lists contacts with their forces (`contacts`), or its columns (`contact_columns`)"
         )
 
 
@@ -77,25 +75,23 @@ def doubts_of_state(sample: Sample, window: Window | None) -> dict[str, str]:
     """Notes, by code, that say why the stress is missing or incomplete."""
     contacts, packing = sample.contacts, sample.packing
     if len(contacts) and contacts.force is None:
-        present = "no forces" if contacts.force_n is None else "the normal part of forces only"
-        return {
-            "no_stress": f"the contacts have {present}: all columns that need the stress are empty"
-        }
+        held = "no forces" if contacts.force_n is None else "the normal part of forces only"
+        text = f"the contacts have {held}: all columns that need the stress are empty"
+        return {"no_stress": text}
     if _volume(packing, window) is None:
-        return {
-            "no_volume": "void ratio and stress of the whole are empty: they need the volume of an "
-            "RV, or of a cell that is periodic along all its vectors"
-        }
+        text = "they need the volume of an RV, or of a cell that is periodic along all its vectors"
+        return {"no_volume": f"void ratio and stress of the whole are empty: {text}"}
     at_walls = packing.position[(packing.wall_contacts > 0) & sample.grains]
     if window is not None:
         at_walls = at_walls[window.contains(at_walls, packing)]
     if packing.wall_forces is not None or not len(at_walls):
         return {}
-    return {
-        "wall_stress": "grains touch walls, but the forces of these contacts are unknown (they are "
-        "read from LIGGGHTS' wall/gran/local and YADE's O.save), so the stress leaves them out: "
-        "choose an RV away from the walls"
-    }
+    text = (
+        "grains touch walls, but the forces of these contacts are unknown (they are read from "
+        "LIGGGHTS' wall/gran/local and YADE's O.save), so the stress leaves them out: choose an RV "
+        "away from the walls"
+    )
+    return {"wall_stress": text}
 
 
 def _volume(packing: Packing, window: Window | None) -> float | None:
@@ -157,9 +153,7 @@ def _void_ratio(sample: Sample, window: Window | None) -> float | None:
         return None
     position, radius = packing.position[sample.grains], packing.radius[sample.grains]
     # overlaps between the spheres of a clump count once
-    share = np.ones_like(radius)
-    if packing.bodies is not None:
-        share = own_shares(packing, partial(_rays, space=space))[sample.grains]
+    share = own_shares(packing, partial(_rays, space=space))[sample.grains]
     if window is None:
         solid = float(np.sum(space.volume(radius) * share))
     else:
@@ -187,7 +181,7 @@ def cut_volumes(
     # A convex region that contains the ball of radius ρ about the origin and the point
     # x / (1 - r/ρ) also contains the sphere of radius r about x.
     curved = float(np.linalg.eigvalsh(shape.quadric.form)[-1])
-    ball = math.sqrt(shape.quadric.level / curved) if curved > 0.0 else math.inf
+    ball = np.sqrt(shape.quadric.level / curved) if curved > 0.0 else np.inf
     room = 1.0 - radius / min([ball, *shape.planes[:, 3]])
     scaled = places / np.where(room > 0.0, room, 1.0)[:, None]
     share = ((room > 0.0) & shape.contains(scaled)).astype(np.float64)
@@ -218,7 +212,7 @@ def _points_in_ball(space: Space = SPACE) -> FloatArray:
         height = np.full_like(share, 0.5 - 0.5 / len(share))
     cosine = 2.0 * (height + 0.5 / len(height)) - 1.0
     across = np.sqrt(1.0 - cosine**2)
-    angle = 2.0 * math.pi * turn
+    angle = 2.0 * np.pi * turn
     unit = np.column_stack([across * np.cos(angle), across * np.sin(angle), cosine]) @ space.basis
     half = share[:, None] * unit
     return np.concatenate([half, -half])

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -80,10 +80,8 @@ def centers_of(sample: Sample, mode: str) -> FloatArray:
     """Centres of boundary particles or grains, shape (K, 3); SettingsError if there are none."""
     chosen = sample.boundary if mode == "boundary" else sample.gathered
     if not chosen.any():
-        raise SettingsError(
-            f"strain: {mode} was asked for, but the frame has none"
-            + (": name them with `boundary`" if mode == "boundary" else "")
-        )
+        text = f"{mode} was asked for, but the frame has none: name them with `boundary`"
+        raise SettingsError(f"strain: {text}")
     return sample.packing.position[chosen]
 
 
@@ -150,9 +148,8 @@ def volumetric_strain(cell: Cell | None, first: Cell | None) -> float | None:
     """
     if cell is None or first is None or not (cell.is_endless and first.is_endless):
         return None
-    now, before = (np.linalg.det(box.own_vectors) for box in (cell, first))
     # this form gives 0.0 for an unchanged cell; the other sign would give -0.0
-    return float(np.log(abs(before / now)))
+    return float(np.log(abs(np.linalg.det(first.own_vectors) / np.linalg.det(cell.own_vectors))))
 
 
 def is_flipped(cell: Cell | None, before: Cell | None) -> bool:
@@ -175,8 +172,7 @@ def is_flipped(cell: Cell | None, before: Cell | None) -> bool:
     return True
 
 
-@dataclass(frozen=True, eq=False)
-class Strains:
+class Strains(NamedTuple):
     """Reference of the strains of a series: its first frame that has grains, or a file."""
 
     mode: str
@@ -189,23 +185,24 @@ class Strains:
     """Cell of the first frame that has grains."""
 
     @classmethod
-    def of(cls, settings: Settings) -> Strains:
+    def of(cls, settings: Settings, first: Sample | None = None) -> Strains:
         """
-        Start from settings, before the first frame is read.
+        Start from settings and the first frame that has grains, if there is one.
 
         Raises
         ------
         ReadError
             If the file of strains cannot be read.
+        SettingsError
+            As :func:`axial_length`.
         """
-        is_file = settings.strain not in STRAIN_MODES
-        file = FrameFile(Path(settings.strain), ["strain"]) if is_file else None
-        return cls(settings.strain, settings.axis, file)
-
-    def since(self, sample: Sample) -> Strains:
-        """Set the reference frame; raises the errors of :func:`axial_length`."""
-        length = axial_length(sample, self.mode, self.axis) if self.file is None else None
-        return replace(self, length=length, cell=sample.packing.cell)
+        mode, axis = settings.strain, settings.axis
+        is_file = mode not in STRAIN_MODES
+        file = FrameFile(Path(mode), ["strain"]) if is_file else None
+        if first is None:
+            return cls(mode, axis, file)
+        length = None if is_file else axial_length(first, mode, axis)
+        return cls(mode, axis, file, length, first.packing.cell)
 
     def at(self, number: int, sample: Sample) -> dict[str, float | None]:
         """Axial, shear and volumetric strain of a frame, by column."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -18,7 +18,7 @@ from scanfab.fabric.void import void_fabric
 from scanfab.pipeline.plan import NOISE, Plan
 from scanfab.scan.directions import design_of, rule_of
 from scanfab.scan.following import FollowedTooFarError
-from scanfab.scan.scan import scan_lines
+from scanfab.scan.scan import ScanSums, scan_lines
 from scanfab.scan.solids import Solids, is_affordable, most_lines
 
 LOGGER = logging.getLogger("scanfab")
@@ -66,32 +66,27 @@ class Errors(NamedTuple):
         return MOST_EMPTY < self.empty < 1.0
 
 
-class Goal:
-    """
-    What a scan sums, and which error must meet the tolerance: here the error of each variant.
+def scan_variants(
+    solids: Solids, plan: Plan, replicates: range, most_steps: float = math.inf
+) -> ScanSums:
+    """Scan some replicates; maps use a function of their own, which also sums block by block."""
+    return scan_lines(
+        solids, plan.rule, spacing=plan.spacing, cutoff=plan.cutoff, variants=plan.variants,
+        replicates=replicates, seed=plan.settings.seed, workers=plan.workers,
+        most_steps=most_steps,
+    )  # fmt: skip
 
-    Maps use a subclass, whose sums also hold the fabric of each block.
-    """
 
-    def scan(
-        self, solids: Solids, plan: Plan, replicates: range, most_steps: float = math.inf
-    ) -> Any:
-        """Scan some replicates and return their sums."""
-        return scan_lines(
-            solids, plan.rule, spacing=plan.spacing, cutoff=plan.cutoff, variants=plan.variants,
-            replicates=replicates, seed=plan.seed, workers=plan.workers, most_steps=most_steps,
-        )  # fmt: skip
-
-    def errors(self, sums: Any, plan: Plan, variant: str) -> Errors:
-        """Standard errors from the scatter of replicates, and from the fit of a polynomial."""
-        length, segments = sums.kept(variant)
-        empty = float(np.mean(segments == 0))
-        fabric = void_fabric(sums.axes, plan.rule.weights, length, segments, plan.space)
-        if fabric is None:
-            return Errors(math.inf, math.inf, empty)
-        reported = fabric.axial_error(plan.axis) or 0.0
-        expected = fabric.expected_error(plan.axis, plan.rule.degree)
-        return Errors(reported, expected or reported, empty)
+def variant_errors(sums: ScanSums, plan: Plan, variant: str) -> Errors:
+    """Errors of a variant from the scatter of replicates, and from the fit of a polynomial."""
+    length, segments = sums.kept(variant)
+    empty = float(np.mean(segments == 0))
+    fabric = void_fabric(sums.axes, plan.rule.weights, length, segments, plan.space)
+    if fabric is None:
+        return Errors(math.inf, math.inf, empty)
+    reported = fabric.axial_error(plan.settings.axis) or 0.0
+    expected = fabric.expected_error(plan.settings.axis, plan.rule.degree)
+    return Errors(reported, expected or reported, empty)
 
 
 def missing_work(errors: Iterable[Errors], plan: Plan, replicates: int) -> float:
@@ -100,14 +95,14 @@ def missing_work(errors: Iterable[Errors], plan: Plan, replicates: int) -> float
 
     Auto scans and calibrations use the same rule.
     """
-    margin = MARGIN
+    margin, tolerance = MARGIN, plan.settings.tolerance
     if plan.auto != "replicates" and replicates > 1:
         margin = 1.0 + SIGMAS / math.sqrt(2.0 * (replicates - 1))
     missing = expected = 0.0
     for error in errors:
         if math.isfinite(error.reported):
-            missing = max(missing, (error.reported / plan.tolerance) ** 2)
-            expected = max(expected, (margin * error.expected / plan.tolerance) ** 2)
+            missing = max(missing, (error.reported / tolerance) ** 2)
+            expected = max(expected, (margin * error.expected / tolerance) ** 2)
         elif error.empty < 1.0 and plan.auto == "replicates" and replicates < 256:
             # more replicates may find segments in directions that have none yet
             return GROWTH
@@ -119,28 +114,32 @@ def missing_work(errors: Iterable[Errors], plan: Plan, replicates: int) -> float
 
 
 def scan_to_tolerance(
-    solids: Solids, plan: Plan, where: str = "the frame", goal: Goal | None = None
+    solids: Solids,
+    plan: Plan,
+    where: str = "the frame",
+    scan: Callable[..., Any] = scan_variants,
+    errors_of: Callable[..., Errors] = variant_errors,
 ) -> tuple[Any, Plan, list[Note]]:
     """
     Scan one frame as planned; an auto scan continues until the tolerance is met.
 
-    Progress is written to the logger ``scanfab``; ``where`` names the frame there.
+    Progress is written to the logger ``scanfab``; ``where`` names the frame there. ``scan`` and
+    ``errors_of`` say what is summed and which error of a variant must meet the tolerance.
 
     Returns
     -------
     sums
-        Sums of all replicates as the goal defines them; ScanSums for the default goal.
+        Sums of all replicates, as ``scan`` returns them.
     Plan
         The plan with the final rule and the final spacing of each replicate.
     list of Note
         Notes on tolerances that were not met.
     """
-    goal = goal or Goal()
     if not plan.auto:
-        return goal.scan(solids, plan, range(plan.replicates), plan.max_chords), plan, []
-    scan = _AutoScan(solids, _within_budget(plan, solids), goal)
-    notes = scan.run(where)
-    return scan.sums, scan.plan, notes
+        return scan(solids, plan, range(plan.replicates), plan.max_chords), plan, []
+    auto_scan = _AutoScan(solids, _within_budget(plan, solids), scan, errors_of)
+    notes = auto_scan.run(where)
+    return auto_scan.sums, auto_scan.plan, notes
 
 
 @dataclass
@@ -149,7 +148,8 @@ class _AutoScan:
 
     solids: Solids
     plan: Plan
-    goal: Goal
+    scan: Callable[..., Any]
+    errors_of: Callable[..., Errors]
     sums: Any = None
     errors: dict[str, Errors] = field(default_factory=dict)
     """Errors of each variant."""
@@ -161,16 +161,16 @@ class _AutoScan:
     def run(self, where: str) -> list[Note]:
         """Scan until the tolerance is met or nothing can be added; return notes on what failed."""
         planned, begun = self.plan.spacing, time.perf_counter()
-        start, stop, missed = 0, self.plan.replicates, []
+        start, stop = 0, self.plan.replicates
         while True:
-            self._scan(start, stop)
+            self._add_round(start, stop)
             counted = self._counted()
             missing = self._missing(counted)
             rest = min(missing, self.plan.max_chords / self.spent) - 1.0
             if rest > 0.0:
                 seconds = spelt_time(rest * (time.perf_counter() - begun))
                 worst = max(self.errors[name].reported for name in counted)
-                reached, tolerance = spelt_apart(worst, self.plan.tolerance)
+                reached, tolerance = spelt_apart(worst, self.plan.settings.tolerance)
                 LOGGER.info("%s: error %s of %s, about %s", where, reached, tolerance, seconds)
             # a better plan is of no use if lines already had to be wider than planned
             if start == 0 and self.plan.spacing <= planned:
@@ -178,29 +178,25 @@ class _AutoScan:
                 if better is not None:
                     self.plan, planned = better, better.spacing
                     continue
-            if missing <= 1.0:
-                break
             more = math.ceil(max(min(missing, GROWTH), SMALLEST_ROUND) * stop)
-            more = min(more, MAX_REPLICATES, int(stop + self.left))
-            if self.plan.auto == "directions" or more <= stop:
-                missed = [self._missed(missing)]
-                break
+            more = int(min(more, MAX_REPLICATES, stop + self.left))
+            if missing <= 1.0 or self.plan.auto == "directions" or more <= stop:
+                return list(self._notes(missing, counted))
             start, stop = stop, more
-        return [*missed, *self._dropped(counted)]
 
-    def _scan(self, start: int, stop: int) -> None:
+    def _add_round(self, start: int, stop: int) -> None:
         """Scan some replicates and add their sums; the first round starts with new sums."""
         if start == 0:
             batch = self.sums = self._first_round()
         else:
-            batch = self.goal.scan(self.solids, self.plan, range(start, stop))
+            batch = self.scan(self.solids, self.plan, range(start, stop))
             self.sums = concatenated([self.sums, batch])
         plan = self.plan
         lines = most_lines(self.solids, plan.spacing) * len(plan.rule)
         self.spent += float(batch.work.sum()) + lines * batch.replicates
         each = float(self.sums.work.mean()) + lines
         self.left = (plan.max_chords - self.spent) / max(each, 1.0)
-        self.errors = {name: self.goal.errors(self.sums, plan, name) for name in plan.variants}
+        self.errors = {name: self.errors_of(self.sums, plan, name) for name in plan.variants}
 
     def _first_round(self) -> Any:
         """
@@ -211,11 +207,11 @@ class _AutoScan:
         """
         replicates, most = self.plan.replicates, self.plan.max_chords
         if self.solids.medium is None:
-            return self.goal.scan(self.solids, self.plan, range(replicates))
+            return self.scan(self.solids, self.plan, range(replicates))
         while True:
             try:
-                first = self.goal.scan(self.solids, self.plan, range(1), most / replicates)
-                rest = self.goal.scan(self.solids, self.plan, range(1, replicates), most)
+                first = self.scan(self.solids, self.plan, range(1), most / replicates)
+                rest = self.scan(self.solids, self.plan, range(1, replicates), most)
                 return concatenated([first, rest])
             except FollowedTooFarError:
                 wider = 2.0 * self.plan.spacing
@@ -269,7 +265,7 @@ class _AutoScan:
             better = replace(plan, spacing=spacing)
             # if closer lines do not suffice, directions are added too
             missing /= (plan.spacing / spacing) ** power
-            if missing > 1.0 and not plan.rule_is_asked_for:
+            if missing > 1.0 and plan.settings.directions is None:
                 axes = math.ceil(min(missing, FINER_UP_TO) * len(plan.rule))
                 better = replace(better, rule=design_of(axes, space))
         growth = space.lines(len(better.rule) / len(plan.rule), better.spacing / plan.spacing)
@@ -277,29 +273,29 @@ class _AutoScan:
         affordable = affordable and is_affordable(self.solids, better.spacing)
         return better if growth > 1.0 and affordable else None
 
-    def _missed(self, factor: float) -> Note:
-        text = (
-            f"the scan stopped after {self.spent:.2g} chords before the tolerance "
-            f"{self.plan.tolerance:g} was met: alpha_vs_axial_se holds the error that it reached; "
-            f"about {factor:.2g} times as many lines would be needed (`max_chords`, `tolerance`)"
-        )
-        steps, work = self.sums.steps.sum(), self.sums.work.sum()
-        if 2 * steps > work:
-            text += (
-                f"; {steps / work:.0%} of the work was to follow long void segments through the "
-                f"images of the cell: is the cell too large, or periodic where the sample is not "
-                f"(`cell`, `periodic`)?"
+    def _notes(self, missing: float, counted: str) -> Iterator[Note]:
+        """Notes on a missed tolerance, of the scan and of the variants that did not decide."""
+        aim = self.plan.settings.tolerance
+        if missing > 1.0:
+            text = (
+                f"the scan stopped after {self.spent:.2g} chords before the tolerance {aim:g} was "
+                f"met: alpha_vs_axial_se holds the error that it reached; about {missing:.2g} "
+                f"times as many lines would be needed (`max_chords`, `tolerance`)"
             )
-        return Note(TOLERANCE_MISSED, text)
-
-    def _dropped(self, counted: str) -> Iterator[Note]:
-        """Notes on the variants that did not decide and missed the tolerance."""
+            steps, work = self.sums.steps.sum(), self.sums.work.sum()
+            if 2 * steps > work:
+                text += (
+                    f"; {steps / work:.0%} of the work was to follow long void segments through "
+                    f"the images of the cell: is the cell too large, or periodic where the sample "
+                    f"is not (`cell`, `periodic`)?"
+                )
+            yield Note(TOLERANCE_MISSED, text)
         for name, errors in self.errors.items():
-            if name in counted or errors.reported <= self.plan.tolerance:
+            if name in counted or errors.reported <= aim:
                 continue
             text = "there is no void fabric yet"
             if math.isfinite(errors.reported):
-                reached, tolerance = spelt_apart(errors.reported, self.plan.tolerance)
+                reached, tolerance = spelt_apart(errors.reported, aim)
                 text = f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}"
             text += ": it keeps few grains, or would need far more lines than the others "
             yield Note("variant_dropped", f'{text}(`variants="{name}"` scans it alone)', (name,))
@@ -313,9 +309,8 @@ def _within_budget(plan: Plan, solids: Solids) -> Plan:
         return plan
     if plan.auto != "replicates" or plan.max_chords < axes:
         raise SettingsError(
-            f"max_chords: expected at least the {chords:.2g} chords that {plan.replicates} "
-            f"replicates of {len(plan.rule)} directions cut, found {plan.max_chords:g}: choose a "
-            f"wider `spacing`, fewer `directions` or a larger `max_chords`"
+            f"max_chords: expected at least {chords:.2g}, the chords of {plan.replicates} "
+            f"replicates, found {plan.max_chords:g}: choose a wider `spacing` or fewer `directions`"
         )
     return replace(plan, spacing=plan.spacing * plan.space.apart(chords / plan.max_chords))
 

@@ -104,24 +104,3 @@ def map_columns(more: Collection[str] = (), *, shells: bool = False) -> tuple[Co
 def row_of(columns: Iterable[Column], values: Mapping[str, Any]) -> Row:
     """A row with a value for each column; a missing value is None."""
     return Row(**{column.name: values.get(column.name) for column in columns})
-
-
-def complete_row(values: Mapping[str, Any], more: Collection[str] = ()) -> Row:
-    """
-    A row with all columns of :func:`table_columns`, in their order.
-
-    Raises
-    ------
-    TypeError
-        If a value belongs to no column or a column has no value, which is a bug.
-
-    Examples
-    --------
-    >>> from scanfab.table.columns import COLUMNS, complete_row
-    >>> complete_row({**dict.fromkeys(COLUMNS), "frame": 3}).frame
-    3
-    """
-    names = [column.name for column in table_columns(more)]
-    if wrong := sorted({*names} ^ {*values}):
-        raise TypeError(f"missing or unknown columns of a row: {', '.join(wrong)}")
-    return Row(**{name: values[name] for name in names})

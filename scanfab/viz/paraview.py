@@ -107,7 +107,7 @@ def scan_line_sample(measured: Measurement, variant: str) -> Segments:
     """A few scan lines along the loading axis and across it, in the dump's coordinates."""
     position, radius, window = measured.spheres_of(VARIANTS[variant])
     space = measured.plan.space
-    frame = line_triads(np.array([measured.plan.axis]), space)[0]
+    frame = line_triads(np.array([measured.plan.settings.axis]), space)[0]
     # along the axis, and along the first direction across it
     across = line_triads(frame[:1], space)[0] if space.is_plane else np.roll(frame, -1, axis=0)
     found = sample_segments(position, radius, np.stack([frame, across]), LINES, window, space)

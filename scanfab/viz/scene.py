@@ -178,8 +178,7 @@ def _strains(
     """Both strains as the fabric table has them; None also where one cannot be had."""
     axial, shear = None, None
     with suppress(SettingsError):
-        strains = Strains.of(settings)
-        axial = (strains if first is None else strains.since(first)).at(number, sample)["strain"]
+        axial = Strains.of(settings, first).at(number, sample)["strain"]
     if first is not None and sample.grains.any():
         shear = shear_strain(sample.packing.cell, first.packing.cell)
     return {"strain": axial, "shear_strain": shear}

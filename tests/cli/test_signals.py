@@ -77,7 +77,8 @@ def test_a_part_without_rows_and_half_a_file_are_removed(tmp_path, rows):
         tmp_path,
         f"""
 from pathlib import Path
-from scanfab.table.columns import COLUMNS, complete_row
+from scanfab.table.columns import COLUMNS
+from scanfab.table.row import Row
 from scanfab.base.files import whole_file
 from scanfab.pipeline.record import PartFile
 
@@ -86,7 +87,7 @@ def run(args):
     with part.alone():
         part.begin({{}})
         for _ in range({rows}):
-            part.add([], [complete_row(dict.fromkeys(COLUMNS))])
+            part.add([], [Row(**dict.fromkeys(COLUMNS))])
         with whole_file(Path("figure.png")) as part:
             part.write_text("half")
             os.kill(os.getpid(), signal.SIGTERM)

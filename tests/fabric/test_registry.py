@@ -8,7 +8,7 @@ import pytest
 import scanfab
 from scanfab import Column, ScanfabError, ScanfabWarning
 from scanfab.table import columns
-from scanfab.table.columns import COLUMNS, complete_row, table_columns
+from scanfab.table.columns import COLUMNS, row_of, table_columns
 from scanfab.table.formats import OWN_FORMATS, read_rows
 from scanfab.table.writing import write_rows
 from tests.helpers.lattices import simple_cubic
@@ -55,7 +55,7 @@ def test_its_columns_are_computed_and_stand_behind_the_own_ones():
 def test_its_columns_are_written_and_read_back(tmp_path):
     values = dict.fromkeys(COLUMNS) | {"frame": 0, "c_fourth": 0.5, "vs_longest": None}
     for suffix in [one.suffix for one in OWN_FORMATS]:
-        write_rows(tmp_path / f"t{suffix}", [complete_row(values)], table_columns())
+        write_rows(tmp_path / f"t{suffix}", [row_of(table_columns(), values)], table_columns())
         assert read_rows(tmp_path / f"t{suffix}") == [values]
 
 

@@ -8,7 +8,7 @@ from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox
 from scanfab.pipeline.measurement import measure
 from scanfab.pipeline.plan import make_plan
-from scanfab.pipeline.rv import windows_of
+from scanfab.pipeline.rv import rvs_of
 from scanfab.scan.scan import scan_lines
 from scanfab.scan.solids import Solids
 from tests.helpers.lattices import rotation, shaken_cubic
@@ -32,7 +32,7 @@ def flat():
 
 
 def window_of(sample, **options):
-    return windows_of(sample, Settings(**options))[0]
+    return rvs_of(Settings(**options), sample)[0].window
 
 
 def test_sizes_are_fractions_of_the_half_extents(flat):
@@ -131,7 +131,7 @@ def test_a_window_across_periodic_faces_is_that_of_the_repeated_packing(tilted, 
 
 BEYOND, NOTHING, IMAGE = (
     "beyond the sample",
-    "is far too small for the smallest",
+    "is far too small for grains",
     "overlaps its own image",
 )
 
@@ -147,7 +147,7 @@ BEYOND, NOTHING, IMAGE = (
         ("flat", "box", {"rv_size": "2,2,1e-11"}, NOTHING),
         (
             "flat", "box", {"rv_size": "0.1,0.1,0.1", "rv_center": "10.8,8.8,5.8"},
-            r"holds no grain: choose another `rv_center`, or a larger RV \(`rv_radius`, `rv_size`",
+            "holds no grain: choose another `rv_center` or a larger RV",
         ),
         ("tilted", "sphere", {"rv": 1.5}, "wider than the cell's shortest period"),
         ("tilted", "box", {"rv_size": "6.1,1,1"}, rf"{IMAGE}, \(.*\) away"),

@@ -64,10 +64,8 @@ class MapBlocks(NamedTuple):
         """
         packing, gathered = sample.packing, sample.gathered
         if packing.space.is_plane:
-            raise SettingsError(
-                f"a map needs spheres, but all grains are discs in the plane "
-                f"{packing.space.name}: use `compute` with an RV at each `rv_center` instead"
-            )
+            found = f"all grains are discs in {packing.space}"
+            raise SettingsError(f"a map needs spheres, but {found}: use `compute` with `rv_center`")
         open_axes = np.eye(3)
         if settings.slices is not None:
             # the loading axis is the last one
@@ -109,42 +107,38 @@ class MapBlocks(NamedTuple):
         if cosines[across] < MOST_OBLIQUE:
             angle = np.degrees(np.arccos(cosines[across]))
             raise SettingsError(
-                f"slices: in a periodic cell they are parallel to its faces, but the nearest "
-                f"normal is {angle:.0f} degrees off the axis: choose another `axis`, or `grid`"
+                f"slices: they lie along faces of the periodic cell, whose nearest normal is "
+                f"{angle:.0f} degrees off the axis: choose another `axis`, or `grid`"
             )
-        return replace(
-            undivided, parts=tuple(settings.blocks if k == across else 1 for k in range(3))
-        )
+        parts = np.where(np.arange(3) == across, settings.blocks, 1)
+        return replace(undivided, parts=tuple(parts.tolist()))
 
-    def doubts(self, sample: Sample, window: Window | None, mean: float) -> Iterator[Note]:
+    def doubts(self, sample: Sample, window: Window | None) -> Iterator[Note]:
         """
-        Check that the blocks are large enough; ``mean`` is the mean radius of the grains.
+        Check that the blocks are large enough.
 
         Raises
         ------
         SettingsError
             If a block is thinner than a mean radius.
         """
+        mean = float(sample.packing.radius[sample.grains].mean())
         tilings = [self.of_window(window)] if window is not None else []
         if {*"ab"} & {*self.settings.variants}:
             tilings.append(self.of_whole(sample.packing.cell))
         thinnest = float(min(tiling.heights.min() for tiling in tilings))
         name = next(option for option in BLOCK_OPTIONS if getattr(self.settings, option))
-        thickness = (
-            f"makes blocks {thinnest:.4g} thick, {thinnest / mean:.3g} mean radii of the grains"
-        )
-        choose = (
+        text = (
+            f"makes blocks {thinnest:.4g} thick, {thinnest / mean:.3g} mean radii of the grains: "
             f"choose fewer, so that they are at least {DOUBTED_BELOW:g} mean radii thick "
             f"({DOUBTED_BELOW * mean:.4g})"
         )
         times = thinnest / mean / (1.0 - 1e-9)
         if times < REFUSED_BELOW:
-            raise SettingsError(
-                f"{name}: {thickness}: a block smaller than a grain has no fabric: {choose}"
-            )
+            raise SettingsError(f"{name}: {text}: a block smaller than a grain has no fabric")
         if times < DOUBTED_BELOW:
             unsure = "grains reach into several blocks, so the errors of blocks are uncertain"
-            yield Note("thin_blocks", f"`{name}` {thickness}: {unsure}: {choose}")
+            yield Note("thin_blocks", f"`{name}` {text}: {unsure}")
 
 
 def _axes(
@@ -157,15 +151,20 @@ def _axes(
     return cell.vectors / period[:, None], cell.origin, np.array(cell.periodic), period
 
 
-def near_surface(
-    blocks: Blocks, normals: FloatArray, furthest: FloatArray, mean: float
-) -> BoolArray:
+def near_surface(blocks: Blocks, sample: Sample, window: Window | None) -> BoolArray:
     """
-    Which blocks lie so near to the surface of a convex region that they lose segments, shape (B,).
+    Which blocks lie so near to a surface that they lose segments, shape (B,).
 
-    The planes n·x = f touch the region; ``normals`` holds n, shape (K, 3), and ``furthest`` holds
-    f, shape (K,). ``mean`` is the mean radius of the grains.
+    The surface is that of the window, or without a window that of the sample.
     """
+    mean = float(sample.packing.radius[sample.gathered].mean())
+    # planes n·x = f that touch the surface: n has the shape (K, 3), f has the shape (K,)
+    if window is None:
+        normals, furthest = _hull_of(sample)
+    else:
+        normals = np.concatenate([window.shape.planes[:, :3], direction_points()[0]])
+        touching = window.shape.support(normals) + window.center
+        furthest = np.einsum("ki,ki->k", touching, normals)
     outline = blocks.corners
     if blocks.radius:
         units = direction_points()[0][::SOME]
@@ -176,15 +175,8 @@ def near_surface(
     return near
 
 
-def surface_of(window: Window) -> tuple[FloatArray, FloatArray]:
-    """Planes that touch a window from many directions, for :func:`near_surface`."""
-    normals = np.concatenate([window.shape.planes[:, :3], direction_points()[0]])
-    places = window.shape.support(normals) + window.center
-    return normals, np.einsum("ki,ki->k", places, normals)
-
-
-def hull_of(sample: Sample) -> tuple[FloatArray, FloatArray]:
-    """Facets of the hull of the grain centres, for :func:`near_surface`; all blocks if flat."""
+def _hull_of(sample: Sample) -> tuple[FloatArray, FloatArray]:
+    """Facets of the hull of the grain centres; a plane in front of all blocks if it is flat."""
     from scipy.spatial import ConvexHull, QhullError
 
     cell, across = sample.packing.cell, np.eye(3)

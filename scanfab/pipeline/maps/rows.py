@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from scanfab.base.arrays import concatenated
+from scanfab.base.arrays import compressed, concatenated
 from scanfab.base.errors import Note, joined
 from scanfab.base.space import SPACE
 from scanfab.base.spelling import counted
@@ -21,10 +21,10 @@ from scanfab.fabric.tensor import FabricTensor, axial, tensor_values
 from scanfab.fabric.void import BlockFabrics, block_fabrics
 from scanfab.packing.sample import VARIANTS, Sample, Variant
 from scanfab.packing.window import Window
-from scanfab.pipeline.maps.blocks import hull_of, near_surface, surface_of, volumes_inside
+from scanfab.pipeline.maps.blocks import near_surface, volumes_inside
 from scanfab.pipeline.measurement import coarse_spacing, gap_scan, solids_of
 from scanfab.pipeline.plan import Plan
-from scanfab.pipeline.tolerance import Errors, Goal, scan_to_tolerance
+from scanfab.pipeline.tolerance import Errors, scan_to_tolerance
 from scanfab.pipeline.variant_columns import doubts_of_lines, edge_of, left_out_of
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import design_of
@@ -71,22 +71,18 @@ def map_rows(
     blocks : two Blocks
         Blocks of the whole sample and of the RV.
     """
-    settings, map_blocks = plan.map_settings, plan.map_blocks
-    assert settings is not None
-    assert map_blocks is not None
-    solids = solids_of(sample, plan.window, variants=plan.variants, edge=plan.edge)
-    whole = map_blocks.of_whole(sample.packing.cell)
-    blocks = whole, whole if plan.window is None else map_blocks.of_window(plan.window)
-    sums, plan, notes = scan_to_tolerance(solids, plan, where, MedianBlock(blocks))
-    parts = _part_sums(solids, plan, blocks, sums)
+    assert plan.map_blocks is not None
+    solids = solids_of(sample, plan.window, variants=plan.variants, edge=plan.settings.edge)
+    whole = plan.map_blocks.of_whole(sample.packing.cell)
+    blocks = whole, whole if plan.window is None else plan.map_blocks.of_window(plan.window)
+    scan = partial(_scan_blocks, blocks)
+    sums, plan, notes = scan_to_tolerance(solids, plan, where, scan, _median_errors)
+    parts = _scan_parts(solids, plan, blocks, sums)
     rows = []
     for name in plan.variants:
-        variant = VARIANTS[name]
-        mapped = BlocksOfVariant(
-            sample, plan, solids, variant, blocks[variant.in_window], sums, parts[name]
-        )
-        values = ({**known, "variant": name, **own} for own in mapped.rows())
-        rows += [row_of(settings.columns, own) for own in values]
+        own_blocks = blocks[VARIANTS[name].in_window]
+        mapped = VariantMap(sample, plan, solids, VARIANTS[name], own_blocks, sums, parts[name])
+        rows += [row_of(plan.settings.columns, {**known, **own}) for own in mapped.rows()]
         notes += mapped.notes()
     return rows, joined(notes), blocks
 
@@ -99,39 +95,37 @@ class MapSums(ScanSums):
     """Fabrics of the blocks, by variant."""
 
 
-@dataclass(frozen=True, eq=False)
-class MedianBlock(Goal):
-    """The goal of a map: the median error over the blocks of each variant meets the tolerance."""
+def _scan_blocks(
+    blocks: tuple[Blocks, Blocks],
+    solids: Solids,
+    plan: Plan,
+    replicates: range,
+    most_steps: float = math.inf,
+) -> MapSums:
+    """Scan one replicate after the other; sums by axis of all together would be too large."""
+    parts = []
+    scan = gap_scan(solids, plan, blocks, [plan.cutoff])
+    for replicate in replicates:
+        sums = scan(plan.rule, spacing=plan.spacing, replicates=[replicate], most_steps=most_steps)
+        most_steps -= float(sums.scan.steps.sum())
+        kept = {name: sums.in_blocks(name, 0, plan.settings.moment) for name in plan.variants}
+        fabrics = {
+            name: block_fabrics(sums.axes, plan.rule.weights, *own) for name, own in kept.items()
+        }
+        parts.append(MapSums(**vars(sums.scan), fabrics=fabrics))
+    whole: MapSums = concatenated(parts)
+    return whole
 
-    blocks: tuple[Blocks, Blocks]
-    """Blocks of the whole and of the window, in the dump's coordinates."""
 
-    def scan(
-        self, solids: Solids, plan: Plan, replicates: range, most_steps: float = math.inf
-    ) -> MapSums:
-        """Scan one replicate after the other; sums by axis of all together would be too large."""
-        weights, moment, parts = plan.rule.weights, plan.moment, []
-        scan = partial(gap_scan(solids, plan, self.blocks, [plan.cutoff]), plan.rule)
-        for replicate in replicates:
-            sums = scan(spacing=plan.spacing, replicates=[replicate], most_steps=most_steps)
-            most_steps -= float(sums.scan.steps.sum())
-            fabrics = {
-                name: block_fabrics(sums.axes, weights, *sums.in_blocks(name, 0, moment))
-                for name in plan.variants
-            }
-            parts.append(MapSums(**vars(sums.scan), fabrics=fabrics))
-        whole: MapSums = concatenated(parts)
-        return whole
-
-    def errors(self, sums: MapSums, plan: Plan, variant: str) -> Errors:
-        """Median error of the blocks with segments; over many blocks it is certain enough."""
-        fabrics = sums.fabrics[variant]
-        is_met = fabrics.is_met
-        if not is_met.any():
-            return Errors(math.inf, math.inf, 1.0)
-        errors = np.where(fabrics.exists, fabrics.axial_errors(np.asarray(plan.axis)), np.inf)
-        median = float(np.median(errors[is_met]))
-        return Errors(median, median, float(np.median(fabrics.filled.mean(axis=0)[is_met])))
+def _median_errors(sums: MapSums, plan: Plan, variant: str) -> Errors:
+    """Median error of the blocks with segments; over many blocks it is certain enough."""
+    fabrics = sums.fabrics[variant]
+    is_met = fabrics.is_met
+    if not is_met.any():
+        return Errors(math.inf, math.inf, 1.0)
+    errors = fabrics.axial_errors(np.asarray(plan.settings.axis))
+    median = float(np.median(np.where(fabrics.exists, errors, np.inf)[is_met]))
+    return Errors(median, median, float(np.median(fabrics.filled.mean(axis=0)[is_met])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,41 +140,38 @@ class PartSums:
     """Volume of void whose segments have their middle in each part."""
 
 
-def _part_sums(
+def _scan_parts(
     solids: Solids, plan: Plan, blocks: tuple[Blocks, Blocks], before: ScanSums
 ) -> dict[str, PartSums]:
     """Scan fewer lines, with blocks in eight parts, for errors due to the sample and the void."""
-    rule, parts = design_of(PART_AXES), []
+    rule, replicates = design_of(PART_AXES), []
     most = min(MOST_CHORDS, plan.max_chords)
     spacing = coarse_spacing(solids, PART_REPLICATES * len(rule), before, plan, most)
-    finer = blocks[0].finer(), blocks[1].finer()
-    scan, clipped = (
-        gap_scan(version, plan, finer, [0.0, plan.cutoff])
-        for version in (solids, replace(solids, edge=CLIP))
-    )
+    finer, cutoffs = (blocks[0].finer(), blocks[1].finer()), [0.0, plan.cutoff]
     for replicate in range(PART_REPLICATES):
-        sums = voids = scan(rule, spacing=spacing, replicates=[replicate])
+        words = {"spacing": spacing, "replicates": [replicate]}
+        sums = voids = gap_scan(solids, plan, finer, cutoffs)(rule, **words)
         if solids.edge == START:
             # this edge rule also counts the parts of segments outside the window
-            voids = clipped(rule, spacing=spacing, replicates=[replicate])
-        sums_of_variants = {}
+            voids = gap_scan(replace(solids, edge=CLIP), plan, finer, cutoffs)(rule, **words)
+        variants = {}
         for name in plan.variants:
             by_part = blocks[name in "cd"].by_part
-            length, number = map(by_part, sums.in_blocks(name, 1, plan.moment))
+            length, number = map(by_part, sums.in_blocks(name, 1, plan.settings.moment))
             rest = length.sum(axis=-1, keepdims=True) - length
             # rounding must not leave negative numbers
             left = np.maximum(number.sum(axis=-1, keepdims=True) - number, 0.0)
             void = np.einsum("d,rdbp->rbp", rule.weights, by_part(voids.in_blocks(name)[0]))
             void *= spacing**2 / rule.weights.sum()
             without = block_fabrics(sums.axes, rule.weights, rest, left)
-            sums_of_variants[name] = PartSums(without, number.sum(axis=1), void)
-        parts.append(sums_of_variants)
-    whole: dict[str, PartSums] = concatenated(parts)
+            variants[name] = PartSums(without, number.sum(axis=1), void)
+        replicates.append(variants)
+    whole: dict[str, PartSums] = concatenated(replicates)
     return whole
 
 
 @dataclass(frozen=True)
-class BlocksOfVariant:
+class VariantMap:
     """All blocks of one variant."""
 
     sample: Sample
@@ -206,51 +197,42 @@ class BlocksOfVariant:
     @cached_property
     def at_surface(self) -> BoolArray:
         """Which blocks lie so near to a surface that they lose segments, shape (B,)."""
-        mean = float(self.sample.packing.radius[self.sample.gathered].mean())
-        window, inner = self.window, self.solids.inner
-        if window is not None and self.plan.edge == START:
+        window, inner, edge = self.window, self.solids.inner, self.plan.settings.edge
+        if window is not None and edge == START:
             # segments are followed beyond the RV, and each end counts in the block that holds it
             return np.zeros(len(self.blocks), bool)
-        if window is None and self.plan.edge == ENDS and inner is not None:
+        if window is None and edge == ENDS and inner is not None:
             window = Window(inner.center + self.solids.origin, inner.shape)
-        surface = hull_of(self.sample) if window is None else surface_of(window)
-        return near_surface(self.blocks, *surface, mean)
+        return near_surface(self.blocks, self.sample, window)
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Values of each block, by column."""
-        blocks, sample, fabrics = self.blocks, self.sample, self.fabrics
-        axis, plan, replicates = np.asarray(self.plan.axis), self.plan, self.scan.replicates
+        blocks, sample, fabrics, plan = self.blocks, self.sample, self.fabrics, self.plan
+        axis, replicates = np.asarray(plan.settings.axis), self.scan.replicates
         chosen = sample.fabric_contacts(self.variant, self.window)
-        normals = np.compress(chosen, sample.contacts.normal, axis=0)
-        points = self._placed(np.compress(chosen, sample.contacts.point, axis=0))
+        normals = compressed(chosen, sample.contacts.normal)
+        points = self._placed(compressed(chosen, sample.contacts.point))
         along = SPACE.axial((normals @ axis) ** 2)
+        of_contacts = self._by_part(points, along, np.ones(len(along)))
         arrays: dict[str, Any] = {
             "block": np.arange(len(blocks)),
             **dict(zip("xyz", blocks.middles.T, strict=True)),
             **self.grains,
             **self.void,
             **self._solid_fraction(),
-            "alpha_c_axial_sample_se": ratio_with_errors(
-                *self._by_part(points, along, np.ones(len(along)))
-            )[1],
+            "alpha_c_axial_sample_se": ratio_with_errors(*of_contacts)[1],
             "segments": fabrics.segments.sum(axis=0).astype(np.int64),
             "at_surface": self.at_surface.astype(np.int64),
         }
         if blocks.radius:
             arrays |= {"r_inner": blocks.bounds[:-1], "r_outer": blocks.bounds[1:]}
-        # rows hold None in place of NaN
-        listed = {
-            name: [None if value != value else value for value in values.tolist()]
-            for name, values in arrays.items()
-        }
-        number = blocks.of(points)
-        order = np.argsort(number, kind="stable")
-        starts = np.searchsorted(number[order], np.arange(len(blocks) + 1))
-        # the first group is dropped: it holds the contacts outside all blocks
-        groups = np.split(normals[order], starts)[1:-1]
-        tensors = fabrics.tensors.mean(axis=0)
-        for block, (own, exists) in enumerate(zip(groups, fabrics.exists, strict=True)):
+        number, tensors = blocks.of(points), fabrics.tensors.mean(axis=0)
+        for block, exists in enumerate(fabrics.exists):
+            own = normals[number == block]
+            # rows hold None in place of NaN
+            values = {name: array[block].item() for name, array in arrays.items()}
             yield {
+                "variant": self.variant.name,
                 "directions": len(plan.rule),
                 "replicates": replicates,
                 "spacing": plan.spacing / math.sqrt(replicates),
@@ -260,7 +242,7 @@ class BlocksOfVariant:
                 **tensor_values("c", contact_fabric(own), axis),
                 "alpha_c_axial_se": axial_error(own, axis),
                 **tensor_values("vs", FabricTensor(tensors[block]) if exists else None, axis),
-                **{name: values[block] for name, values in listed.items()},
+                **{name: None if value != value else value for name, value in values.items()},
             }
 
     def _placed(self, points: FloatArray) -> FloatArray:
@@ -299,7 +281,7 @@ class BlocksOfVariant:
     @cached_property
     def void(self) -> dict[str, FloatArray]:
         """Columns of the void fabric and its errors; NaN for blocks without a fabric."""
-        fabrics, rest, axis = self.fabrics, self.parts.rest, np.asarray(self.plan.axis)
+        fabrics, rest, axis = self.fabrics, self.parts.rest, np.asarray(self.plan.settings.axis)
         held = self.parts.segments.sum(axis=0) > 0
         columns = {
             "mean_length": ratio(fabrics.length.sum(axis=0), fabrics.number.sum(axis=0)),
@@ -312,29 +294,26 @@ class BlocksOfVariant:
 
     def _solid_fraction(self) -> dict[str, FloatArray]:
         """1 - volume of the void in the block / volume of the block inside the window."""
-        void = self.parts.void
+        void, radius = self.parts.void, self.sample.packing.radius[self.sample.grains]
         volumes = volumes_inside(self.blocks, self.window)
         volume = volumes.sum(axis=1)
-        known = volume > 0
-        if self.window is None:
-            # outside an open sample, void is not defined
-            known &= ~self.at_surface
+        # outside an open sample, void is not defined
+        known = (volume > 0) & ((self.window is not None) | ~self.at_surface)
         if self.window is not None or self.at_surface.any():
             # A surface removes the segments that reach it, and the middles of long segments lie
             # far inside. So the fraction is left out if segments are longer than a block. Their
             # mean length without a cut-off follows roughly from the volumes of the grains.
-            radius = self.sample.packing.radius[self.sample.grains]
             solid = float(np.sum(self.grains["grains"]) * np.mean(SPACE.volume(radius)))
             chord = 4.0 * float(np.sum(radius**3) / (3.0 * np.sum(radius**2)))
             free = chord * max(float(volumes.sum()) - solid, 0.0)
             known &= free <= solid * self.blocks.heights.min()
         left, total = volume[:, None] - volumes, void.sum(axis=2)
         without = 1.0 - ratio(total[..., None] - void, left)
-        columns = {
-            "solid_fraction": 1.0 - ratio(total.mean(axis=0), volume),
-            "solid_fraction_se": part_errors(without, (volumes > 0) & (left > 0)),
+        error = part_errors(without, (volumes > 0) & (left > 0))
+        return {
+            "solid_fraction": np.where(known, 1.0 - ratio(total.mean(axis=0), volume), np.nan),
+            "solid_fraction_se": np.where(known, error, np.nan),
         }
-        return {name: np.where(known, values, np.nan) for name, values in columns.items()}
 
     def notes(self) -> Iterator[Note]:
         """Notes on doubtful lines and blocks, and on the homogeneity of the sample."""
@@ -346,9 +325,8 @@ class BlocksOfVariant:
         if lacking:
             texts["few_segments"] = (
                 f"{lacking} of {counted(len(self.blocks), 'block')} have no void fabric: {empty} "
-                f"have no void segment at all, {lacking - empty} have none in more than 5 % of the "
-                f"directions: choose fewer blocks, closer lines (`spacing`, `tolerance`) or a "
-                f"shorter `cutoff`"
+                f"have no void segment, {lacking - empty} have none in over 5 % of the directions: "
+                f"choose fewer blocks, closer lines (`spacing`) or a shorter `cutoff`"
             )
         texts[HOMOGENEITY] = self._homogeneity()
         return (Note(code, text, (variant.name,)) for code, text in texts.items())
@@ -360,18 +338,15 @@ class BlocksOfVariant:
         variances = self.void["alpha_vs_axial_sample_se"] ** 2
         variances = variances + np.nan_to_num(self.void["alpha_vs_axial_se"]) ** 2
         test = homogeneity_of(values, variances, self.fabrics.segments.sum(axis=0), FREEDOM)
-        if test is None:
-            few = "too few blocks to tell whether the sample is homogeneous"
-            better = "" if self.variant.in_window else "blocks of the RV by `variants=c` and "
-            if not self.at_surface.any():
-                return few
+        if test is not None:
+            chance = "p < 0.0001" if test.chance < 1e-4 else f"p = {test.chance:.2g}"
+            sign = "" if test.chance < UNLIKELY else "no sign that "
             return (
-                f"{few}: {inner.sum()} of {len(inner)} are neither empty nor at a surface: choose "
-                f"smaller blocks, or {better}`edge=start`"
+                f"alpha_vs_axial of {test.blocks} blocks scatters {test.ratio:.2g} times as much "
+                f"as their errors explain ({chance}): {sign}the sample is not homogeneous"
             )
-        chance = "p < 0.0001" if test.chance < 1e-4 else f"p = {test.chance:.2g}"
-        sign = "" if test.chance < UNLIKELY else "no sign that "
-        return (
-            f"alpha_vs_axial of {test.blocks} blocks scatters {test.ratio:.2g} times as much as "
-            f"their errors explain ({chance}): {sign}the sample is not homogeneous"
-        )
+        text = "too few blocks to tell whether the sample is homogeneous"
+        if self.at_surface.any():
+            text += f": {inner.sum()} of {len(inner)} are neither empty nor at a surface"
+            text += " (choose smaller blocks, or those of the RV with `edge=start`)"
+        return text

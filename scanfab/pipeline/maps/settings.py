@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from scanfab.base.errors import SettingsError
 from scanfab.base.option import numbers, optional, sample, whole
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import parse_variants
@@ -61,38 +61,26 @@ class MapSettings(Settings):
     shells: int | None = sample(optional(block_count), first=True)
     """Number of shells of equal thickness about the centre."""
 
-    def __init__(self, **options: Any) -> None:
-        super().__init__(**options)
-        named = [name for name in BLOCK_OPTIONS if getattr(self, name) is not None]
+    def _clashes(self) -> Iterator[str]:
+        yield from super()._clashes()
+        named = [f"`{name}`" for name in BLOCK_OPTIONS if getattr(self, name) is not None]
         if len(named) != 1:
-            raise SettingsError(
+            yield (
                 f"a map has one kind of blocks: expected exactly one of `grid`, `slices` and "
-                f"`shells`, found {' and '.join(f'`{name}`' for name in named) or 'none'}"
+                f"`shells`, found {' and '.join(named) or 'none'}"
             )
         if self.cutoffs:
-            raise SettingsError(
-                "cutoffs: a map has one cut-off: give it as `cutoff`, and make a map for each one"
-            )
+            yield "cutoffs: a map has one cut-off: give it as `cutoff`"
         if len(self.rvs) > 1:
-            raise SettingsError(
-                f"rv: expected one size, because a map has one RV, found {len(self.rvs)}: make a "
-                f"map for each"
-            )
+            yield f"rv: expected one size, because a map has one RV, found {len(self.rvs)}"
         if self.with_:
-            raise SettingsError(
-                f"with_: a map has no further columns, found {', '.join(self.with_)}: use "
-                f"`compute` for the whole sample or for an RV at `rv_center`"
-            )
+            groups = ", ".join(self.with_)
+            yield f"with_: a map has no further columns, found {groups}: use `compute`"
 
     @property
     def blocks(self) -> int:
         """Number of blocks."""
         return math.prod(self.grid) if self.grid is not None else self.slices or self.shells or 1
-
-    @property
-    def rows_per_frame(self) -> int:
-        """Number of rows per frame: one for each variant and block."""
-        return len(self.variants) * self.blocks
 
     @property
     def columns(self) -> tuple[Column, ...]:

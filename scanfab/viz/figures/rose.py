@@ -249,11 +249,11 @@ def void_rings(frame: ScannedFrame, angles: Sequence[float]) -> list[Ring]:
         blocks=measured.blocks,
         variants=variant,
         replicates=range(REPLICATES),
-        seed=plan.seed,
+        seed=plan.settings.seed,
         workers=plan.workers,
         most_steps=plan.max_chords,
     )
-    sums_of, numbers = rose.kept(variant, 0, plan.moment)
+    sums_of, numbers = rose.kept(variant, 0, plan.settings.moment)
     every, counts = measured.kept(variant)
     mean = every.sum() / counts.sum()
     with np.errstate(invalid="ignore", divide="ignore"):
