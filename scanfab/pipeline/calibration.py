@@ -202,7 +202,7 @@ class _OneFrame:
     """One frame that is scanned repeatedly with different settings."""
 
     def __init__(self, source: Source, settings: Settings, frame: int) -> None:
-        frames = Frames(source, replace(settings, frames=parse_frames(frame, "frame")))
+        frames = Frames(source, replace(settings, frames=parse_frames("frame", frame)))
         self.number, wanted = frames.one()
         # the first frame of the series that has grains makes the plan
         first = frames.first()
