@@ -92,10 +92,10 @@ class SourceCommand(Command):
         rest = list(args)
         while rest:
             joined.append(rest.pop(0))
-            if counts := COUNTS.get(joined[-1]):
-                found = len(list(takewhile(NUMBER.fullmatch, rest)))
-                taken = max((count for count in counts if count <= found), default=found)
-                joined += [" ".join(rest[:taken])] * bool(taken)
+            counts = COUNTS.get(joined[-1], ())
+            found = len(list(takewhile(NUMBER.fullmatch, rest))) if counts else 0
+            if taken := max((count for count in counts if count <= found), default=found):
+                joined.append(" ".join(rest[:taken]))
                 del rest[:taken]
         return super().parse_args(ctx, joined)
 
