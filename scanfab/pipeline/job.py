@@ -97,8 +97,8 @@ class Job:
         self.series, self.settings = [one for one, _ in parts], parts[0][1]
         same = parts[0][0].reading, self.settings
         if any((one.reading, settings) != same for one, settings in parts):
-            what = "the series of one table must be read with the same options and have same frames"
-            raise SettingsError(f"{what}: compute each into a table of its own")
+            must = "must be read with the same options, and be parts of the same frames"
+            raise SettingsError(f"the series of one table {must}: make a table of each")
         names = [one.name for one in self.series]
         if twice := {name for name in names if names.count(name) > 1}:
             raise SettingsError(f"{min(twice)}: named twice among the series of one table")
