@@ -76,15 +76,6 @@ def test_cutoffs_are_a_range_of_lengths_with_both_ends_or_a_list(text, values, u
     assert {one.unit for one in cutoffs if one.value} == units
 
 
-def test_the_defaults_are_those_of_the_command_line():
-    settings = Settings()
-    assert (settings.variants, settings.rv, settings.cutoff) == ("abcd", 0.7, Length(1.0, "rmin"))
-    assert (settings.spacing, settings.directions, settings.tolerance) == (None, None, 1e-4)
-    assert (settings.min_contacts, settings.rattlers, settings.contact_tolerance) == (2, "count", 0)
-    assert (settings.axis, settings.strain) == ((0, 0, 1), "auto")
-    assert (settings.seed, settings.boundary) == (0, ())
-
-
 def test_values_are_kept_as_they_are_meant():
     assert [Settings(variants=text).variants for text in ("dca", "aab")] == ["acd", "ab"]
     assert [Settings(variants=text).needs_window for text in ("ab", "cd", "ad")] == [0, 1, 1]
