@@ -248,9 +248,14 @@ class Settings:
         space : Space
             Space of the first frame that has grains: only a frame shows that the grains are discs.
 
+        Returns
+        -------
+        Settings
+            Settings with an axis in the plane, and with directions in the plane.
+
         Raises
         ------
-        DimensionError
+        SettingsError
             If the settings are for spheres and the grains are discs, or the other way round.
         """
         self._check_sizes(space.dimension)
