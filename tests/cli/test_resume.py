@@ -285,6 +285,9 @@ def test_a_frame_that_was_skipped_is_tried_again(compute, dumps, stop, is_whole,
     assert is_whole("table.csv", *skip)
     assert compute("table.csv", *skip, "--resume") == (1, 0)
     assert "frame 1 skipped" in capsys.readouterr().err
+    # with two frames in place of one, later frames would have other numbers
+    second.write_text(good + good.replace("TIMESTEP\n100", "TIMESTEP\n150"))
+    assert compute("table.csv", *skip, "--resume") == (2, 0)
     second.write_text(good)
     assert compute("table.csv", *skip, "--resume") == (0, 1)
     assert is_whole("table.csv", *skip)
