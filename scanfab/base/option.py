@@ -8,6 +8,7 @@ import math
 import sys
 import textwrap
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from functools import cache, partial, wraps
@@ -55,7 +56,7 @@ class Option:
     """Default value as users would write it."""
     parse: Parse = lambda name, value: value
     """Function of name and value that checks and converts; converted values pass unchanged."""
-    choices: Sequence[str] | Callable[[], Iterable[str]] = ()
+    choices: Iterable[str] | Callable[[], Iterable[str]] = ()
     """Words that a shell completes. An option without a parser accepts no others."""
     also: str = ""
     """What is accepted beside the choices; for FILE a shell also completes file names."""
@@ -153,7 +154,6 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
     The decorated function refuses unknown names. In its docstring, ``{options}`` is replaced by the
     help of the options, in the order and with the types of the signature.
     """
-    declared = {option.name: option for option in options}
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         parameters = inspect.signature(function).parameters
@@ -163,66 +163,54 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
             refuse_unknown(function.__name__, kwargs, list(parameters))
             return function(*args, **kwargs)
 
-        helps = [
-            _documented(declared[name], parameter.annotation)
-            for name, parameter in parameters.items()
-            if name in declared
-        ]
-        text = inspect.cleandoc(function.__doc__ or "")
-        call.__doc__ = text.replace("{options}", "\n".join(helps))
+        helps = {}
+        for option in options:
+            # a form of a single word, such as FILE, would repeat the type
+            written = f" Written as ``{option.form}``." if set("|:,") & set(option.form) else ""
+            text = textwrap.fill(option.help + written, 92, break_on_hyphens=False)
+            helps[option.name] = f", optional\n{textwrap.indent(text, '    ')}"
+        named = [(one.name, one.annotation) for one in parameters.values() if one.name in helps]
+        texts = [f"{name} : {annotation}{helps[name]}" for name, annotation in named]
+        call.__doc__ = inspect.cleandoc(function.__doc__ or "").replace(
+            "{options}", "\n".join(texts)
+        )
         return call
 
     return decorate
 
 
-def _documented(option: Option, annotation: str) -> str:
-    """The entry of an option in the parameters of a numpydoc docstring."""
-    form = option.form
-    # a form of a single word, such as FILE, would repeat the type
-    written = f" Written as ``{form}``." if set("|:,") & set(form) else ""
-    text = textwrap.fill(option.help + written, 92, break_on_hyphens=False)
-    return f"{option.name} : {annotation}, optional\n{textwrap.indent(text, '    ')}"
-
-
 def number(expected: str, holds: Callable[[float], bool]) -> Parse:
-    """A parser of one number; any other value becomes NaN, which fails every condition."""
+    """A parser of one number for which a condition holds; NaN must fail every condition."""
+    return _number(expected, holds, float)
 
-    def parse(name: str, value: Any) -> float:
-        try:
+
+def whole(expected: str, holds: Callable[[float], bool]) -> Parse:
+    """A parser of one whole number for which a condition holds."""
+    return _number(expected, lambda value: value.is_integer() and holds(value), int)
+
+
+def _number(expected: str, holds: Callable[[float], bool], kind: type) -> Parse:
+    def parse(name: str, value: Any) -> Any:
+        with suppress(TypeError, ValueError, OverflowError):
             result = float(value)
-        except (TypeError, ValueError):
-            result = math.nan
-        if not holds(result):
-            raise unusable(name, expected, value)
-        return result
-
-    return parse
-
-
-def whole(expected: str, holds: Callable[[int], bool]) -> Parse:
-    """A parser of one whole number."""
-    parse_float = number(expected, lambda value: value.is_integer() and holds(int(value)))
-
-    def parse(name: str, value: Any) -> int:
-        result = parse_float(name, value)
-        # the value itself is returned, as a float would round a large integer
-        return value if isinstance(value, int) else int(result)
+            if holds(result):
+                # an integer is returned itself, because a float would round a large one
+                return value if kind is int and isinstance(value, int) else kind(result)
+        raise unusable(name, expected, value)
 
     return parse
 
 
 def numbers(expected: str, holds: Callable[[Floats], bool]) -> Callable[[str, Any], Floats]:
-    """A parser of several finite numbers: a sequence, or a text with commas or blanks."""
+    """A parser of finite numbers: a sequence, a text with commas or blanks, or one number."""
 
     def parse(name: str, value: Any) -> tuple[float, ...]:
         words = value.replace(",", " ").split() if isinstance(value, str) else value
-        try:
-            values = tuple(map(float, words))
-        except (TypeError, ValueError):
-            values = (math.nan,)
-        if not all(map(math.isfinite, values)) or not holds(values):
-            raise unusable(name, expected, value)
-        return values
+        with suppress(TypeError, ValueError, OverflowError):
+            values = tuple(map(float, words if isinstance(words, Iterable) else [words]))
+            if all(map(math.isfinite, values)) and holds(values):
+                return values
+        raise unusable(name, expected, value)
 
     return parse
 

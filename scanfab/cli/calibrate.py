@@ -61,8 +61,7 @@ def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
     """
     from scanfab.base.column import columns_of_fields
     from scanfab.pipeline.calibration import StepRow
-    from scanfab.pipeline.record import asked_for
-    from scanfab.pipeline.repeat import repeat_command
+    from scanfab.pipeline.record import asked_for, repeat_command
     from scanfab.table.writing import write_rows
 
     outputs = take_output(chosen)

@@ -22,7 +22,7 @@ from scanfab.base.errors import ScanfabNote
 from scanfab.base.spelling import spelt_time
 from scanfab.io.files import without_temporary
 from scanfab.pipeline.options import as_options
-from scanfab.pipeline.told import Told
+from scanfab.pipeline.told import listening
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -71,9 +71,20 @@ class Command(click.Command):
             self.params.append(click.Option([f"--{name}"], help=words, **flag))
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command."""
-        with _reported_warnings() as ctx.obj:
-            return super().invoke(ctx)
+        """Run the command; its warnings and notes become lines on standard error."""
+        # read here, because threads that compute frames have no click context
+        is_quiet = level() == "quiet"
+
+        def show(message: Warning) -> None:
+            kind = "note" if isinstance(message, ScanfabNote) else "warning"
+            if kind == "warning" or not is_quiet:
+                say(f"{kind}: {as_options(str(message))}")
+
+        with warnings.catch_warnings():
+            # users of the command can do nothing about the warnings of other packages
+            warnings.simplefilter("ignore")
+            with listening(show) as ctx.obj:
+                return super().invoke(ctx)
 
 
 def _choose_level(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
@@ -81,23 +92,6 @@ def _choose_level(ctx: click.Context, parameter: click.Parameter, value: bool) -
         raise click.UsageError("--quiet and --verbose contradict each other: choose one")
     if value:
         ctx.meta[TALK] = parameter.name
-
-
-@contextmanager
-def _reported_warnings() -> Iterator[Told]:
-    """Print scanfab's warnings and notes as single lines on standard error, each text once."""
-    told, is_quiet = Told(), level() == "quiet"
-
-    def show(message: Any, category: type[Warning], *rest: Any, **more: Any) -> None:
-        is_note = issubclass(category, ScanfabNote)
-        if told.add(category, str(message)) and not (is_note and is_quiet):
-            say(f"{'note' if is_note else 'warning'}: {as_options(str(message))}")
-
-    with warnings.catch_warnings():
-        # warnings of other packages arrive here as well; Told.add() refuses them
-        warnings.simplefilter("always")
-        warnings.showwarning = show
-        yield told
 
 
 def level() -> str:

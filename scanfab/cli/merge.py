@@ -8,7 +8,6 @@ import click
 
 from scanfab.cli.console import Command, is_readable, print_csv, print_table
 from scanfab.cli.options import options, usage_errors
-from scanfab.io.options import parse_frames
 
 
 @click.command(cls=Command)
@@ -28,20 +27,16 @@ def merge(parts: tuple[Path, ...], output: Path | None, frames: str | None) -> i
     Job I of 8:  scanfab compute dumps/ --frames I::8 -o part_I.csv
     Then:        scanfab merge part_*.csv -o fabric.csv
     """
-    from scanfab.pipeline.merge import check_no_part, merged
+    from scanfab.pipeline.merge import merge_tables
+    from scanfab.table.writing import Excerpt
 
     with usage_errors():
-        chosen = parse_frames(frames)
-        if output is not None:
-            check_no_part(output, parts)
-    table = merged(parts, chosen)
-    if output is not None:
-        table.save(output)
-    elif is_readable():
-        print_table(table.rows, table.excerpt)
-    else:
-        print_csv(table.rows, table.excerpt, table.columns)
+        table = merge_tables(parts, output, frames=frames)
+    if output is None and is_readable():
+        print_table(table, Excerpt(table.names))
+    elif output is None:
+        print_csv(table, Excerpt(table.names), table.columns)
     # the user may have chosen columns without the void fabric
-    if not table.rows or "alpha_vs" not in [column.name for column in table.columns]:
+    if not len(table) or "alpha_vs" not in table.names:
         return 0
-    return 0 if any(row.get("alpha_vs") is not None for row in table.rows) else 1
+    return 0 if any(row.alpha_vs is not None for row in table) else 1

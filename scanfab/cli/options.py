@@ -78,10 +78,10 @@ class SourceCommand(Command):
         for parameter in self.get_params(ctx):
             record = parameter.get_help_record(ctx) if isinstance(parameter, click.Option) else None
             if record is not None:
-                option = DECLARED.get(str(parameter.name))
-                group = "output" if option is None else "" if option.first else option.group
+                option = DECLARED.get(str(parameter.name), Option("", str, ""))
                 # pad, so that the texts of all groups are aligned
-                records[group].append((record[0].ljust(COLUMN), record[1]))
+                padded = record[0].ljust(COLUMN), record[1]
+                records["" if option.first else option.group].append(padded)
         for group in (group for group in TITLES if records[group]):
             with formatter.section(TITLES[group]):
                 formatter.write_dl(records[group], col_max=COLUMN)
@@ -137,7 +137,7 @@ def _click_option(option: Option, changes: Mapping[str, Any]) -> Callable[[Funct
     }
     words, default = as_options(attributes["help"]), attributes.get("default")
     # show the default 0 of a number, but not the default False of a switch
-    if default is not None and default != () and default is not False and "(default: " not in words:
+    if default not in (None, ()) and default is not False and "(default: " not in words:
         # click would write 10000000000.0 and 0.0 instead of 1e10 and 0
         short = f"{default:g}".replace("e+", "e") if isinstance(default, float) else default
         words += f"  [default: {short}]"
@@ -175,11 +175,11 @@ def take_output(chosen: dict[str, Any], *kinds: str) -> Output:
     outputs = Output(**{name: chosen.pop(name) for name in vars(Output()) if name in chosen})
     if outputs.plot is None and outputs.figure is not None:
         raise click.UsageError("--figure goes with --plot FILE")
-    if outputs.figure is not None:
-        with usage_errors():
+    with usage_errors():
+        if outputs.figure is not None:
             find_figure(outputs.figure, *kinds)
-    if outputs.plot is not None:
-        with usage_errors("--plot: "):
+    with usage_errors("--plot: "):
+        if outputs.plot is not None:
             check_plot_file(outputs.plot)
     return outputs
 
@@ -202,10 +202,9 @@ def tables_argument(**more: Any) -> Callable[[Function], Function]:
 
 def check_labels(labels: tuple[str, ...], tables: tuple[Any, ...]) -> None:
     """Raise a usage error unless there is one label for each table, or none at all."""
-    if labels and len(labels) != len(tables):
-        raise click.UsageError(
-            f"--label: expected one per table: {len(tables)}, found {len(labels)}"
-        )
+    if len(labels) not in (0, len(tables)):
+        expected = f"expected one per table: {len(tables)}"
+        raise click.UsageError(f"--label: {expected}, found {len(labels)}")
 
 
 def _expanded(
@@ -252,7 +251,7 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
     copy = temporary_copy(iter(partial(sys.stdin.buffer.read, PART), b""), "standard input")
     if copy.stat().st_size == 0:
         raise ReadError("standard input: expected a dump, found nothing")
-    return [replace(read_series(copy, **reading), name="-")]
+    return [replace(read_series(copy, **reading), name="-", sources=("-",))]
 
 
 def open_one(sources: tuple[str, ...], reading: dict[str, Any], done: str) -> Series:

@@ -30,7 +30,6 @@ def write_table(sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Set
     ``kind`` is the class of the table's settings.
     """
     from scanfab.pipeline.job import Job
-    from scanfab.pipeline.record import asked_for
     from scanfab.viz.paraview import vtk_folders
 
     ctx = click.get_current_context()
@@ -70,7 +69,6 @@ def write_table(sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Set
             job = Job(
                 series,
                 settings,
-                asked_for(sources, reading, settings, excerpt),
                 outputs.output,
                 excerpt,
                 resume=resume,

@@ -92,7 +92,7 @@ def convert(
     pattern = out / f"frame_{STEP}{writer.extensions[0]}" if is_folder else out
     check_folder(pattern if out.is_dir() else out)
     refuse_unknown("convert", reading, [*READING, "to", "frames"])
-    packings = _packings(source, parse_frames(frames), reading)
+    packings = _packings(source, parse_frames("frames", frames), reading)
     if STEP not in pattern.name:
         # look for a second frame before the file is written
         first = list(islice(packings, 2))

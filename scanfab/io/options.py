@@ -3,26 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from scanfab.base import option
-from scanfab.base.option import options_of, reading, unusable
+from scanfab.base.option import number, numbers, optional, options_of, reading, unusable, whole
+from scanfab.io.reader import installed_readers, reader_named
 
-parse_positive = option.optional(
-    option.number("a number above 0", lambda value: 0 < value < math.inf)
-)
-parse_skip = option.whole("how many lines to skip, 0 or more", lambda value: 0 <= value < 2**31)
-
-
-def _reader_names() -> Iterable[str]:
-    from scanfab.io.reader import installed_readers
-
-    return installed_readers()
+parse_positive = optional(number("a number above 0", lambda value: 0 < value < math.inf))
+parse_skip = whole("how many lines to skip, 0 or more", lambda value: 0 <= value < 2**31)
 
 
 def parse_text(name: str, value: Any) -> str | None:
@@ -34,8 +26,6 @@ def parse_text(name: str, value: Any) -> str | None:
 
 def parse_format(name: str, value: Any) -> str | None:
     """The name of an installed reader."""
-    from scanfab.io.reader import reader_named
-
     given = parse_text(name, value)
     if given is not None:
         reader_named(given)
@@ -51,8 +41,10 @@ def parse_contacts(name: str, value: Any) -> str | PathLike[str]:
 
 def parse_columns(name: str, value: Any) -> dict[str, str] | None:
     """A dict of standard name to column, from a mapping or from ``NAME=COLUMN,NAME=COLUMN``."""
-    if value is None or isinstance(value, Mapping):
-        return None if value is None else dict(value)
+    if value is None:
+        return None
+    if isinstance(value, Mapping):
+        return dict(value)
     names: dict[str, str] = {}
     for part in str(value).split(","):
         standard, _, column = map(str.strip, part.partition("="))
@@ -72,18 +64,14 @@ def parse_cell(name: str, value: Any) -> tuple[float, ...] | str | PathLike[str]
         "three lengths LX LY LZ above 0, or six numbers LX LY LZ XY XZ YZ, or a CSV file with the "
         "cell of each frame"
     )
-    return option.numbers(expected, lambda cell: len(cell) in (3, 6) and min(cell[:3]) > 0)(
-        name, value
-    )
+    return numbers(expected, lambda cell: len(cell) in (3, 6) and min(cell[:3]) > 0)(name, value)
 
 
-def parse_frames(text: str | int | slice | None, name: str = "frames") -> slice:
-    """A slice from ``A:B:C`` or a single number."""
-    if text is None:
-        return slice(None)
-    if isinstance(text, slice):
-        return text
-    words = str(text).split(":")
+def parse_frames(name: str, value: str | int | slice | None) -> slice:
+    """A slice from ``A:B:C`` or a single number; None gives all frames."""
+    if value is None or isinstance(value, slice):
+        return value or slice(None)
+    words = str(value).split(":")
     with suppress(ValueError):
         if len(words) == 1:
             first = int(words[0])
@@ -92,7 +80,7 @@ def parse_frames(text: str | int | slice | None, name: str = "frames") -> slice:
         parts = [int(word) if word.strip() else None for word in words]
         if len(parts) <= 3 and parts[2:] != [0]:
             return slice(*parts)
-    raise unusable(name, "a slice such as 0:10:2, :5 or -1:", text)
+    raise unusable(name, "a slice such as 0:10:2, :5 or -1:", value)
 
 
 def parse_periodic(name: str, value: Any) -> str | None:
@@ -104,15 +92,16 @@ def parse_periodic(name: str, value: Any) -> str | None:
 
 def parse_dim(name: str, value: Any) -> str | int:
     """``auto``, 2 or 3."""
-    word = option.one_of("auto", "2", "3")(name, str(value))
-    return word if word == "auto" else int(word)
+    if str(value) not in ("auto", "2", "3"):
+        raise unusable(name, "auto, 2 or 3", value)
+    return "auto" if value == "auto" else int(value)
 
 
 @dataclass(frozen=True)
 class Reading:
     """The options of ``read_series``."""
 
-    format: str | None = reading(parse_format, metavar="NAME", choices=_reader_names)
+    format: str | None = reading(parse_format, metavar="NAME", choices=installed_readers)
     """Reader to use (default: chosen by the content of the file)."""
     columns: dict[str, str] | None = reading(parse_columns, metavar="NAMES")
     """

@@ -23,7 +23,6 @@ from scanfab.pipeline.plan import make_plan
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work, variant_errors
 from scanfab.pipeline.values import SHAPES, Length
-from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.directions import direction_rule, rule_of, usual_rule
 from scanfab.table.plots import Plots
 from scanfab.table.row import Record
@@ -202,8 +201,8 @@ class _OneFrame:
     """One frame that is scanned repeatedly with different settings."""
 
     def __init__(self, source: Source, settings: Settings, frame: int) -> None:
-        frames = Frames(source, replace(settings, frames=parse_frames(frame, "frame")))
-        self.name, (self.number, wanted) = frames.name, frames.one()
+        frames = Frames(source, replace(settings, frames=parse_frames("frame", frame)))
+        self.number, wanted = frames.one()
         # the first frame of the series that has grains makes the plan
         first = frames.first()
         if first is None:
@@ -213,8 +212,8 @@ class _OneFrame:
         sample = self.first if number == self.number else frames.sample(self.number, wanted)
         if sample is None or not sample.grains.any():
             raise PackingError(f"frame {self.number} has no grains: choose another frame")
-        self.sample, self.space = sample, self.first.packing.space
-        self.settings = settings_in(settings, self.space)
+        self.name, self.sample, self.space = frames.name, sample, self.first.packing.space
+        self.settings = settings.in_space(self.space)
         tell(sample.doubts_of_escaped(), f"frame {self.number}")
         # these notes hold for every step
         tell(make_plan(self.settings, self.first).notes)

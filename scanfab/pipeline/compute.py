@@ -1,4 +1,4 @@
-"""compute(): the frames of a series side by side, as rows of the fabric table in their order."""
+"""compute(): frames side by side in an executor, and their rows in the order of the series."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ LOGGER = logging.getLogger("scanfab")
 
 Observer = Callable[[FrameResult], None]
 
-# codes of notes that are true of later frames too: a grain that flew away goes on flying
+# codes of notes that would be repeated in all later frames: a grain that flew away stays away
 ONCE_A_SERIES = {ESCAPED, "other_bodies", "grains_left"}
-# seconds after which a run that waits for a frame looks again how many may be under way
+# a run that waits for a frame asks so often, in seconds, how many frames the workers can take
 PAUSE = 2.0
-# what a thread of another process was warned of while it computed a frame
+# the warnings of the frame that a thread of another process computes
 _heard = threading.local()
 
 
@@ -81,21 +81,22 @@ def compute(
     on_error: str = "stop",
 ) -> Table:
     """
-    The fabric table of a packing or of a series.
+    Compute the fabric table of a packing or of a series.
 
-    The RV, ``rmin`` and the initial length L0 of a series are those of its first frame that has
-    grains. In a loop over frames, ``compute(frame.read())``, each frame gets its own: hand over the
-    series, or name ``rv_radius``, ``rv_center`` and ``cutoff`` as lengths.
+    The first frame of a series that has grains decides its RV, ``rmin`` and initial length L0. In a
+    loop over frames, ``compute(frame.read())``, each frame would have its own: pass the series, or
+    give ``rv_radius``, ``rv_center`` and ``cutoff`` as lengths.
 
     Parameters
     ----------
     source : Packing, Series or iterable of Packing
         One frame, or many: what :func:`scanfab.read_series` returns, or packings from anywhere, for
-        instance a generator that yields those of a running simulation. One frame a worker is in
-        memory, unless `frames` counts from the end of an iterable.
+        instance from a generator that yields the packings of a running simulation. Only one frame
+        per worker is in memory, unless `frames` counts from the end of an iterable.
     executor : concurrent.futures.Executor, optional
-        Computes the frames in place of threads of this process, `workers` of them at a time, each
-        scanned by one thread; that of :func:`scanfab.dask_executor` as many as its workers take.
+        Computes the frames, `workers` at a time, each with one thread. By default threads of this
+        process do. An executor of :func:`scanfab.dask_executor` gets as many frames as its workers
+        have threads.
     {options}
 
     Returns
@@ -108,7 +109,7 @@ def compute(
     ScanfabError
         If a frame cannot be read, or the settings do not fit the packing.
     TypeError
-        If there is no such option; names the nearest that there is.
+        If there is no such option; the message suggests the most similar name.
 
     Examples
     --------
@@ -139,27 +140,34 @@ def compute_frames(
     executor: Executor | None = None,
 ) -> Iterator[list[Row]]:
     """
-    The rows of :func:`compute`, those of each frame as soon as they may come, in their order.
+    Compute the rows of :func:`compute`, frame by frame in the order of the series.
 
     Parameters
     ----------
     source, settings, executor
         As for :func:`compute`.
     done : container of int, optional
-        Leave out these frames, which an earlier run has computed.
+        Frames to leave out, because an earlier run has computed them.
     observe : callable, optional
-        Called with the :class:`FrameResult` of each frame, where that is computed.
+        Called with the :class:`FrameResult` of each frame, in the process that computes it.
 
     Yields
     ------
     list of Row
-        None are empty: frames that are skipped are left out.
+        The rows of a frame as soon as it and all frames before it are computed; nothing for a frame
+        that is skipped.
     """
     if not isinstance(executor, Executor | None):
         raise unusable("executor", "a concurrent.futures.Executor", executor)
     frames = Frames(source, settings)
-    plan, notes = _plan(frames), _SeriesNotes(frames.settings)
-    own = ThreadPoolExecutor(settings.workers)
+    # an error in a file of strains is raised before the first frame is read
+    plan = plan_without_grains(settings)
+    if (first := frames.first()) is not None:
+        _, frame, sample = first
+        tell(frames.notes(frame, sample))
+        plan = make_plan(settings, sample)
+        tell(plan.notes)
+    notes, own = _SeriesNotes(frames.settings), ThreadPoolExecutor(settings.workers)
     try:
         jobs = _jobs(frames, plan, done, observe, is_far=executor is not None)
         for computed in _in_order(jobs, executor or own, settings, own):
@@ -173,23 +181,10 @@ def compute_frames(
         tell([Note("no_grains", "no frame has any grains")], frames.name)
 
 
-def _plan(frames: Frames) -> Plan:
-    """The plan of a series, by its first frame that has grains."""
-    # an error in a file of strains comes before the first frame
-    plan = plan_without_grains(frames.settings)
-    first = frames.first()
-    if first is not None:
-        _, frame, sample = first
-        tell(frames.notes(frame, sample))
-        plan = make_plan(frames.settings, sample)
-        tell(plan.notes)
-    return plan
-
-
 def _jobs(
     frames: Frames, plan: Plan, done: Container[int], observe: Observer | None, is_far: bool
 ) -> Iterator[_Job | None]:
-    """The chosen frames that are not done; None where the next is still to come."""
+    """The chosen frames that are not done; None while the next frame of a simulation is missing."""
     for due in frames.as_they_come():
         if due is None:
             yield None
@@ -205,7 +200,7 @@ def _jobs(
 
 
 class _Computed(NamedTuple):
-    """What comes back of a frame, also from another process."""
+    """The result of a frame, which may come from another process."""
 
     number: int
     rows: list[Row]
@@ -213,9 +208,9 @@ class _Computed(NamedTuple):
     cell: Cell | None = None
     """None also if the frame has no grains."""
     grouping: Grouping | None = None
-    """None also if each sphere is a grain."""
+    """The clumps; None if each sphere is a grain."""
     heard: tuple[Warning, ...] = ()
-    """Warnings of another process, where nobody hears them."""
+    """Warnings of another process, which nobody has seen there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,14 +223,14 @@ class _Job:
     source: str
     observe: Observer | None
     home: tuple[str, int]
-    """The machine and process in which warnings are heard."""
+    """Machine and process that show warnings to the user."""
 
     def __str__(self) -> str:
         return f"frame {self.number}"
 
     @property
     def path(self) -> Path | None:
-        """The file of the frame, if it lies in one."""
+        """The file of the frame, if it comes from a file."""
         return self.frame.snapshot.path if isinstance(self.frame, Frame) else None
 
     def __call__(self, threads: int) -> _Computed:
@@ -268,7 +263,7 @@ def _hear(message: Any, *_: Any, **__: Any) -> None:
 
 
 class _SeriesNotes:
-    """Tells the notes of the frames of one series, in their order."""
+    """Issues the notes of the frames of one series as warnings, in the order of the frames."""
 
     def __init__(self, settings: Settings) -> None:
         self._flips = Flips(settings.frames.step)
@@ -276,7 +271,7 @@ class _SeriesNotes:
         self._told: set[str] = set()
 
     def tell(self, computed: _Computed) -> None:
-        """Tell what there is to tell of a frame."""
+        """Issue the notes of a frame."""
         for warning in computed.heard:
             warnings.warn(warning, stacklevel=3)
         notes = list(computed.notes)
@@ -296,42 +291,42 @@ def _in_order(
     """
     The results of jobs, in the order of the jobs.
 
-    A job is None where the next one is not there yet: a result that is ready then comes meanwhile.
-    If the jobs end in an error, the results of those under way come before it. Of the ``own``
-    executor few frames have more threads each.
+    A job is None while the next job is missing; meanwhile results are returned. If the iterator of
+    jobs raises an error, the results of the jobs under way come first. If there are fewer jobs than
+    threads in the ``own`` executor, each job gets several threads.
     """
     waiting: deque[tuple[_Job, Future[_Computed]]] = deque()
-    over: Exception | None = None
+    end: Exception | None = None
     try:
-        while waiting or over is None:
-            # how many processors there are elsewhere, only Dask tells
+        while waiting or end is None:
+            # only Dask knows how many threads its workers have
             room = executor.room() if isinstance(executor, DaskExecutor) else settings.workers
             fresh, computed = list[_Job](), None
-            if waiting and (over or len(waiting) >= room):
+            if waiting and (end or len(waiting) >= room):
                 wait([waiting[0][1]], PAUSE)
             if waiting and waiting[0][1].done():
                 computed = _result(executor, *waiting.popleft(), settings.on_error == "skip")
             try:
-                while not over and len(waiting) + len(fresh) < room and (job := next(jobs)):
+                while not end and len(waiting) + len(fresh) < room and (job := next(jobs)):
                     fresh.append(job)
             except Exception as error:
-                over = error
+                end = error
             under_way = max(len(waiting) + len(fresh), 1)
             threads = max(settings.workers // under_way, 1) if executor is own else 1
             waiting.extend((job, executor.submit(job, threads)) for job in fresh)
-            # the next frames are begun by now, as whoever takes this one may be slow
+            # yielded after the next jobs have started, because the caller may be slow
             if computed is not None:
                 yield computed
-        if not isinstance(over, StopIteration):
-            raise over
+        if not isinstance(end, StopIteration):
+            raise end
     finally:
-        # the executor may go on for others
+        # the executor may be used further
         for _, future in waiting:
             future.cancel()
 
 
 def _result(executor: Executor, job: _Job, future: Future[_Computed], skips: bool) -> _Computed:
-    """What has become of a frame; one that cannot be computed is skipped, or ends the run."""
+    """The result of a job; if it failed, the frame is skipped or the error is raised."""
     try:
         return future.result()
     except Exception as found:

@@ -1,4 +1,4 @@
-"""One frame: from its grains and contacts to the rows of the fabric table."""
+"""compute_frame(): from the grains and contacts of one frame to its rows of the fabric table."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ from scanfab.table.columns import row_of
 from scanfab.table.row import Row
 
 OTHER_CUTOFFS = "error_at_other_cutoffs"
-"""The code of a note: the scan is fine enough for its cut-off, but not for another."""
+"""Code of the note that the scan is fine enough for its cut-off, but not for another."""
 
 
 @dataclass(frozen=True, eq=False)
 class FrameResult:
-    """The rows of one frame, and what they were made from, for those who want to see it."""
+    """The rows of one frame, and the data they were made of, for figures and files."""
 
     source: str
     number: int
     sample: Sample
     measurements: tuple[Measurement, ...]
-    """One for each RV, the smallest first, which has the whole, too; none without any grain, and
-    none of a map."""
+    """One for each RV, the smallest first; the first also holds the whole sample. Empty for a map
+    and for a frame without grains."""
     rows: list[Row]
     notes: tuple[Note, ...] = ()
-    """What is doubtful about them."""
+    """Doubts about the rows."""
     blocks: tuple[Blocks, Blocks] | None = None
-    """Of a map those of the whole sample and of the RV; None without any grain."""
+    """For a map the blocks of the whole sample and of the RV; None for a frame without grains."""
 
     def measured(self, variant: str, rv: float | None = None) -> Measurement:
         """
         The measurement of a variant in a frame that has grains.
 
-        ``rv`` is the size of its RV, where there are several.
+        If there are several RVs, ``rv`` is the size of the RV.
         """
         return next(
             one
@@ -66,18 +66,18 @@ def compute_frame(
     Parameters
     ----------
     frame : Packing, Sample or Frame
-        What is not read yet, is read here.
+        The frame; a Frame is read here.
     plan : Plan
-        Of the series: the same for all its frames.
+        The plan of the series, the same for all its frames.
     number : int, optional
-        Of the frame in the series, from 0.
+        Number of the frame in the series, from 0.
     source : str, optional
-        The name of the series.
+        Name of the series.
 
     Returns
     -------
     FrameResult
-        With rows without numbers if the frame has no grains.
+        If the frame has no grains, its rows have no numbers.
 
     Raises
     ------
@@ -94,16 +94,23 @@ def compute_frame(
 
 
 def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResult:
-    has_grains = frame.grains.any()
+    has_grains = bool(frame.grains.any())
     if has_grains and frame.packing.space != plan.space:
         raise PackingError(f"{other_space(frame.packing.space, plan.space)} (`dim`)")
-    known = _frame_values(frame, plan, number, source)
+    known = {
+        "source": source,
+        "frame": number,
+        "step": frame.packing.step,
+        "time": frame.packing.time,
+        "contacts_from": frame.contacts.source,
+        **plan.strains.at(number, frame),
+    }
     if not has_grains:
         return FrameResult(source, number, frame, (), list(_empty_rows(known, plan)))
+    escaped = frame.doubts_of_escaped()
     if plan.map_blocks is not None:
         mapped, told, blocks = map_rows(frame, plan.in_frame(frame), known, f"frame {number}")
-        notes = (*frame.doubts_of_escaped(), *told)
-        return FrameResult(source, number, frame, (), mapped, notes, blocks)
+        return FrameResult(source, number, frame, (), mapped, (*escaped, *told), blocks)
     groups, columns = plan.settings.with_, plan.settings.columns
     if "forces" in groups or "state" in groups:
         refuse_forces(frame, groups)
@@ -113,17 +120,13 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
     for variant in plan.variants:
         for measurement, _ in zip(measurements, plan.rvs_of(variant), strict=False):
             for place in range(len(plan.cutoffs)):
-                # one at a time, as each holds the contacts of its variant
+                # one at a time, because each holds the contacts of its variant
                 one = VariantColumns(measurement, VARIANTS[variant], place)
                 values = {**known, "variant": variant, **one.columns()}
                 rows.append(row_of(columns, values))
                 doubts += one.notes()
-    notes = (
-        *frame.doubts_of_escaped(),
-        *(note for one in measurements for note in one.notes),
-        *joined(doubts),
-        *_large_errors(rows, plan),
-    )
+    of_scan = [note for measurement in measurements for note in measurement.notes]
+    notes = (*escaped, *of_scan, *joined(doubts), *_large_errors(rows, plan))
     return FrameResult(source, number, frame, measurements, rows, notes)
 
 
@@ -136,20 +139,12 @@ def _empty_rows(known: Mapping[str, Any], plan: Plan) -> Iterator[Row]:
             yield from [row_of(settings.columns, {**empty, **own})] * len(plan.cutoffs)
 
 
-def _frame_values(sample: Sample, plan: Plan, number: int, source: str) -> dict[str, Any]:
-    """The columns that are the same in all rows of a frame."""
-    return {
-        "source": source,
-        "frame": number,
-        "step": sample.packing.step,
-        "time": sample.packing.time,
-        "contacts_from": sample.contacts.source,
-        **plan.strains.at(number, sample),
-    }
-
-
 def _large_errors(rows: list[Row], plan: Plan) -> Iterator[Note]:
-    """Other cut-offs, RVs and the second moment are measured along lines chosen for one."""
+    """
+    A note if a scan that meets the tolerance for one row misses it for another row.
+
+    This happens for other cut-offs, other RVs and the second moment, which use the same lines.
+    """
     worst = max(rows, key=lambda row: row.alpha_vs_axial_se or 0.0)
     error, rv = worst.alpha_vs_axial_se or 0.0, worst.get(RV_COLUMN.name)
     aim, others = plan.settings.tolerance, plan.settings.lists_gaps or len(plan.rvs) > 1

@@ -1,4 +1,4 @@
-"""The frames of one source as samples: the chosen ones, and the first that has grains."""
+"""The frames of one source as samples: the chosen frames, and the first that has grains."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ Source = Packing | Series | Iterable[Packing]
 
 
 class NoChosenFrameError(SettingsError):
-    """The series has frames, but none of those that were chosen."""
+    """The series has frames, but the option ``frames`` chooses none of them."""
 
 
 class _Stream:
-    """Packings that come one after the other, for instance out of a running simulation."""
+    """Packings that come one after the other, for instance from a running simulation."""
 
     name = ""
 
@@ -41,14 +41,14 @@ class _Stream:
         self._taken = 0
 
     def __iter__(self) -> Iterator[Packing]:
-        """Those that are not taken yet; a packing that has come is kept until it is taken."""
+        """The packings that are not taken yet; they are kept until they are taken."""
         for number in count():
             if number == len(self._kept):
                 for packing in islice(self._coming, 1):
                     if not isinstance(packing, Packing):
                         raise SettingsError(f"expected packings, found {packing!r} among them")
                     self._kept.append(packing)
-            # whoever goes through them may have started another round meanwhile
+            # another iterator may have kept packings meanwhile, so compare again
             if number == len(self._kept):
                 return
             yield self._kept[number]
@@ -57,7 +57,7 @@ class _Stream:
         return self._taken + sum(1 for _ in self)
 
     def as_they_come(self) -> Iterator[Packing]:
-        """Each for the last time, so that no more of them are in memory than need be."""
+        """Take each packing, so that it is forgotten: no more are in memory than necessary."""
         while self._kept or next(iter(self), None) is not None:
             self._taken += 1
             yield self._kept.popleft()
@@ -65,19 +65,19 @@ class _Stream:
 
 class Frames:
     """
-    One source, frame by frame, for all that look at samples; a packing is a series of one.
+    The frames of one source, read when they are needed; a packing is a series of one frame.
 
-    With ``on_error="stop"`` a damaged frame is an error; with ``"skip"`` a warning names it and it
-    is left out, whether it was chosen or lies before the first frame that has grains. No frame is
-    read twice: the samples that the search for that first frame has read are used again.
+    With ``on_error="stop"`` a damaged frame is an error. With ``"skip"`` a warning names it and it
+    is left out, no matter whether it was chosen or lies before the first frame that has grains. No
+    frame is read twice: samples that the search for that first frame has read are used again.
 
     Parameters
     ----------
     source : Packing, Series or iterable of Packing
         One frame, or many.
     settings : Settings
-        ``frames``, ``on_error``, ``boundary``, ``min_contacts``, ``rattlers``,
-        ``min_force`` and ``contact_tolerance`` count.
+        Only ``frames``, ``on_error``, ``boundary``, ``min_contacts``, ``rattlers``, ``min_force``
+        and ``contact_tolerance`` are used.
 
     Raises
     ------
@@ -100,36 +100,35 @@ class Frames:
             raise SettingsError(f"frames: {what}, which nobody knows while it is followed")
         self.name = self.source.name
         self.ready: dict[int, Sample | None] = {}
-        """Chosen frames that :meth:`first` has read; None for damaged ones."""
+        """Chosen frames that :meth:`first` has read; None for damaged frames."""
 
     def __iter__(self) -> Iterator[tuple[int, Unread]]:
-        """All frames with their numbers, not read."""
+        """All frames with their numbers, unread."""
         return enumerate(self.source)
 
     @cached_property
     def chosen(self) -> range:
-        """The numbers of the chosen frames; there may be fewer."""
+        """The numbers of the chosen frames; the range may end behind the last frame."""
         return chosen_frames(self.source, self.settings.frames)
 
     def due(self) -> Iterator[tuple[int, Unread]]:
-        """The same as :meth:`as_they_come`, which waits for the frames of a series."""
-        return (one for one in self.as_they_come() if one is not None)
+        """The chosen frames with their numbers, unread; waits for frames that are still to come."""
+        return (frame for frame in self.as_they_come() if frame is not None)
 
     def as_they_come(self) -> Iterator[tuple[int, Unread] | None]:
         """
-        The chosen frames with their numbers, not read; the last time that frames are gone through.
+        The chosen frames with their numbers, unread; the frames of a stream are forgotten.
 
-        Where the next frame of a series that is followed is not there yet, None comes in its place.
+        None stands for a frame of a followed series that is not complete yet.
 
         Raises
         ------
         SettingsError
-            At the end, if there is none.
+            At the end, if there was no chosen frame.
         """
         every: Iterable[Unread | None] = self.source
         if isinstance(self.source, _Stream | FollowedSeries):
             every = self.source.as_they_come()
-        # if frames are counted from the end, all packings of a stream come here, and are kept
         chosen, found, number = self.chosen, False, 0
         for frame in every:
             if frame is None:
@@ -145,22 +144,22 @@ class Frames:
             raise self.no_such_frames()
 
     def one(self) -> tuple[int, Unread]:
-        """The first chosen frame; SettingsError if there is none."""
-        found = next((one for one in self if one[0] in self.chosen), None)
-        if found is None:
-            raise self.no_such_frames()
-        return found
+        """The first chosen frame, unread; SettingsError if there is none."""
+        for number, frame in self:
+            if number in self.chosen:
+                return number, frame
+        raise self.no_such_frames()
 
     def first(self) -> tuple[int, Unread, Sample] | None:
         """
-        The first frame that has grains, of all; None without any.
+        The first frame of the series that has grains, chosen or not; None if no frame has any.
 
         Raises
         ------
         SettingsError
-            If the boundary is that of no frame, or all particles are boundary.
+            If no frame has boundary particles, or all particles are boundary.
         """
-        particles = 0
+        has_particles = False
         for number, frame in self:
             sample = self.sample(number, frame)
             if number in self.chosen:
@@ -168,15 +167,15 @@ class Frames:
             if sample is not None and sample.grains.any():
                 tell(self.check_boundary(sample))
                 return number, frame, sample
-            particles += 0 if sample is None else len(sample.packing)
-        if particles:
+            has_particles |= sample is not None and len(sample.packing) > 0
+        if has_particles:
             named = " or ".join(rule.text for rule in self.settings.boundary)
             what = f"{named} selects all particles of every frame"
             raise SettingsError(f"boundary: {what}: no grain is left")
         return None
 
     def sample(self, number: int, frame: Unread) -> Sample | None:
-        """A frame told apart; None if it is damaged and damaged frames are skipped."""
+        """The sample of a frame; None if the frame is damaged and damaged frames are skipped."""
         if number in self.ready:
             return self.ready.pop(number)
         try:
@@ -187,24 +186,24 @@ class Frames:
             tell([Note(SKIPPED, str(error))], f"frame {number}")
             return None
 
+    def read(self, frame: Unread) -> Sample:
+        """Read a frame and sort its particles into grains, boundary and rattlers."""
+        return sample_rule(self.settings).sample(packing_of(frame))
+
     def notes(self, frame: Unread, sample: Sample) -> list[Note]:
-        """What looks wrong in a frame before anything is measured."""
+        """Doubts about a frame before anything is measured."""
         file = frame if isinstance(frame, Frame) else None
         notes = doubts_of(sample, **(file.named if file else {}))
-        # whoever makes a packing of arrays knows its cell
+        # a packing made of arrays has the cell that its maker wants
         if no_cell := cell_doubt(sample, file.carries if file else "cell"):
             notes.append(Note("no_cell", no_cell))
         return notes if self.settings.boundary else notes + boundary_hints(sample, self.settings)
 
-    def read(self, frame: Unread) -> Sample:
-        """A frame told apart, by its contacts and the boundary; raises if it is damaged."""
-        return sample_rule(self.settings).sample(packing_of(frame))
-
     def check_boundary(self, first: Sample) -> list[Note]:
         """
-        SettingsError if no frame has any of the boundary's particles; a note if one rule fits none.
+        A note for rules of the boundary that select no particle; SettingsError if no rule does.
 
-        Particles may come in later frames, so those are looked through if the ``first`` has none.
+        Rules that select no particle of the ``first`` sample are tried on all other frames.
         """
         rules = self.settings.boundary
         missing = [rule for rule in rules if not rule.select(first.packing).any()]
@@ -221,7 +220,7 @@ class Frames:
         return [Note("no_such_boundary", f"`boundary`: {message}")]
 
     def no_such_frames(self) -> SettingsError:
-        """The error for a choice that meets no frame."""
+        """The error for a choice without any frame."""
         count = len(self.source)
         if count == 0 and isinstance(self.source, FollowedSeries):
             return NoChosenFrameError(self.source.lack)
@@ -233,13 +232,13 @@ class Frames:
 
 
 def packing_of(frame: Unread) -> Packing:
-    """The packing of a frame, which is read if it lies in a file."""
+    """The packing of a frame; a frame in a file is read."""
     return frame if isinstance(frame, Packing) else frame.read()
 
 
 def sample_rule(settings: Settings) -> SampleRule:
-    """What settings say of how particles are told apart."""
-    return SampleRule(**{one.name: getattr(settings, one.name) for one in fields(SampleRule)})
+    """The settings that sort particles into grains, boundary and rattlers."""
+    return SampleRule(**{field.name: getattr(settings, field.name) for field in fields(SampleRule)})
 
 
 def _counts_from_end(frames: slice) -> bool:
@@ -247,20 +246,20 @@ def _counts_from_end(frames: slice) -> bool:
 
 
 def chosen_frames(source: Series | _Stream, frames: slice) -> range:
-    """The numbers of the frames to compute, in the order of the source."""
+    """The numbers of the chosen frames, in the order of the source."""
     if isinstance(source, Series):
         chosen = source.numbers_of(frames)
     else:
-        # packings are counted only where they must be, as some may still come
+        # packings are counted only if necessary, because some may still come
         chosen = range(len(source) if _counts_from_end(frames) else ENDLESS)[frames]
     return chosen if chosen.step > 0 else chosen[::-1]
 
 
 def of_whole(series: Series, settings: Settings) -> tuple[Series, Settings]:
     """
-    The whole of a series of which some frames are given, and settings that choose these.
+    The whole series for a slice of it, and settings that choose the frames of the slice.
 
-    Which frames are asked for decides neither RV, rmin nor L0, whichever way it is said.
+    So RV, rmin and L0 are those of the whole series, no matter how frames are chosen.
     """
     if series.is_whole:
         return series, settings
@@ -271,7 +270,7 @@ def of_whole(series: Series, settings: Settings) -> tuple[Series, Settings]:
 
 
 def boundary_hints(sample: Sample, settings: Settings) -> list[Note]:
-    """What to tell of boundary particles that are not named, or of a name that fits none."""
+    """A note if the boundary selects no particle, or if particles look like an unnamed boundary."""
     if settings.boundary:
         if sample.boundary.any():
             return []
@@ -280,44 +279,42 @@ def boundary_hints(sample: Sample, settings: Settings) -> list[Note]:
     expression = enclosing_class(sample.packing)
     if expression is None:
         return []
-    text = (
-        f"the particles with {expression} enclose the others: if they are a boundary, "
-        f'name them: `boundary="{expression}"`'
-    )
-    return [Note("unnamed_boundary", text)]
+    text = f"the particles with {expression} enclose the others: if they are a boundary, "
+    return [Note("unnamed_boundary", f'{text}name them: `boundary="{expression}"`')]
 
 
 def _values_there(sample: Sample, rules: Sequence[BoundaryRule]) -> str:
-    """Rules of a boundary that fit no particle, and the values that there are."""
+    """Rules of the boundary that select no particle, and the values that particles have."""
     named = " or ".join(rule.text for rule in rules)
     return f"{named}: {existing_values(sample.packing, rules)}"
 
 
 def samples(source: Source, **options: Any) -> Iterator[tuple[int, Sample]]:
     """
-    The chosen frames as samples, one in memory at a time, as :func:`scanfab.compute` sees them.
+    Yield the chosen frames as samples, as :func:`scanfab.compute` sees them.
 
     Parameters
     ----------
     source : Packing, Series or iterable of Packing
         One frame, or many.
     **options
-        Those of :func:`scanfab.compute`, of which ``boundary``, ``min_contacts``,
-        ``rattlers``, ``min_force``, ``contact_tolerance``, ``frames`` and ``on_error`` count.
+        Options of :func:`scanfab.compute`; only ``boundary``, ``min_contacts``, ``rattlers``,
+        ``min_force``, ``contact_tolerance``, ``frames`` and ``on_error`` are used.
 
     Yields
     ------
     number : int
-        Of the frame in the series, from 0.
+        Number of the frame in the series, from 0.
     sample : Sample
-        Its particles, told apart; contacts that no file lists are found by geometry.
+        Its particles, sorted into grains, boundary and rattlers, and its contacts, which are found
+        by geometry if no file lists them. Only one sample is in memory at a time.
 
     Raises
     ------
     ScanfabError
-        If a frame cannot be read (with ``on_error="skip"`` it is passed over), or if there is none.
+        If a frame cannot be read (with ``on_error="skip"`` it is skipped), or if there is none.
     TypeError
-        If there is no such option; names the nearest that there is.
+        If there is no such option; the message suggests the most similar name.
 
     Examples
     --------
@@ -328,7 +325,7 @@ def samples(source: Source, **options: Any) -> Iterator[tuple[int, Sample]]:
     0 Sample: 800 grains, 60 rattlers (fewer than 2 contacts)
     1 Sample: 800 grains, 54 rattlers (fewer than 2 contacts)
     """
-    # what is wrong with an option is told at once, not with the first frame
+    # no generator function: an error in an option is raised at once, not with the first frame
     frames = Frames(source, Settings(**options))
     found = ((number, frames.sample(number, frame)) for number, frame in frames.due())
     return ((number, sample) for number, sample in found if sample is not None)

@@ -18,7 +18,6 @@ from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import Frames, boundary_hints
 from scanfab.pipeline.rv import rvs_of
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.window_settings import settings_in
 from scanfab.table.row import Record
 
 
@@ -116,7 +115,7 @@ def _rv(frames: Frames, sample: Sample) -> Window | None:
     if not sample.grains.any():
         return None
     tell(frames.check_boundary(sample))
-    return rvs_of(settings_in(frames.settings, sample.packing.space), sample)[-1].window
+    return rvs_of(frames.settings.in_space(sample.packing.space), sample)[-1].window
 
 
 def _report(

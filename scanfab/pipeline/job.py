@@ -1,32 +1,33 @@
-"""The computation of a table under way: new rows, those of earlier runs, and the files for them."""
+"""The computation of a table: new rows, rows of earlier runs, and the files that hold them."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+import platform
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from importlib.metadata import version
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ReadError, SettingsError, note
 from scanfab.base.files import check_folder
 from scanfab.io.follow import FollowedSeries
+from scanfab.io.options import take_reading
 from scanfab.io.series import Series
 from scanfab.pipeline.compute import Observer, compute_frames
-from scanfab.pipeline.frames import NoChosenFrameError, chosen_frames
+from scanfab.pipeline.frames import NoChosenFrameError, chosen_frames, of_whole
 from scanfab.pipeline.record import (
     FREE,
     FrameRows,
     PartFile,
     Record,
-    differing_settings,
-    hash_of,
+    asked_for,
     input_entry,
     named_files,
     read_table,
-    versions_used,
     write_manifest,
 )
 from scanfab.pipeline.settings import Settings
@@ -38,59 +39,72 @@ from scanfab.table.writing import ALL, Excerpt, check_output, manifest_of, write
 
 Advance = Callable[[], object]
 
+# packages whose versions a manifest lists
+PACKAGES = (
+    "scanfab", "numpy", "numba", "scipy", "meshio", "pyvista", "click", "rich", "h5py",
+    "matplotlib", "jinja2", "polars",
+)  # fmt: skip
+
 
 @dataclass(eq=False)
 class Job:
     """
-    One table of some series, computed frame by frame; an interrupted one can be gone on with.
+    One table of one or several series, computed frame by frame; it can resume an interrupted run.
 
-    Each frame that FILE.part or a complete FILE holds is taken over; all others are computed. In
-    the end FILE is written with all rows in the order of series and frames.
+    Frames that FILE.part or a complete FILE holds are taken over, and all others are computed. At
+    the end FILE is written with all rows, in the order of series and frames.
 
     Raises
     ------
     SettingsError
-        If two series have one name, or a file cannot be written where it is asked for.
+        If two series have the same name, if they differ in options of reading or in the frames that
+        they stand for, or if a file cannot be written.
     """
 
     series: Sequence[Series]
-    """With names of their own."""
+    """Slices of series become whole series; then `settings` choose the frames of the slices."""
     settings: Settings
-    """Of all of them."""
-    asked: dict[str, Any]
-    """What decides the bytes of the table: from :func:`asked_for`."""
     output: Path | None = None
-    """The file of the rows; without it they are to be taken from :meth:`rows`."""
+    """FILE; without it the rows must be taken from :meth:`rows`."""
     excerpt: Excerpt = ALL
-    """Which columns of the rows are written, and with how many digits."""
+    """Columns and digits of the rows in FILE."""
     resume: bool = False
-    """Whether to go on with what earlier runs have left."""
+    """Whether to take over the rows of earlier runs."""
     manifest_path: Path | None = None
-    """A manifest there too."""
+    """A further file for the manifest."""
     more: Mapping[str, Any] = field(default_factory=dict)
     """Further entries of the manifest."""
     observers: Sequence[Observer] = ()
-    """For each series what is called with the result of each frame that is computed now."""
+    """One function for each series, called with the result of each frame that is computed now."""
     told: Told = field(default_factory=Told)
-    """What is told meanwhile, for the manifest."""
+    """Warnings and notes so far, for the manifest."""
     executor: Executor | None = None
     """As for :func:`scanfab.compute`."""
 
+    asked: dict[str, Any] = field(init=False)
+    """The settings that decide the bytes of the table, from :func:`asked_for`."""
     finished: FrameRows = field(default_factory=dict, init=False)
-    """The rows of the finished frames, those of earlier runs among them."""
+    """The rows of all finished frames, including those of earlier runs."""
     taken_over: int = field(default=0, init=False)
-    """How many frames earlier runs have finished."""
+    """Number of frames that earlier runs have finished."""
     is_over: bool = field(default=False, init=False)
-    """Whether all rows have come: the table is being made of them."""
-    found_void_fabric: bool = field(default=False, init=False)
-    """Whether any row has one."""
-    warned_before: Sequence[str] | None = field(default=None, init=False)
-    """The warnings of the complete FILE that is gone on with, if there is one."""
+    """Whether all frames are finished, and only the table is still to be written."""
+    resumed: Record | None = field(default=None, init=False)
+    """The complete FILE that is resumed, if there is one."""
 
     def __post_init__(self) -> None:
+        parts = [of_whole(one, self.settings) for one in self.series]
+        self.series, self.settings = [one for one, _ in parts], parts[0][1]
+        same = parts[0][0].reading, self.settings
+        if any((one.reading, settings) != same for one, settings in parts):
+            must = "must be read with the same options, and be parts of the same frames"
+            raise SettingsError(f"the series of one table {must}: make a table of each")
         names = [one.name for one in self.series]
         if twice := {name for name in names if names.count(name) > 1}:
             raise SettingsError(f"{min(twice)}: named twice among the series of one table")
+        sources = [source for one in self.series for source in one.sources or (one.name,)]
+        reading = take_reading(dict(self.series[0].reading))
+        self.asked = asked_for(sources, reading, self.settings, self.excerpt)
         if self.manifest_path is not None:
             check_folder(self.manifest_path)
         if self.output is not None:
@@ -98,37 +112,45 @@ class Job:
             self._part = PartFile(self.output)
 
     @property
+    def found_void_fabric(self) -> bool:
+        """Whether any row has a void fabric; also if a FILE that is resumed has no such columns."""
+        names = ("alpha_vs", "alpha_vs_axial")
+        if self.resumed and self.resumed.rows and self.resumed.columns.isdisjoint(names):
+            return True
+        rows = (row for rows in self.finished.values() for row in rows)
+        return any(row[name] is not None for row in rows for name in names)
+
+    @property
     def is_good(self) -> bool:
-        """Whether no frame was skipped, and one has a void fabric."""
-        # a table without frames, of a job that none was left for, lacks nothing
+        """Whether no frame was skipped and any row has a void fabric, or there are no frames."""
         return not self.told.skipped and (self.found_void_fabric or not self.finished)
 
     @property
     def done(self) -> int:
-        """How many frames are finished, those of earlier runs among them."""
+        """Number of finished frames, including those of earlier runs."""
         return len(self.finished)
 
     @property
     def every_row(self) -> list[Row]:
-        """The rows of all finished frames, in the order of the series and of their frames."""
+        """The rows of all finished frames, in the order of series and frames."""
         place = {one.name: number for number, one in enumerate(self.series)}
         frames = sorted(self.finished, key=lambda key: (place[key[0]], key[1]))
         return [row for key in frames for row in self.finished[key]]
 
     def frames(self) -> int:
-        """About how many frames there are to be finished, those of earlier runs among them."""
+        """Estimate the number of frames of the table, including those of earlier runs."""
         frames = self.settings.frames
         expected = sum(len(range(one.frames_expected())[frames]) for one in self.series)
         return max(expected, self.done)
 
     @contextmanager
-    def begun(self, needed: Iterable[str] = ()) -> Iterator[None]:
+    def begun(self, needed: Collection[str] = ()) -> Iterator[None]:
         """
-        Keep other runs away from the file in the block; if resumed, find what they have left.
+        Keep other runs away from FILE inside the block; to resume, take over the finished rows.
 
         Parameters
         ----------
-        needed : iterable of str, optional
+        needed : collection of str, optional
             Columns that a complete FILE must have.
 
         Raises
@@ -136,7 +158,7 @@ class Job:
         ScanfabError
             If another run writes to the file.
         SettingsError
-            If the rows there were made with other settings or of other inputs.
+            If the rows were made with other settings or of other inputs.
         """
         if self.output is None:
             yield
@@ -154,12 +176,12 @@ class Job:
 
     def write(self, advance: Advance = lambda: None) -> None:
         """
-        Write the rows to the file as they come, in a block of :meth:`begun`.
+        Compute the rows and write them to FILE, inside a block of :meth:`begun`.
 
         Raises
         ------
         ScanfabError
-            If a frame cannot be computed; what is finished stays in FILE.part.
+            If a frame cannot be computed; finished frames stay in FILE.part.
         OSError
             If the file cannot be written to.
         """
@@ -172,28 +194,28 @@ class Job:
             self._part.begin(self.asked)
         known = set[Path]()
         for one, rows in self._computed(advance):
-            files = [*named_files(self.asked), *one.files(rows[0].frame, known)]
-            new = [file for file in dict.fromkeys(files) if file not in known]
-            self._part.add([input_entry(file) for file in new], rows)
-            known.update(new)
+            files = dict.fromkeys((*named_files(self.asked), *one.files(rows[0].frame, known)))
+            self._part.add([input_entry(file) for file in files if file not in known], rows)
+            known.update(files)
         if is_table and not self.finished and read_rows(self.output):
-            raise SettingsError(
-                f"{self.output}: this run has no rows, so the table that is there stays as it is: "
-                f"choose other `frames`, or another `output=FILE`"
-            )
+            what = "this run has no rows, so the table that is there stays as it is"
+            choose = "choose other `frames`, or another `output=FILE`"
+            raise SettingsError(f"{self.output}: {what}: {choose}")
         columns = self.settings.columns
         write_rows(self.output, self.every_row, columns, self.excerpt, self.save_manifests)
         self._part.remove()
 
     def save_manifests(self) -> None:
-        """Write the manifest where it was asked for, and beside the file."""
+        """Write the manifest beside FILE, and where the user asked for it."""
         files = {*named_files(self.asked), *(path for one in self.series for path in one.files())}
+        versions = {name: version(name) for name in PACKAGES}
+        before = [] if self.resumed is None else map(str, self.resumed.manifest["warnings"])
         found = {
             "settings": self.asked,
             "seed": self.asked["seed"],
-            "versions": versions_used(),
+            "versions": {"python": platform.python_version(), **versions},
             "inputs": [input_entry(path) for path in sorted(files)],
-            "warnings": list(dict.fromkeys([*(self.warned_before or ()), *self.told.warnings])),
+            "warnings": list(dict.fromkeys([*before, *self.told.warnings])),
             "notes": self.told.notes,
             # of the whole series, so that a merge of parts knows which frames are missing
             "frames": {one.name: len(one) for one in self.series},
@@ -202,7 +224,7 @@ class Job:
         if self.manifest_path is not None:
             write_manifest(self.manifest_path, found)
         if self.output is not None:
-            outdated = self.output if self.warned_before is None else None
+            outdated = self.output if self.resumed is None else None
             write_manifest(manifest_of(self.output), found, outdated)
 
     def _computed(self, advance: Advance) -> Iterator[tuple[Series, list[Row]]]:
@@ -210,44 +232,42 @@ class Job:
         for place, one in enumerate(self.series):
             done = {frame for source, frame in self.finished if source == one.name}
             observe = self.observers[place] if self.observers else None
-            words: Any = {"done": done, "observe": observe, "executor": self.executor}
+            computed = compute_frames(
+                one, self.settings, done=done, observe=observe, executor=self.executor
+            )
             try:
-                for rows in compute_frames(one, self.settings, **words):
+                for rows in computed:
                     yield one, rows
-                    self._finish({(one.name, rows[0].frame): rows})
+                    self.finished[one.name, rows[0].frame] = rows
                     advance()
             except NoChosenFrameError as none:
-                # of an array of more jobs than frames some have nothing to do
+                # an array of more jobs than frames has jobs without frames
                 note(f"{str(none).removeprefix('frames: ')}: it has no row in this table")
         self.is_over = True
         for one in self.series:
             if isinstance(one, FollowedSeries):
                 one.end()
 
-    def _finish(self, frames: FrameRows) -> None:
-        self.finished |= frames
-        every = (row for rows in frames.values() for row in rows)
-        self.found_void_fabric |= any(
-            (row.alpha_vs, row.alpha_vs_axial) != (None, None) for row in every
-        )
-
-    def _take_over(self, output: Path, needed: Iterable[str]) -> None:
-        """Take over the frames of a complete FILE, and of FILE.part."""
-        # the series as they are now, also those that are followed
+    def _take_over(self, output: Path, needed: Collection[str]) -> None:
+        """Take over the frames of a complete FILE, and those of FILE.part."""
+        # a followed series counts with the files that exist now
         series = [one.as_it_is if isinstance(one, FollowedSeries) else one for one in self.series]
         if output.is_file():
             try:
                 self._take_table(read_table(output), series, needed)
             except (SettingsError, ReadError):
-                # the run that was interrupted last has left FILE.part, whatever made FILE
+                # then FILE is older: the run that was interrupted last has left FILE.part
                 if not self._part.frames:
                     raise
         if self._part.frames:
             frames = self._checked(self._part.read(), series)
             chosen = {one.name: chosen_frames(one, self.settings.frames) for one in series}
-            self._finish({key: rows for key, rows in frames.items() if key[1] in chosen[key[0]]})
+            self.finished |= {key: rows for key, rows in frames.items() if key[1] in chosen[key[0]]}
 
-    def _take_table(self, record: Record, series: Sequence[Series], needed: Iterable[str]) -> None:
+    def _take_table(
+        self, record: Record, series: Sequence[Series], needed: Collection[str]
+    ) -> None:
+        """Take over the frames of a complete FILE, and its choice of frames."""
         frames = self._checked(record, series, FREE)
         lacking = [name for name in needed if name not in record.columns]
         if frames and lacking:
@@ -256,16 +276,13 @@ class Job:
         joined = _joined_frames(record, self.settings.frames, [len(one) for one in series])
         self.settings = replace(self.settings, frames=joined)
         self.asked = {**self.asked, "frames": as_written(joined)}
-        self.warned_before = [str(text) for text in record.manifest["warnings"]]
-        self._finish(frames)
-        # a choice of columns may say nothing of the void fabric
-        if not {"alpha_vs", "alpha_vs_axial"} & record.columns:
-            self.found_void_fabric |= bool(frames)
+        self.resumed = record
+        self.finished |= frames
 
     def _checked(
         self, record: Record, series: Sequence[Series], free: Collection[str] = ()
     ) -> FrameRows:
-        """The complete frames of a record; SettingsError if this run would compute others."""
+        """The complete frames of a record; SettingsError if this run would compute other rows."""
         for reason in _objections(record, self.asked, series, free):
             advice = "name another `output=FILE`, or leave out `resume` to compute all again"
             raise SettingsError(f"{record.path}: `resume` cannot go on with it: {reason}: {advice}")
@@ -277,84 +294,69 @@ def _objections(
     record: Record, asked: Mapping[str, Any], series: Sequence[Series], free: Collection[str]
 ) -> Iterator[str]:
     """
-    Why the rows of a record are not those that a run would compute now; nothing if they are.
+    Reasons why a run would compute other rows than those of a record; none if it would not.
 
-    New frames may have come behind the last one, as files or at the end of the last file. A file
-    whose frame was skipped may have been mended, and a file of cells or strains may have new lines.
+    These changes are allowed: new frames behind the last one, as files or at the end of the last
+    file; a repaired file whose frame was skipped; new lines in a file of cells or strains.
 
     Parameters
     ----------
     record : Record
-        Of an earlier run.
+        The record of an earlier run.
     asked : mapping
         The settings of this run.
     series : sequence of Series
-        What is read now.
+        The series of this run.
     free : collection of str
         Settings that may differ.
     """
-    if differing := differing_settings(record.manifest["settings"], asked, free):
+    if differing := record.differing(asked, free):
         yield f"it was made with other settings ({differing})"
     if not record.rows:
         return
     for source in sorted({source for source, _ in record.rows} - {one.name for one in series}):
         yield f"its source {source} is not named now"
-    before = {str(one.get("path")): one for one in record.manifest["inputs"]}
     named, cells = named_files(asked), [one.cells.path for one in series if one.cells is not None]
     read = {str(file) for file in (*named, *(file for one in series for file in one.files()))}
-    for gone in sorted(before.keys() - read):
+    for gone in sorted(record.inputs.keys() - read):
         yield f"{gone} is not among the files that are read now"
     for one in series:
-        yield from _changed_frames(one, before, record.rows)
-    # new lines may name the strain of a frame that had none
+        yield from _changed_files(one, record)
+    # a new line may give a strain to a frame that had none
     lacks_strain = any(row.strain is None for rows in record.rows.values() for row in rows)
     for file in (*named, *cells):
         may_grow = file in cells or (str(file) == asked["strain"] and not lacks_strain)
-        if not _is_same(file, before, may_grow, by_lines=True):
+        if not record.has(file, may_grow, by_lines=True):
             yield f"{file} has changed since, in more than new lines at its end"
 
 
-def _changed_frames(series: Series, before: Mapping[str, Any], rows: FrameRows) -> Iterator[str]:
-    """What has changed of the files of a series, and of those read with them."""
-    steps = [step for step, file in series.grains.files.items() if str(file) in before]
-    last = max((step for step in steps if step is not None), default=None)
-    files = [(s, f) for one in (series.grains, *series.contacts) for s, f in one.files.items()]
-    for step, file in files:
-        if str(file) not in before:
-            if steps and (step is None or last is None or step <= last):
-                yield f"{file} is new, and not behind the last frame"
-            continue
-        beside = series.beside(file) if series.grains.files.get(step) == file else []
-        changed = [one for one in beside if not _is_same(one, before)]
-        if not _is_same(file, before, may_grow=step is None or step == last):
-            changed.append(file)
-        # a broken file counts as one frame: if it has more now, later frames have other numbers
-        numbers = [frame.number for frame in series if changed and frame.name_step == step]
-        if changed and (len(numbers) != 1 or (series.name, numbers[0]) in rows):
-            yield f"{changed[0]} has changed since, or is new beside the grains"
-
-
-def _is_same(
-    file: Path, before: Mapping[str, Any], may_grow: bool = False, by_lines: bool = False
-) -> bool:
-    """Whether a file is what it was, or begins as it was: with whole lines if ``by_lines``."""
-    known, found = before.get(str(file), {}), file.stat()
-    size = known.get("size", math.inf)
-    if found.st_size < size or (found.st_size > size and not may_grow):
-        return False
-    digest, ends_line = hash_of(file, size, found.st_mtime_ns)
-    # a number at the end may have got more digits
-    return digest == known.get("sha256") and (ends_line or not by_lines)
+def _changed_files(series: Series, record: Record) -> Iterator[str]:
+    """Changes in the files of a series up to the last frame of a record; not in its cells."""
+    finished = [frame for source, frame in record.rows if source == series.name]
+    frames = list(islice(series, max(finished, default=-1) + 1))
+    families = (series.grains, *series.contacts)
+    steps = {file: step for family in families for step, file in family.files.items()}
+    known = [step for step, file in series.grains.files.items() if str(file) in record.inputs]
+    files = set(series.files(len(frames) - 1)) if frames else set()
+    for file in sorted(files - ({series.cells.path} if series.cells is not None else set())):
+        step = steps.get(file, -1)
+        if str(file) not in record.inputs:
+            yield f"{file} is new, and not behind the last frame"
+        elif not record.has(file, may_grow=step in [None, *known[-1:]]):
+            # a broken file counts as one frame: if it has more now, later frames have other numbers
+            numbers = [frame.number for frame in frames if frame.name_step == step]
+            if len(numbers) != 1 or numbers[0] in finished:
+                yield f"{file} has changed since"
 
 
 def _joined_frames(record: Record, chosen: slice, counts: Sequence[int]) -> slice:
     """
-    The frames of a complete FILE and those chosen now, of series of so many frames, as one slice.
+    One slice for the frames of a complete FILE and those chosen now; ``counts`` are all frames.
 
     Raises
     ------
     SettingsError
-        If together they make none: no frame of FILE may be lost.
+        If there is no such slice: no frame of FILE may be lost.
     """
     known = {frame for _, frame in record.rows}
     now = {frame for count in counts for frame in range(count)[chosen]}

@@ -1,4 +1,4 @@
-"""merge_tables(): the parts of a job array as one table, with the bytes of one run."""
+"""merge_tables(): join the parts of a job array into one table, with the bytes of one run."""
 
 from __future__ import annotations
 
@@ -6,40 +6,16 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from scanfab.base.column import Column
 from scanfab.base.errors import ReadError, SettingsError, warn
 from scanfab.io.families import PathLike
 from scanfab.io.options import parse_frames
-from scanfab.pipeline.record import (
-    FREE,
-    Record,
-    differing_settings,
-    is_unfinished,
-    part_of,
-    read_table,
-    write_manifest,
-)
+from scanfab.pipeline.record import FREE, Record, part_of, read_table, write_manifest
 from scanfab.pipeline.values import as_written
 from scanfab.table.row import Row
 from scanfab.table.table import Table
 from scanfab.table.writing import Excerpt, check_output, manifest_of, write_rows
-
-
-class Merged(NamedTuple):
-    """The rows of one table, and how it is written."""
-
-    rows: list[Row]
-    columns: list[Column]
-    """Those that all parts have."""
-    excerpt: Excerpt
-    manifest: dict[str, Any]
-
-    def save(self, output: Path) -> None:
-        """Write the table and its manifest; each is complete or untouched."""
-        write = partial(write_manifest, manifest_of(output), self.manifest)
-        write_rows(output, self.rows, self.columns, self.excerpt, write)
 
 
 def merge_tables(
@@ -49,21 +25,21 @@ def merge_tables(
     frames: str | int | slice | None = None,
 ) -> Table:
     """
-    The tables of a job array as one table: the rows, and the bytes, of one run.
+    Join the tables of a job array into one table, with the rows and bytes of a single run.
 
-    Each job computes some frames (``scanfab compute dumps/ --frames I::N -o part_I.csv``). The RV,
-    ``rmin`` and the initial length are those of the whole series in every part, so the rows of all
-    parts in the order of their frames are the table of a single run. Parts of several series become
-    a table of all of them, one series after the other, in the order in which they are named.
+    Each job computes some frames (``scanfab compute dumps/ --frames I::N -o part_I.csv``). RV,
+    ``rmin`` and initial length come from the whole series in every part, so the rows of all parts
+    in the order of their frames are the table of a single run. Parts of several series become one
+    table, one series after the other in the order in which they are named.
 
     Parameters
     ----------
     parts : path or sequence of paths
         Tables of any format, each with its manifest ``PART.manifest.json`` beside it.
     output : path, optional
-        A file for the table; its manifest is written beside it. The suffix is its format.
+        A file for the table; its manifest is written beside it. The suffix decides the format.
     frames : str, int or slice, optional
-        Which frames of each series the table is to have, by default all.
+        Which frames of each series the table must have (default: all).
 
     Returns
     -------
@@ -73,8 +49,8 @@ def merge_tables(
     Raises
     ------
     ReadError
-        If a part is not finished, was made with other settings or of other files, or differs from
-        another one in a frame that both have, or if a frame is in no part; nothing is written.
+        If a part is not finished, was made with other settings or of other files, or has other
+        values than another part for the same frame; or if a frame is in no part.
     SettingsError
         If the output cannot be a table, or is one of the parts.
 
@@ -92,73 +68,70 @@ def merge_tables(
     True
     """
     named = [parts] if isinstance(parts, str | os.PathLike) else parts
-    paths = [Path(one) for one in named]
-    if output is not None:
-        check_no_part(Path(output), paths)
-    found = merged(paths, parse_frames(frames))
-    if output is not None:
-        found.save(Path(output))
-    return Table(found.rows, found.columns)
-
-
-def check_no_part(output: Path, paths: Sequence[Path]) -> None:
-    """SettingsError if the output cannot be written, or would replace a part."""
-    check_output(output)
-    if output.resolve() in [path.resolve() for path in paths]:
-        raise SettingsError(f"{output}: is one of the parts: name another `output=FILE`")
-
-
-def merged(paths: Sequence[Path], frames: slice) -> Merged:
-    """The table that :func:`merge_tables` makes of some parts."""
+    paths = list(dict.fromkeys(map(Path, named)))
     if not paths:
         raise SettingsError("expected the parts of a table, found none")
-    parts = [_read(path) for path in dict.fromkeys(paths)]
-    first, asked = parts[0], parts[0].manifest["settings"]
-    inputs: dict[str, tuple[Mapping[str, Any], Path]] = {}
-    counts: dict[str, int] = {}
-    for part in parts:
-        if differing := differing_settings(asked, part.manifest["settings"], FREE):
-            raise ReadError(f"{part.path}: has other settings ({differing}) than {first.path}")
-        for one in part.manifest["inputs"]:
-            before, other = inputs.setdefault(str(one.get("path")), (one, part.path))
-            if before.get("sha256") != one.get("sha256"):
-                name = f"{one.get('path')} has changed between the jobs"
-                raise ReadError(f"{part.path}: {name} of it and of {other}: run them again")
-        for source, count in part.manifest["frames"].items():
-            counts[source] = max(count, counts.get(source, 0))
+    chosen = parse_frames("frames", frames)
+    if output is not None:
+        check_output(Path(output))
+        if Path(output).resolve() in [path.resolve() for path in paths]:
+            raise SettingsError(f"{output}: is one of the parts: name another `output=FILE`")
+    records = [_read(path) for path in paths]
+    manifest = _joined_manifest(records, chosen)
     rows = [
         row
-        for source, count in counts.items()
-        for frame in sorted(range(count)[frames])
-        for row in _rows_of(source, frame, parts)
+        for source, count in manifest["frames"].items()
+        for frame in sorted(range(count)[chosen])
+        for row in _rows_of(source, frame, records)
     ]
-    sources = _each_once(part.manifest["settings"]["sources"] for part in parts)
-    manifest = {
-        **first.manifest,
-        "settings": {**asked, "frames": as_written(frames), "sources": sources},
+    asked, declared = manifest["settings"], records[0].settings.columns
+    fields = asked.get("fields") or [column.name for column in declared]
+    lists = [record.columns for record in records if record.rows]
+    fields = tuple(name for name in fields if all(name in names for names in lists))
+    excerpt = Excerpt(fields, asked.get("digits", Excerpt.digits))
+    if output is not None:
+        save = partial(write_manifest, manifest_of(Path(output)), manifest)
+        write_rows(Path(output), rows, declared, excerpt, save)
+    return Table(rows, excerpt.columns(declared))
+
+
+def _joined_manifest(records: Sequence[Record], frames: slice) -> dict[str, Any]:
+    """The manifest of the merged table; ReadError if settings or inputs of the parts differ."""
+    first, manifests = records[0], [record.manifest for record in records]
+    inputs: dict[str, tuple[Mapping[str, Any], Path]] = {}
+    counts: dict[str, int] = {}
+    for record in records:
+        if differing := first.differing(record.manifest["settings"], FREE):
+            raise ReadError(f"{record.path}: has other settings ({differing}) than {first.path}")
+        for path, entry in record.inputs.items():
+            before, part = inputs.setdefault(path, (entry, record.path))
+            if before.get("sha256") != entry.get("sha256"):
+                what = f"{path} has changed between the jobs of it and of {part}"
+                raise ReadError(f"{record.path}: {what}: run them again")
+        # the manifest of an older version does not say how many frames each series has
+        last = [(source, frame + 1) for source, frame in record.rows]
+        for source, count in (*record.manifest["frames"].items(), *last):
+            counts[source] = max(count, counts.get(source, 0))
+
+    def each_once(lists: Iterable[Iterable[Any]]) -> list[str]:
+        return list(dict.fromkeys(str(item) for items in lists for item in items))
+
+    sources = each_once(one["settings"]["sources"] for one in manifests)
+    return {
+        **manifests[0],
+        "settings": {**manifests[0]["settings"], "frames": as_written(frames), "sources": sources},
         "inputs": [inputs[path][0] for path in sorted(inputs)],
-        "warnings": _each_once(part.manifest["warnings"] for part in parts),
-        "notes": _each_once(part.manifest["notes"] for part in parts),
+        "warnings": each_once(one["warnings"] for one in manifests),
+        "notes": each_once(one["notes"] for one in manifests),
         "frames": counts,
     }
-    columns, lists = first.settings.columns, [part.columns for part in parts if part.rows]
-    fields = asked.get("fields") or [one.name for one in columns]
-    fields = [name for name in fields if all(name in names for names in lists)]
-    excerpt = Excerpt(tuple(fields), asked.get("digits", Excerpt.digits))
-    return Merged(rows, excerpt.columns(columns), excerpt, manifest)
-
-
-def _each_once(lists: Iterable[Iterable[Any]]) -> list[str]:
-    return list(dict.fromkeys(str(one) for some in lists for one in some))
 
 
 def _read(path: Path) -> Record:
     """The record of a part; ReadError if it is not finished."""
-    if is_unfinished(path):
-        raise ReadError(
-            f"{path}: is not finished, as {part_of(path).name} is there: the same command with "
-            f"`resume` goes on with it"
-        )
+    if part_of(path).exists():
+        how = "the same command with `resume` goes on with it"
+        raise ReadError(f"{path}: is not finished, as {part_of(path).name} is there: {how}")
     if not path.exists():
         raise ReadError(f"{path}: there is no such part: run its job")
     try:
@@ -174,20 +147,19 @@ def _read(path: Path) -> Record:
 
 
 def _rows_of(source: str, frame: int, parts: Sequence[Record]) -> list[Row]:
-    """The rows of a frame; none if its job has skipped it, and ReadError if they are missing."""
+    """The rows of a frame, empty if its job skipped it; ReadError if they are missing."""
     what, key = f"frame {frame} of {source}", (source, frame)
     having = [part for part in parts if key in part.rows]
     for part in having[1:]:
         for before, now in zip(having[0].rows[key], part.rows[key], strict=True):
             if differing := [name for name in before if before[name] != now[name]]:
-                name, first = differing[0], having[0].path
+                name, other = differing[0], f"{what} has other values than in {having[0].path}"
                 values = f"{name} is {now[name]} here and {before[name]} there"
-                raise ReadError(f"{part.path}: {what} has other values than in {first}: {values}")
+                raise ReadError(f"{part.path}: {other}: {values}")
     if having:
         return having[0].rows[key]
     for part in parts:
-        count = part.manifest["frames"].get(source, 0)
-        if frame in range(count)[part.settings.frames]:
+        if frame in range(part.manifest["frames"].get(source, 0))[part.settings.frames]:
             if part.settings.on_error != "skip":
                 raise ReadError(f"{part.path}: lacks {what}: run its job again")
             warn(f"{part.path}: {what} was skipped, see its manifest")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.option import option, options_of, reading, running
 from scanfab.io.files import without_temporary
 from scanfab.io.options import READING_OPTIONS
+from scanfab.io.writer import installed_writers
 from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.pipeline.settings import Settings
 
@@ -79,19 +79,13 @@ class Output:
     """
 
 
-def _writer_names() -> Iterable[str]:
-    from scanfab.io.writer import installed_writers
-
-    return installed_writers()
-
-
 @dataclass
 class Other:
     """Options of the other commands, which compute no table."""
 
     frame: int = reading(default=0, decides=False, metavar="K")
     """Which frame; a negative number counts from the end."""
-    to: str | None = running(metavar="NAME", choices=_writer_names, first=True)
+    to: str | None = running(metavar="NAME", choices=installed_writers, first=True)
     """Format to write (default: from the suffix of OUT); scanfab formats lists all formats."""
 
     strain_max: float | None = running(group="fabric")
@@ -123,9 +117,9 @@ def as_options(message: str | Exception) -> str:
     """
     Rewrite a message of the library, which names Python arguments, for the command line.
 
-    Data from standard input is called so, not by the temporary file that holds it. A SettingsError
-    begins with the argument that is wrong. Other messages may begin with a file name that happens
-    to be the name of an option, so their first word stays.
+    The name of the temporary file that holds standard input is replaced as well. A SettingsError
+    begins with the argument that is wrong. Other messages may begin with the name of a file, which
+    may look like an option, so their first word stays.
 
     Examples
     --------

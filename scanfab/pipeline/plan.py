@@ -19,7 +19,6 @@ from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.pipeline.rv import RV, Deformation, doubts_of_rv, rvs_of
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import Strains
-from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.directions import DirectionRule, usual_rule
 
 # number of replicates of a fixed scan, and least number of an auto scan
@@ -159,7 +158,7 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     """
     refuse_impossible(sample)
     packing = sample.packing
-    settings = settings_in(settings, packing.space)
+    settings = settings.in_space(packing.space)
     plan = plan_without_grains(settings, sample)
     radii = packing.radius[sample.grains]
     lengths = {"rmin": float(radii.min()), "rmean": float(radii.mean()), "rmax": float(radii.max())}

@@ -1,24 +1,24 @@
 """
-Which rows of a table are there, and what made them: settings, versions, inputs with size and hash.
+Finished rows of a table, and what made them: settings, versions, inputs with size and hash.
 
-FILE.manifest.json says it of a complete FILE, and FILE.part of its own rows: both are read as a
-:class:`Record`. By it a run that goes on with finished rows, and a merge of several tables, tell
-whether the rows are those that they would compute now.
+A :class:`Record` is read from a complete FILE with its FILE.manifest.json, or from the FILE.part of
+an interrupted run. It tells a run that resumes, and a merge of several tables, whether these rows
+are the ones that would be computed now.
 
 FILE.part is a text that grows with each finished frame. Its first line holds the settings of the
 run. Each further line holds one frame: its rows, with all columns and digits, and size and hash of
-the input files that no earlier frame was made of. A last line that was not written to its end is of
-a frame that is not finished. At the end of the run the manifest is written, then FILE appears in
-one step, and FILE.part is removed last: a run is finished once FILE is there and not older than
-FILE.part.
+the input files that no earlier frame was made of. A last line without its end belongs to a frame
+that was not finished. At the end of the run the manifest is written, then FILE appears in one step,
+and FILE.part is removed last.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
-import platform
+import shlex
 import shutil
 import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -32,9 +32,12 @@ from typing import IO, Any, NamedTuple
 from scanfab.base.ending import undone_at_end
 from scanfab.base.errors import ReadError, SettingsError, note
 from scanfab.base.files import locked, named_errors, whole_file
-from scanfab.base.option import options_of
-from scanfab.base.spelling import counted
-from scanfab.pipeline.maps.settings import MapSettings, is_map
+from scanfab.base.option import flag_of, options_of
+from scanfab.base.spelling import counted, shortest
+from scanfab.io.options import READING_OPTIONS
+from scanfab.io.series import Series
+from scanfab.io.sources import READING, open_sources
+from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import SHAPES, STRAIN_MODES, as_written
 from scanfab.table.columns import row_of
@@ -42,51 +45,68 @@ from scanfab.table.formats import json_line, read_rows
 from scanfab.table.row import Row
 from scanfab.table.writing import ALL, Excerpt, manifest_of
 
-PACKAGES = (
-    "scanfab", "numpy", "numba", "scipy", "meshio", "pyvista", "click", "rich", "h5py",
-    "matplotlib", "jinja2", "polars",
-)  # fmt: skip
-# Settings that may differ where rows are taken over from a complete table or merged: such rows are
-# of other frames, or of other series, and their inputs are compared by content.
+# Settings that may differ if rows come from a complete table: they say which frames and which
+# series were computed, and the inputs are compared by their content.
 FREE = ("frames", "sources")
-# entries of a manifest that are lists, and may be missing in one of an older version
+# entries of a manifest that are lists, and may be missing in the manifest of an older version
 LISTS = ("inputs", "warnings", "notes")
-# bytes of a file that are read at a time
+# options that take their numbers one by one
+APART = ("rv_center", "rv_size", "cell")
+# a file is read by so many bytes at a time
 PIECE = 1 << 20
+# errors that a damaged JSON file causes
+DAMAGED = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
 
 FrameRows = dict[tuple[str, int], list[Row]]
-"""The rows of each frame, by its source and number."""
+"""The rows of each frame, by source and number of the frame."""
 
 
 class Record(NamedTuple):
-    """Finished rows by source and frame, and what made them."""
+    """Finished rows, and what made them."""
 
     path: Path
-    """Of the table, or of its FILE.part."""
+    """The table, or its FILE.part."""
     settings: Settings
     manifest: dict[str, Any]
-    """Of FILE.part only ``settings``, ``inputs`` and ``frames``."""
+    """The manifest of a table; of a FILE.part only the entries ``settings`` and ``inputs``."""
+    inputs: dict[str, dict[str, Any]]
+    """The entries of the inputs in the manifest, by path."""
     rows: FrameRows
-    """The rows of a frame may be fewer than it has."""
+    """Rows of a damaged table may be fewer than a frame has."""
     columns: frozenset[str]
-    """Those that were written; none without a row."""
+    """The columns that were written; empty if there is no row."""
 
     @classmethod
     def of(cls, path: Path, manifest: dict[str, Any], rows: Sequence[Mapping[str, Any]]) -> Record:
-        """A record of rows as they were read; SettingsError for settings that cannot be used."""
-        found = FrameRows()
+        """Make a record of rows as they were read; SettingsError if the settings are invalid."""
         try:
             settings = restored_settings(manifest["settings"])
         except SettingsError as error:
-            what = "the settings of its manifest cannot be used"
-            raise SettingsError(f"{path}: {what}: {error}") from None
+            raise SettingsError(f"{path}: {error}") from None
+        found = FrameRows()
         for row in rows:
             complete = row_of(settings.columns, row)
             found.setdefault((row["source"], row["frame"]), []).append(complete)
-        # a manifest of an older version does not say how many frames each series has
-        counts = manifest.get("frames") or {source: frame + 1 for source, frame in found}
+        inputs = {str(entry.get("path")): entry for entry in manifest["inputs"]}
         columns = frozenset(rows[0] if rows else ())
-        return cls(path, settings, {**manifest, "frames": counts}, found, columns)
+        return cls(path, settings, manifest, inputs, found, columns)
+
+    def differing(self, asked: Mapping[str, Any], free: Collection[str] = ()) -> str:
+        """The names of the settings that differ from others, except the ``free`` ones."""
+        before = self.manifest["settings"]
+        names = {name for name in (*before, *asked) if before.get(name) != asked.get(name)}
+        words = {"scanfab": "version of scanfab"}
+        return ", ".join(sorted(words.get(name, name) for name in names - {*free}))
+
+    def has(self, file: Path, may_grow: bool = False, by_lines: bool = False) -> bool:
+        """Whether an input is unchanged, or has only grown, behind a whole line if ``by_lines``."""
+        known, found = self.inputs.get(str(file), {}), file.stat()
+        size = known.get("size", math.inf)
+        if found.st_size < size or (found.st_size > size and not may_grow):
+            return False
+        digest, ends_line = hash_of(file, size, found.st_mtime_ns)
+        # if a line is not whole, its last number may have got more digits
+        return digest == known.get("sha256") and (ends_line or not by_lines)
 
 
 def asked_for(
@@ -98,15 +118,15 @@ def asked_for(
     Parameters
     ----------
     sources : sequence of str
-        As given.
+        The sources as given.
     reading : mapping
-        Options of ``read_series``.
+        The options of ``read_series``.
     settings : Settings
-        Of the computation. The number of workers changes no result, so it is left out.
+        The settings of the computation. The number of workers is left out: it changes no result.
     excerpt : Excerpt, optional
         Columns and digits of the result.
     """
-    names = [one.name for one in options_of(type(settings)) if one.decides]
+    names = [option.name for option in options_of(type(settings)) if option.decides]
     written = {name: as_written(getattr(settings, name)) for name in names}
     if settings.directions is not None:
         written["directions"] = settings.directions.asked_as
@@ -115,41 +135,94 @@ def asked_for(
     return dict(json.loads(json.dumps(found, default=os.fspath)))
 
 
-def differing_settings(
-    before: Mapping[str, Any], asked: Mapping[str, Any], but: Collection[str] = ()
-) -> str:
-    """The names of the settings that differ, ``but`` for some, in alphabetical order."""
-    names = {one for one in (*before, *asked) if before.get(one) != asked.get(one)} - {*but}
-    return ", ".join(sorted("version of scanfab" if n == "scanfab" else n for n in names))
-
-
 def restored_settings(asked: Mapping[str, Any]) -> Settings:
-    """
-    The settings of a manifest.
-
-    Raises
-    ------
-    SettingsError
-        If one of them cannot be used any more.
-    """
+    """Make the settings of a manifest; SettingsError if any of them cannot be used any more."""
     kind = MapSettings if is_map(asked) else Settings
     try:
         return kind(**{name: asked[name] for name in kind.__dataclass_fields__ if name in asked})
-    except (AttributeError, TypeError, ValueError) as error:
+    except (AttributeError, TypeError, ValueError, SettingsError) as error:
         raise SettingsError(f"the settings of the manifest cannot be used: {error}") from None
 
 
+def repeat_command(
+    asked: Mapping[str, Any], output: str | None = None, named: Collection[str] = ()
+) -> str:
+    """
+    The command line that repeats a computation, quoted for a shell.
+
+    Parameters
+    ----------
+    asked : mapping
+        The ``settings`` of a manifest.
+    output : str, optional
+        The table.
+    named : collection of str, optional
+        Options to name even with their default value, because a settings file beside the dumps
+        gives them another value.
+
+    Examples
+    --------
+    >>> from scanfab.pipeline.record import asked_for, repeat_command
+    >>> from scanfab.pipeline.settings import Settings
+    >>> repeat_command(asked_for(["dumps"], {}, Settings(boundary="type=2", seed=3)))
+    'scanfab compute dumps --boundary type=2 --seed 3'
+    """
+    of_map = is_map(asked)
+    reading = {option.name: option.default for option in READING_OPTIONS}
+    usual = asked_for((), reading, MapSettings(slices=1) if of_map else Settings())
+    # the options that make a table a map have no default
+    usual |= dict.fromkeys(BLOCK_OPTIONS)
+    words = ["scanfab", "map" if of_map else "compute", *map(str, asked["sources"])]
+    for name, value in given_settings(asked).items():
+        if usual.get(name) != value or flag_of(name)[2:] in named:
+            words += _words(flag_of(name), name, value)
+    if output is not None:
+        words += ["-o", output]
+    return shlex.join(words)
+
+
+def given_settings(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings of a manifest that have a value, as users write them."""
+    named = {name: asked[name] for name in asked if name not in ("scanfab", "sources")}
+    return {name: value for name, value in named.items() if value not in (None, [], {})}
+
+
+def reopen(asked: Mapping[str, Any]) -> Series:
+    """Open the first series that a manifest names; ReadError if it cannot be read again."""
+    sources = [str(source) for source in asked["sources"]]
+    if "-" in sources:
+        raise ReadError("the frames came by standard input, which cannot be read again")
+    given = given_settings(asked)
+    return open_sources(sources, **{name: given[name] for name in READING if name in given})[0]
+
+
+def _words(flag: str, name: str, value: Any) -> list[str]:
+    """An option as words of a command line."""
+    if isinstance(value, dict):
+        value = [f"{key}={column}" for key, column in value.items()]
+    if isinstance(value, list):
+        parts = [shortest(one) if isinstance(one, float) else str(one) for one in value]
+        if name == "boundary":
+            return [word for rule in parts for word in (flag, rule)]
+        if name in APART:
+            return [flag, *parts]
+        value = ",".join(parts)
+    text = shortest(value) if isinstance(value, float) else str(value)
+    # a value that starts with a dash would be taken for an option
+    return [f"{flag}={text}"] if text.startswith("-") else [flag, text]
+
+
 def named_files(asked: Mapping[str, Any]) -> list[Path]:
-    """The files that the settings name: of strains (``strain``), of a surface (``rv_shape``)."""
+    """The files that the options ``strain`` and ``rv_shape`` name."""
     strain, shape = asked.get("strain", "auto"), asked.get("rv_shape", "sphere")
     named = ((strain, STRAIN_MODES), (shape, SHAPES))
     return [Path(name) for name, words in named if name not in words]
 
 
 def input_entry(path: Path) -> dict[str, Any]:
-    """Size and hash of a file, as a manifest lists it; it is read again only if it has changed."""
+    """The entry of an input in a manifest: size and hash. It is read again only if it changed."""
     found = path.stat()
-    # a simulation may write more meanwhile
+    # only the bytes up to this size count, since a simulation may write more meanwhile
     digest, _ = hash_of(path, found.st_size, found.st_mtime_ns)
     return {"path": str(path), "size": found.st_size, "sha256": digest}
 
@@ -166,57 +239,44 @@ def hash_of(path: Path, size: int, _changed: int) -> tuple[str, bool]:
     return digest.hexdigest(), ends
 
 
-def versions_used() -> dict[str, str]:
-    """Of Python and of the packages, as a manifest lists them."""
-    return {"python": platform.python_version(), **{name: version(name) for name in PACKAGES}}
-
-
 def write_manifest(path: Path, found: Mapping[str, Any], outdated: Path | None = None) -> None:
     """
     Write a manifest as JSON; the file is complete or untouched.
 
-    An ``outdated`` table, which it does not describe, is removed before the manifest appears: they
-    would look like a pair if the process were killed between the two.
+    A table that is ``outdated``, because the manifest describes another one, is removed before the
+    manifest appears. If the process is killed in between, they must not look like a pair.
     """
     text = json.dumps(found, indent=1, ensure_ascii=False)
     with whole_file(path) as part:
-        # file names may hold bytes that are no text
+        # file names may hold bytes that are not valid text
         part.write_text(text + "\n", encoding="utf-8", errors="backslashreplace")
-        if outdated is not None and outdated.is_file():
-            outdated.unlink()
+        if outdated is not None:
+            outdated.unlink(missing_ok=True)
 
 
 def read_manifest(table: Path) -> dict[str, Any] | None:
-    """
-    The manifest beside a table; None if there is none.
-
-    Raises
-    ------
-    ReadError
-        If it is not a manifest.
-    """
+    """Read the manifest beside a table; None if there is none, ReadError if it is damaged."""
     path = manifest_of(table)
     if not path.is_file():
         return None
     try:
-        found = json.loads(path.read_text("utf-8"))
-        lists = [found["settings"]["sources"], *(found.get(name, []) for name in LISTS)]
-        entries = [found.get("versions", {}), *found.get("inputs", [])]
-        if not all(isinstance(one, list) for one in lists):
+        usual: dict[str, Any] = {"versions": {}, "frames": {}, **{name: [] for name in LISTS}}
+        found = {**usual, **json.loads(path.read_text("utf-8"))}
+        lists = [found["settings"]["sources"], *(found[name] for name in LISTS)]
+        entries = [found["versions"], found["frames"], *found["inputs"]]
+        if {*map(type, lists)} != {list} or {*map(type, entries)} != {dict}:
             raise TypeError
-        if not all(isinstance(entry, dict) for entry in entries):
-            raise TypeError
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except DAMAGED:
         expected = "a manifest of scanfab compute"
         raise ReadError(f"{path}: expected {expected}, found something else") from None
-    return {**{name: [] for name in LISTS}, **found}
+    return found
 
 
 def read_table(table: Path) -> Record:
-    """The record of a finished table, whose manifest is beside it; SettingsError without one."""
+    """Read a complete table and its manifest; SettingsError if it does not tell what made it."""
     found = read_manifest(table)
     if found is None:
-        what = f"there is no {table.name}.manifest.json, which says what made it"
+        what = f"there is no {manifest_of(table).name}, which says what made it"
         raise SettingsError(f"{table}: {what}: run its command again")
     rows = read_rows(table, whole=True)
     if rows and not {"source", "frame"} <= set(rows[0]):
@@ -226,21 +286,13 @@ def read_table(table: Path) -> Record:
 
 
 def part_of(path: Path) -> Path:
-    """Where a table grows until it is complete."""
+    """The path of FILE.part, in which a table grows until it is complete."""
     return path.with_name(f"{path.name}.part")
-
-
-def is_unfinished(path: Path) -> bool:
-    """Whether a table has a FILE.part with rows that it lacks: rows come before their table."""
-    part = part_of(path)
-    if not part.exists():
-        return False
-    return not path.exists() or path.stat().st_mtime_ns < part.stat().st_mtime_ns
 
 
 class PartFile:
     """
-    FILE.part of a table.
+    The FILE.part of a table.
 
     Parameters
     ----------
@@ -253,12 +305,12 @@ class PartFile:
     def __init__(self, output: Path) -> None:
         self.output, self.path = output, part_of(output)
         self.frames = 0
-        """How many finished frames it holds, in a block of :meth:`alone`."""
+        """Number of finished frames that it holds, inside a block of :meth:`alone`."""
         self._lines: list[bytes] = []
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Keep other runs away in the block; a ScanfabError if one writes to it."""
+        """Lock the file inside the block; ScanfabError if another run writes to it."""
         with locked(self.path) as self._stream, undone_at_end(self._remove_if_empty):
             lines = self.path.read_bytes().splitlines(keepends=True)
             self._lines = [line for line in lines if line.endswith(b"\n")]
@@ -269,19 +321,12 @@ class PartFile:
                 self._remove_if_empty()
 
     def read(self) -> Record:
-        """
-        The finished frames, in a block of :meth:`alone`; what is not finished is cut off.
-
-        Raises
-        ------
-        ReadError
-            If it is damaged.
-        """
+        """Read the finished frames and cut off an unfinished one; ReadError if it is damaged."""
         try:
             first, *frames = map(json.loads, self._lines)
-            found = {**first, "inputs": [one for frame in frames for one in frame["inputs"]]}
+            found = {**first, "inputs": [entry for frame in frames for entry in frame["inputs"]]}
             record = Record.of(self.path, found, [row for frame in frames for row in frame["rows"]])
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        except DAMAGED:
             what = "expected what an interrupted run has kept there, found something else"
             raise ReadError(f"{self.path}: {what}: leave out `resume` to start afresh") from None
         if (size := sum(map(len, self._lines))) < self.path.stat().st_size:
@@ -289,43 +334,43 @@ class PartFile:
         return record
 
     def begin(self, asked: Mapping[str, Any]) -> None:
-        """Start afresh with these settings; finished frames are kept under another name."""
+        """Start again with these settings; finished frames are kept under another name."""
         if self.frames:
             names = (f"{self.output.stem}.{n}{self.output.suffix}" for n in count(1))
             others = map(self.output.with_name, names)
             other = next(one for one in others if not (one.exists() or part_of(one).exists()))
-            # not moved: other runs find this very file locked
+            # copied, not renamed, because other runs must find this file locked
             shutil.copyfile(self.path, part_of(other))
             kept = f"{counted(self.frames, 'finished frame')} of an earlier run are kept"
-            how = f"what made it goes on with it by `output={other}` `resume`"
+            how = f"its command goes on with them by `output={other}` `resume`"
             note(f"{self.path}: {kept} as {part_of(other)}; {how}")
         with named_errors(self.path):
             self._stream.truncate(0)
-            self._write({"settings": asked})
+        self._write({"settings": asked})
         self.frames = 0
 
     def add(self, inputs: Iterable[Mapping[str, Any]], rows: Iterable[Row]) -> None:
-        """Keep a finished frame, with the files that no earlier frame was made of."""
-        with named_errors(self.path):
-            self._write({"inputs": list(inputs), "rows": [ALL.of(row) for row in rows]})
+        """Append a finished frame, with the input files that no earlier frame was made of."""
+        self._write({"inputs": list(inputs), "rows": [ALL.of(row) for row in rows]})
         self.frames += 1
 
     def remove(self) -> None:
-        """Remove it, in a block of :meth:`alone`; from then on the next run may have one."""
+        """Remove the file and its lock: the table is complete."""
         if sys.platform == "win32":
             self._stream.close()  # Windows removes no file that is open
         self.path.unlink(missing_ok=True)
         self._stream.close()
 
     def _write(self, line: Mapping[str, Any]) -> None:
-        # not by way of a buffer, which would be written once more at the end where the disk is full
+        """Write a line without a buffer: a buffer that met a full disk is written again later."""
         data = f"{json_line(line)}\n".encode("utf-8", "surrogatepass")
-        while data:
-            data = data[os.write(self._stream.fileno(), data) :]
+        with named_errors(self.path):
+            while data:
+                data = data[os.write(self._stream.fileno(), data) :]
 
     def _remove_if_empty(self) -> None:
-        """Without a frame there is nothing to go on with."""
+        """Remove the file if it holds no frame: there is nothing to resume."""
         is_there = not self._stream.closed and self.path.exists()
-        # counted in the file, as a signal may come just before a frame is counted
+        # counted in the file, as a signal may come just before `frames` is increased
         if is_there and self.path.read_bytes().count(b"\n") < 2:
             self.remove()

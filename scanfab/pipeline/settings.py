@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import Any
 
+from scanfab.base.column import Column
 from scanfab.base.errors import DimensionError, SettingsError
 from scanfab.base.option import fabric, options_of, reading, refuse_unknown, sample, scan, window
+from scanfab.base.space import Space
+from scanfab.base.spelling import spelt_place
 from scanfab.io.options import parse_frames
+from scanfab.packing.boundary import BoundaryRule
 from scanfab.packing.columns import RV_COLUMN
+from scanfab.packing.rattlers import installed_rules
 from scanfab.pipeline import values
-from scanfab.pipeline.values import AXES, SHAPES, STRAIN_MODES, Axis, Length, Vector, as_written
+from scanfab.pipeline.values import STRAIN_MODES, Axis, Length, Vector, as_written
 from scanfab.scan.columns import EDGE_COLUMNS
+from scanfab.scan.directions import RULES, DirectionRule, rule_of
 from scanfab.scan.edges import CLIP, EDGES, ENDS
-
-if TYPE_CHECKING:
-    from scanfab.base.column import Column
-    from scanfab.packing.boundary import BoundaryRule
-    from scanfab.scan.directions import DirectionRule
-
 
 # This takes one processor one to two minutes, and is some hundred times what a frame of a dense
 # packing needs for the default tolerance.
 MAX_CHORDS = 1e10
+# a component of a unit vector up to this counts as 0
+ROUNDING = 1e-9
+# beginnings of direction rules, for shell completion
+DIRECTIONS = ("auto", *(f"{name}:" for name in RULES))
 # options that have a meaning only if another option has this value
 NEEDS = {
     "rv_radius": ("rv_shape", "sphere"),
@@ -70,7 +75,7 @@ class Settings:
     """Radius of the spherical RV in the dump's units, instead of `rv`."""
     rv_center: Vector | None = window(values.parse_point, metavar="X Y Z")
     """Centre of the RV in the dump's units (default: middle of the sample)."""
-    rv_shape: str = window(values.parse_shape, default="sphere", choices=tuple(SHAPES), also="FILE")
+    rv_shape: str = window(values.parse_shape, default="sphere", choices=values.SHAPES, also="FILE")
     """
     Shape of the RV; FILE is a closed convex surface in the dump's units (.stl .vtp .ply .obj).
     """
@@ -79,7 +84,7 @@ class Settings:
     Size of the RV in the dump's units, instead of `rv`: edges of the box, radius and height of the
     cylinder, semi-axes of the ellipsoid. Discs take two numbers.
     """
-    rv_axis: Axis | None = window(values.parse_rv_axis, choices=tuple(AXES), also="X,Y,Z")
+    rv_axis: Axis | None = window(values.parse_rv_axis, choices=values.AXES, also="X,Y,Z")
     """Axis of the cylinder (default: `axis`)."""
     rv_follows: str = window(default="none", choices=("none", "strain"))
     """
@@ -124,7 +129,7 @@ class Settings:
     )
     """Distance between neighbouring scan lines, written as `cutoff` is; auto meets `tolerance`."""
     directions: DirectionRule | None = scan(
-        values.parse_directions, default="auto", metavar="N|RULE", choices=values.direction_rules
+        values.parse_directions, default="auto", metavar="N|RULE", choices=DIRECTIONS
     )
     """
     Directions of the scan: N axes, rounded up to the next exact rule, or lebedev:DEGREE,
@@ -145,7 +150,7 @@ class Settings:
     min_contacts: int = sample(values.parse_count, default=2)
     """A grain with fewer contacts (a clump: with fewer neighbours) is a rattler."""
     rattlers: str = sample(
-        values.parse_rattlers, default="count", metavar="RULE", choices=values.rattler_rules
+        values.parse_rattlers, default="count", metavar="RULE", choices=installed_rules
     )
     """
     Rule that finds rattlers. count: one pass over all contacts; recursive: further passes without
@@ -158,7 +163,7 @@ class Settings:
     """
     For contacts found by geometry: two grains touch if their distance is below (r1 + r2)(1 + X).
     """
-    axis: Axis = fabric(values.parse_axis, choices=tuple(AXES), also="X,Y,Z")
+    axis: Axis = fabric(values.parse_axis, choices=values.AXES, also="X,Y,Z")
     """
     Loading axis, along which the anisotropies are signed (default: z; for discs the second axis of
     their plane).
@@ -172,9 +177,7 @@ class Settings:
     """
     strain: str = sample(values.parse_strain, default="auto", choices=STRAIN_MODES, also="FILE.csv")
     """Where the axial strain comes from; auto: the cell if it is periodic, else the boundary."""
-    frames: slice = reading(
-        lambda name, value: parse_frames(value, name), metavar="A:B:C", first=True
-    )
+    frames: slice = reading(parse_frames, metavar="A:B:C", first=True)
     """Which frames, as a Python slice (default: all)."""
     seed: int = scan(values.parse_count, default=0)
     """Seed of the random numbers."""
@@ -194,20 +197,18 @@ class Settings:
             raise SettingsError(problem)
         # Only a cylinder is checked here: other shapes may be those of discs, which a frame tells.
         if self.rv_shape == "cylinder":
-            self.check_sizes(3)
+            self._check_sizes(3)
 
     def __repr__(self) -> str:
-        chosen = [
-            f"{option.name}={as_written(getattr(self, option.name))!r}"
-            for option in options_of(type(self))
-            if as_written(getattr(self, option.name))
-            != as_written(option.parse(option.name, option.default))
-        ]
+        options = options_of(type(self))
+        written = {one.name: as_written(getattr(self, one.name)) for one in options}
+        usual = {one.name: as_written(one.parse(one.name, one.default)) for one in options}
+        chosen = [f"{name}={value!r}" for name, value in written.items() if value != usual[name]]
         return f"{type(self).__name__}({', '.join(chosen)})"
 
     def _clashes(self) -> Iterator[str]:
         """Messages about options that contradict each other, each with what to do."""
-        shape, takes = self.rv_shape, SHAPES.get(self.rv_shape)
+        shape, takes = self.rv_shape, values.SHAPES.get(self.rv_shape)
         sizes = {"rv_radius": self.rv_radius, "rv_size": self.rv_size, "rv_shape": takes is None}
         for name in (name for name, given in sizes.items() if given and len(self.rvs) > 1):
             several = f"`rv` asks for {len(self.rvs)}"
@@ -221,40 +222,73 @@ class Settings:
                 choose = f'leave out `{name}`, or choose `{other}="{needed}"`'
                 yield f"{name}: has no meaning if `{other}` is {found}: {choose}"
         if self.rv_follows == "strain" and self.strain not in STRAIN_MODES:
-            yield (
-                f"rv_follows: a file of strains ({self.strain}) does not say how the sample "
-                f"deforms along all axes: choose another `strain`, or leave out `rv_follows`"
-            )
+            lack = f"a file of strains ({self.strain}) does not give the strains along all axes"
+            yield f"rv_follows: {lack}: choose another `strain`, or leave out `rv_follows`"
         if self.edge == ENDS and self.moment != 1:
-            yield (
-                "moment: `edge=ends` counts only the parts inside the window, which do not give "
-                "the second moment of the full lengths: choose `edge=start`, or `moment=1`"
-            )
+            lack = "`edge=ends` does not give the second moment of the full lengths"
+            yield f"moment: {lack}: choose `edge=start`, or `moment=1`"
 
-    def check_sizes(self, dimension: int) -> None:
+    def _check_sizes(self, dimension: int) -> None:
+        """Raise DimensionError if the RV has too many or too few sizes for discs or spheres."""
+        shape, takes = self.rv_shape, values.SHAPES.get(self.rv_shape)
+        count = 2 if shape == "cylinder" else dimension
+        if takes and len(self.rv_size) not in (0, count):
+            found = ",".join(f"{size:g}" for size in self.rv_size)
+            if dimension == 2:
+                takes = f"two, {takes.replace(',C', '')}, in the plane of the discs"
+            expected = f"expected {takes} (`rv_shape` is {shape})"
+            raise DimensionError(f"rv_size: {expected}, found {found}")
+
+    def in_space(self, space: Space) -> Settings:
         """
-        Check that the number of the RV's sizes fits the dimension of the sample.
+        Adapt settings to discs in a plane; settings for spheres do not change.
 
         Parameters
         ----------
-        dimension : int
-            2 for discs, 3 for spheres.
+        space : Space
+            Space of the first frame that has grains: only a frame shows that the grains are discs.
+
+        Returns
+        -------
+        Settings
+            Settings with an axis in the plane, and with directions in the plane.
 
         Raises
         ------
         SettingsError
-            If there are too many sizes, or too few.
+            If the settings are for spheres and the grains are discs, or the other way round.
         """
-        shape, takes = self.rv_shape, SHAPES.get(self.rv_shape)
-        if not self.rv_size or not takes:
-            return
-        if len(self.rv_size) != (2 if shape == "cylinder" else dimension):
-            found = ",".join(f"{size:g}" for size in self.rv_size)
-            if dimension == 2:
-                takes = f"two, {takes.replace(',C', '')}, in the plane of the discs"
-            raise DimensionError(
-                f"rv_size: expected {takes} (`rv_shape` is {shape}), found {found}"
-            )
+        self._check_sizes(space.dimension)
+        if space.across is None:
+            return self
+        if self.rv_shape not in ("sphere", "box", "ellipsoid"):
+            choose = "choose sphere (a circle), box (a rectangle) or ellipsoid (an ellipse)"
+            what = f"{self.rv_shape} is no window for discs in {space}"
+            raise DimensionError(f"rv_shape: {what}: {choose}")
+        rule = self.directions
+        if rule is not None and rule.space != space:
+            if rule.asked is None:
+                what = f"{rule.name} is a rule for three dimensions, but all discs lie in {space}"
+                raise DimensionError(f"directions: {what}: choose a number of axes, such as 16")
+            # as many equal angles as axes were asked for
+            rule = rule_of(rule.asked, space)
+        return replace(self, axis=self._axis_in(space, space.across), directions=rule)
+
+    def _axis_in(self, space: Space, across: int) -> Axis:
+        """The loading axis in a plane; the default is the second axis of the plane."""
+        axis, (first, second) = self.axis, ("xyz"[k] for k in sorted(space.along))
+        if isinstance(axis, values.UsualAxis):
+            return values.AXES[second]
+        if abs(axis[across]) > ROUNDING:
+            named = as_written(axis)
+            spelt = named if isinstance(named, str) else spelt_place(axis)
+            choose = f"choose {first}, {second}, or another axis in the plane"
+            what = f"the axis {spelt} leads out of {space} of the discs"
+            raise DimensionError(f"axis: {what}: {choose}")
+        if axis[across] == 0.0:
+            return axis
+        flat = [0.0 if k == across else part for k, part in enumerate(axis)]
+        return Axis(*(part / math.hypot(*flat) for part in flat))
 
     @property
     def rvs(self) -> tuple[float, ...]:
@@ -273,10 +307,8 @@ class Settings:
         columns = [name for name, asked in of_window.items() if asked and self.needs_window]
         columns += [column.name for column in EDGE_COLUMNS if self.edge != CLIP]
         columns += ["alpha_vs_axial_contacts"] * bool(self.cutoffs)
-        return (
-            *columns,
-            *(column.name for group in self.with_ for column in GROUPS[group].columns),
-        )
+        columns += [column.name for group in self.with_ for column in GROUPS[group].columns]
+        return tuple(columns)
 
     @property
     def columns(self) -> tuple[Column, ...]:

@@ -1,9 +1,9 @@
-"""What a computation tells beside its rows: kept for the manifest, and passed on as warnings."""
+"""Warnings and notes of a computation: kept for the manifest, and shown to the user."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -12,48 +12,49 @@ from scanfab.pipeline.options import as_options
 
 
 class Told:
-    """Warnings and notes, each text once, in the words of the command line as manifests have it."""
+    """Warnings and notes as manifests list them: each text once, spelt as on the command line."""
 
     def __init__(self) -> None:
         self.warnings: list[str] = []
         self.notes: list[str] = []
         self.skipped = 0
-        """Frames that were skipped."""
+        """Number of frames that were skipped."""
 
-    def add(self, category: type[Warning], text: str) -> bool:
-        """Keep a warning; says whether it is one of scanfab's that was not told before."""
-        self.skipped += issubclass(category, SkippedFrameWarning)
-        known = self.notes if issubclass(category, ScanfabNote) else self.warnings
-        text = as_options(text)
-        if not issubclass(category, ScanfabWarning | ScanfabNote) or text in known:
-            return False
-        known.append(text)
-        return True
+    def add(self, message: Warning) -> bool:
+        """Keep a warning or note; returns whether its text is new."""
+        self.skipped += isinstance(message, SkippedFrameWarning)
+        known = self.notes if isinstance(message, ScanfabNote) else self.warnings
+        text = as_options(str(message))
+        is_new = text not in known
+        if is_new:
+            known.append(text)
+        return is_new
 
 
 @contextmanager
-def recorded() -> Iterator[Told]:
+def listening(show: Callable[[Warning], object] | None = None) -> Iterator[Told]:
     """
-    Keep what is told in the block, also what the caller's filters of warnings hide.
+    Keep the warnings and notes of scanfab inside the block, whatever the filters of the caller say.
 
-    At the end each text is warned of once, at the line that calls the function of the block, to be
-    shown, hidden or raised as those filters say. Warnings of others are passed on as they come.
+    Each new text is shown at once by ``show``. Without ``show`` the texts are issued again after
+    the block, as warnings at the line that calls the function of the block; there the filters of
+    the caller show them, hide them or raise them. Warnings of other packages pass unchanged.
     """
-    told, messages = Told(), list[Warning]()
+    told, later = Told(), list[Warning]()
     try:
         with warnings.catch_warnings():
-            show = warnings.showwarning
+            others: Any = warnings.showwarning
 
-            def hear(message: Any, category: type[Warning], *place: Any) -> None:
-                if told.add(category, str(message)):
-                    messages.append(message)
-                elif not issubclass(category, ScanfabWarning | ScanfabNote):
-                    show(message, category, *place)
+            def hear(message: Any, category: type[Warning], *place: Any, **more: Any) -> None:
+                if not issubclass(category, ScanfabWarning | ScanfabNote):
+                    others(message, category, *place, **more)
+                elif told.add(message):
+                    (show or later.append)(message)
 
             for kind in (ScanfabWarning, ScanfabNote):
                 warnings.simplefilter("always", kind)
-            warnings.showwarning = hear  # type: ignore[assignment]
+            warnings.showwarning = hear
             yield told
     finally:
-        for message in messages:
+        for message in later:
             warnings.warn(message, stacklevel=4)

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.option import number, numbers, one_of, optional, unusable, whole
 from scanfab.base.spelling import shortest
-
-if TYPE_CHECKING:
-    # these modules load numpy, which would delay the help of commands
-    from scanfab.packing.boundary import BoundaryRule
-    from scanfab.scan.directions import DirectionRule
-
+from scanfab.io.surface import SUFFIXES
+from scanfab.packing.boundary import BoundaryRule
+from scanfab.packing.rattlers import installed_rules
+from scanfab.scan.directions import DirectionRule, direction_rule
 
 Vector = tuple[float, float, float]
+UNITS = ("rmin", "rmean", "rmax")
 STRAIN_MODES = ("auto", "cell", "boundary", "grains")
 MOST_CUTOFFS = 1000
 # groups of further columns, in the order of the table
@@ -67,7 +65,8 @@ class Length:
     """A length in the dump's unit, or relative to a radius of the series' first frame."""
 
     value: float
-    unit: Literal["", "rmin", "rmean", "rmax"] = ""
+    unit: str = ""
+    """``rmin``, ``rmean`` or ``rmax``; empty for the dump's unit."""
 
     def resolve(self, radii: dict[str, float]) -> float:
         """The length in the dump's unit."""
@@ -109,12 +108,11 @@ def parse_length(name: str, text: str | float | Length) -> Length:
     >>> parse_length("cutoff", "0.5rmin")
     Length(value=0.5, unit='rmin')
     """
-    match = re.fullmatch(r"\s*(.+?)\s*(rmin|rmean|rmax)?\s*", str(as_written(text)))
     expected = "a length such as 0.0005 or 1rmin (rmin, rmean, rmax), not negative"
+    word = str(as_written(text)).strip()
+    unit = next((unit for unit in UNITS if word.endswith(unit)), "")
     parse = number(expected, lambda value: 0 <= value < math.inf)
-    if match is None:
-        raise unusable(name, expected, text)
-    return Length(parse(name, match[1]), match[2] or "")  # type: ignore[arg-type]
+    return Length(parse(name, word.removesuffix(unit)), unit)
 
 
 def parse_spacing(name: str, value: Any) -> Length | None:
@@ -164,8 +162,8 @@ def parse_axis(name: str, text: str | Iterable[float] | None) -> Axis:
         return text
     if isinstance(text, str) and text in AXES:
         return AXES[text]
-    parse = numbers("x, y, z or three numbers X,Y,Z", lambda v: len(v) == 3 and math.hypot(*v) > 0)
-    vector = parse(name, text)
+    expected = "x, y, z or three numbers X,Y,Z"
+    vector = numbers(expected, lambda v: len(v) == 3 and math.hypot(*v) > 0)(name, text)
     return Axis(*(part / math.hypot(*vector) for part in vector))
 
 
@@ -183,11 +181,9 @@ def parse_fractions(name: str, value: Any) -> float | tuple[float, ...]:
     >>> parse_fractions("rv", "0.7"), parse_fractions("rv", "0.7,0.4")
     (0.7, (0.4, 0.7))
     """
-    parse = numbers(
-        "a fraction above 0, or several such as 0.4,0.5,0.6",
-        lambda sizes: len(sizes) > 0 and min(sizes) > 0,
-    )
-    fractions = sorted(parse(name, [value] if isinstance(value, int | float) else value))
+    expected = "a fraction above 0, or several such as 0.4,0.5,0.6"
+    parse = numbers(expected, lambda sizes: len(sizes) > 0 and min(sizes) > 0)
+    fractions = sorted(parse(name, value))
     if len(set(fractions)) < len(fractions):
         raise unusable(name, "fractions that differ", value)
     return fractions[0] if len(fractions) == 1 else tuple(fractions)
@@ -203,15 +199,11 @@ def parse_sizes(name: str, value: Any) -> tuple[float, ...]:
 
 def parse_shape(name: str, value: Any) -> str:
     """Parse the shape of a window: a word, or an existing file with a surface."""
-    if str(value) in SHAPES:
-        return str(value)
-    from scanfab.io.surface import SUFFIXES
-
-    path = Path(value)
-    if path.suffix.lower() not in SUFFIXES or not path.is_file():
+    text = str(value)
+    if text not in SHAPES and not (text.lower().endswith(SUFFIXES) and Path(text).is_file()):
         words = f"{', '.join(SHAPES)} or a closed convex surface that exists ({' '.join(SUFFIXES)})"
-        raise unusable(name, words, str(value))
-    return str(value)
+        raise unusable(name, words, text)
+    return text
 
 
 def parse_variants(name: str, letters: object) -> str:
@@ -225,16 +217,13 @@ def parse_groups(name: str, groups: Any) -> tuple[str, ...]:
     """Parse groups of columns, a text with commas or blanks, into the order of the table."""
     groups = groups.replace(",", " ").split() if isinstance(groups, str) else groups
     words = tuple(groups) if isinstance(groups, Iterable) else () if groups is None else (groups,)
-    for word in words:
-        if word not in GROUP_NAMES:
-            raise unusable(name, f"groups of columns out of {', '.join(GROUP_NAMES)}", word)
+    if unknown := [word for word in words if word not in GROUP_NAMES]:
+        raise unusable(name, f"groups of columns out of {', '.join(GROUP_NAMES)}", unknown[0])
     return tuple(group for group in GROUP_NAMES if group in words)
 
 
 def parse_boundary(name: str, rules: Any) -> tuple[BoundaryRule, ...]:
     """Parse boundary rules from one or several expressions."""
-    from scanfab.packing.boundary import BoundaryRule
-
     several = rules if isinstance(rules, tuple | list) else [rules]
     return tuple(
         rule if isinstance(rule, BoundaryRule) else BoundaryRule.parse(str(rule))
@@ -244,45 +233,27 @@ def parse_boundary(name: str, rules: Any) -> tuple[BoundaryRule, ...]:
 
 def parse_directions(name: str, value: Any) -> DirectionRule | None:
     """Parse a direction rule, whose axes must not lie in one plane; ``auto`` gives None."""
-    from scanfab.scan.directions import DirectionRule, direction_rule
-
     if value is None or value == "auto":
         return None
     rule = value if isinstance(value, DirectionRule) else direction_rule(str(value))
     if rule.is_flat:
-        raise SettingsError(
-            f"{name}: the {len(rule)} axes of {rule.name} lie in one plane, so nothing is measured "
-            f"across it: choose more axes"
-        )
+        what = f"the {len(rule)} axes of {rule.name} lie in one plane"
+        raise SettingsError(f"{name}: {what}, so nothing is measured across it: choose more axes")
     return rule
-
-
-def direction_rules() -> list[str]:
-    """The beginnings of direction rules, for shell completion."""
-    from scanfab.scan.directions import RULES
-
-    return ["auto", *(f"{name}:" for name in RULES)]
-
-
-def rattler_rules() -> Iterable[str]:
-    """Names of the installed rattler rules."""
-    from scanfab.packing.rattlers import installed_rules
-
-    return installed_rules()
 
 
 def parse_rattlers(name: str, value: Any) -> str:
     """Parse the name of an installed rattler rule."""
-    return str(one_of(*rattler_rules())(name, value))
+    return str(one_of(*installed_rules())(name, value))
 
 
 def parse_strain(name: str, value: Any) -> str:
     """Parse the source of the axial strain: a word, or an existing file."""
-    is_path = isinstance(value, str | os.PathLike)
-    if not is_path or (str(value) not in STRAIN_MODES and not Path(value).is_file()):
-        found = str(value) if is_path else value
+    text = str(value)
+    if text not in STRAIN_MODES and not Path(text).is_file():
+        found = text if isinstance(value, Path) else value
         raise unusable(name, "auto, cell, boundary, grains or a CSV file that exists", found)
-    return str(value)
+    return text
 
 
 def parse_workers(name: str, value: Any) -> int:

@@ -1,4 +1,4 @@
-"""compute_file(): a fabric table in a file, with its manifest and ParaView files, by one call."""
+"""compute_file(): compute a fabric table into a file, with its manifest and ParaView files."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.errors import SettingsError
@@ -15,18 +15,15 @@ from scanfab.io.families import PathLike, expanded
 from scanfab.io.options import take_reading
 from scanfab.io.series import Series
 from scanfab.io.sources import READING, open_sources
-from scanfab.pipeline.frames import of_whole
 from scanfab.pipeline.job import Job
 from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
-from scanfab.pipeline.record import asked_for
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.told import recorded
+from scanfab.pipeline.told import listening
 from scanfab.table.table import Table, load
 from scanfab.table.writing import Excerpt
 from scanfab.viz.paraview import vtk_folders
 
 Source = Series | PathLike
-T = TypeVar("T")
 
 
 def compute_file(
@@ -45,58 +42,58 @@ def compute_file(
     """
     Compute the fabric table of a series into a file, frame by frame: ``scanfab compute -o``.
 
-    Rows are kept in ``FILE.part`` as they come, so that an interrupted computation can be gone on
-    with; that becomes FILE at the end, which is complete or untouched. Files are those of the
-    command line, byte for byte: what one has begun, the other can resume.
+    Rows are kept in ``FILE.part`` as they come, so that an interrupted computation can be resumed.
+    FILE appears at the end: it is complete or untouched. The command line writes the same bytes, so
+    it can resume what this function began, and the other way round.
 
     Parameters
     ----------
     source : Series, path, or sequence of them
-        What :func:`scanfab.read_series` returns, or files and folders: each folder is a series of
-        its own, all single files together are one.
+        What :func:`scanfab.read_series` returns, or files and folders: each folder is a series, and
+        all single files together are one series.
     output : path
         ``.csv``, ``.tsv``, ``.json``, ``.jsonl``, ``.parquet``, or a format of another package.
-        ``FILE.manifest.json`` beside it says what made it: settings, versions, inputs with size and
-        hash, and what was told.
+        ``FILE.manifest.json`` beside it holds settings, versions, inputs with size and hash,
+        warnings and notes.
     resume : bool, optional
-        Go on with ``FILE.part``, or add to a complete FILE the frames that it lacks. The result is
-        that of one computation of all frames; settings and inputs must be the same.
+        Continue ``FILE.part``, or add missing frames to a complete FILE. The result is the same as
+        if all frames were computed at once; settings and inputs must be the same.
     vtk : path, optional
         A folder for ParaView files of each frame that is computed now.
     manifest : path, optional
         A copy of the manifest.
     fields : str or sequence of str, optional
-        Names of columns, one by one or separated by commas, in the order in which to write them.
+        Which columns to write, in this order: a sequence of names, or a text with commas.
     digits : int, optional
         Significant digits of floats; with 17 they read back the same.
     progress : callable, optional
-        Called after each frame with the number of finished frames, and about how many there are.
+        Called after each frame with the number of finished frames and an estimate of all frames.
     executor : concurrent.futures.Executor, optional
         As for :func:`scanfab.compute`.
     **options
-        Those of :func:`scanfab.compute`, or with `grid`, `slices` or `shells` those of
-        :func:`scanfab.fabric_map`; for paths those of :func:`scanfab.read_series` too.
+        Options of :func:`scanfab.compute`, or of :func:`scanfab.fabric_map` if `grid`, `slices` or
+        `shells` is given; for paths also options of :func:`scanfab.read_series`.
 
     Returns
     -------
     Table
-        What the file holds.
+        The table of the file.
 
     Raises
     ------
     ScanfabError
-        If a frame cannot be read or computed (what is finished can be resumed), if another run
-        writes to the file, or if what is there was made by other settings or of other inputs.
+        If a frame cannot be read or computed (finished frames can be resumed), if another run
+        writes to the file, or if the rows to resume were made by other settings or of other inputs.
     OSError
-        If the file cannot be written to, as on a full disk; this can be resumed as well.
+        If the file cannot be written, for instance on a full disk; this can be resumed as well.
     TypeError
-        If there is no such option; names the nearest that there is.
+        If there is no such option; the message suggests the most similar name.
 
     Warns
     -----
     ScanfabWarning, ScanfabNote
-        Doubts of frames, and frames that were skipped, when all is done; the manifest lists them,
-        also those that are filtered away.
+        Doubts about frames, and frames that were skipped, at the end of the computation. The
+        manifest lists them too, whatever the filters of warnings.
 
     Examples
     --------
@@ -110,26 +107,22 @@ def compute_file(
     [30000, 60000]
     """
     kind = MapSettings if is_map(options) else Settings
-    known = [*READING, *(one.name for one in options_of(MapSettings))]
+    known = [*READING, *(option.name for option in options_of(MapSettings))]
     refuse_unknown("compute_file", options, known)
     if kind is Settings:
-        options = {name: one for name, one in options.items() if name not in BLOCK_OPTIONS}
-    with recorded() as told:
-        opened = _opened(source, options)
-        parts = [of_whole(one, kind(**options)) for one in opened]
-        settings = _same(one for _, one in parts)
-        sources = [name for one in opened for name in one.sources or (one.name,)]
-        reading = take_reading(dict(_same(one.reading for one in opened)))
-        excerpt = Excerpt.make(settings.columns, fields, digits)
+        options = {name: value for name, value in options.items() if name not in BLOCK_OPTIONS}
+    with listening() as told:
+        series = _opened(source, options)
+        settings = kind(**options)
+        folders = () if vtk is None else vtk_folders(Path(vtk), len(series), settings, resume)
         job = Job(
-            [one for one, _ in parts],
+            series,
             settings,
-            asked_for(sources, reading, settings, excerpt),
             Path(output),
-            excerpt,
+            Excerpt.make(settings.columns, fields, digits),
             resume=resume,
             manifest_path=None if manifest is None else Path(manifest),
-            observers=() if vtk is None else vtk_folders(Path(vtk), len(parts), settings, resume),
+            observers=folders,
             told=told,
             executor=executor,
         )
@@ -139,9 +132,9 @@ def compute_file(
 
 
 def _opened(source: Source | Sequence[Source], options: dict[str, Any]) -> Sequence[Series]:
-    """The series of a source; the options of reading are taken out of others."""
-    one = isinstance(source, Series | str | os.PathLike) or not isinstance(source, Iterable)
-    given: list[Any] = [source] if one else list(source)  # type: ignore[arg-type]
+    """Open the series of a source; the options of reading are taken out of ``options``."""
+    is_one = isinstance(source, Series | str | os.PathLike) or not isinstance(source, Iterable)
+    given: list[Any] = [source] if is_one else list(source)  # type: ignore[arg-type]
     if given and all(isinstance(one, Series) for one in given):
         for name in {*READING} & {*options}:
             raise SettingsError(f"{name}: the series is open already: hand it to `read_series`")
@@ -153,14 +146,3 @@ def _opened(source: Source | Sequence[Source], options: dict[str, Any]) -> Seque
         )
     paths = [os.fspath(path) for one in given for path in expanded(one)]
     return open_sources(paths, **take_reading(options))
-
-
-def _same(found: Iterable[T]) -> T:
-    """What is the same for all series of one table, as its manifest names it once."""
-    first, *others = found
-    if any(one != first for one in others):
-        raise SettingsError(
-            "the series of one table are to be read with the same options, and to be parts of the "
-            "same frames: compute them into tables of their own"
-        )
-    return first

@@ -22,7 +22,6 @@ from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import Strains, shear_strain
 from scanfab.pipeline.values import Vector
-from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.segments import Segments, cut_lines
 from scanfab.table.curves import SAME, frame_strain_column
 
@@ -140,7 +139,7 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     first, plan = None if found is None else found[2], None
     if first is not None:
         with suppress(SettingsError):  # the plan tells what does not fit
-            settings = settings_in(settings, first.packing.space)
+            settings = settings.in_space(first.packing.space)
         plan = _plan(first, settings)
     if plan is not None and sample.grains.any():
         plan = plan.in_frame(sample)

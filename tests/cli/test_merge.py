@@ -204,7 +204,7 @@ def test_a_file_that_has_changed_between_jobs_is_named(parts, refused):
         (
             ("settings", "strain"),
             "gone.csv",
-            "the settings of its manifest cannot be used: strain: ",
+            "the settings of the manifest cannot be used: strain: ",
         ),
     ],
 )

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from scanfab.pipeline.record import read_manifest
-from scanfab.pipeline.repeat import repeat_command
+from scanfab.pipeline.record import read_manifest, repeat_command
 from tests.helpers.dumps import cubic_rows, dump_text, write
 
 FAST = 'directions = 9\nspacing = "0.5rmin"\ncutoff = "0.2rmin"\n'

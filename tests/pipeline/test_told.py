@@ -7,14 +7,14 @@ import warnings
 import pytest
 
 from scanfab.base.errors import ScanfabNote, ScanfabWarning, SkippedFrameWarning
-from scanfab.pipeline.told import recorded
+from scanfab.pipeline.told import listening
 
 ALL = ["choose another `rv`", "a note", "frame 1 skipped", "frame 2 skipped"]
 
 
 def told_in_a_function():
     """As compute_file() does it: what is told is warned of where it is called."""
-    with recorded() as told:
+    with listening() as told:
         for text in (ALL[0], ALL[0]):
             warnings.warn(text, ScanfabWarning, stacklevel=1)
         warnings.warn(ALL[1], ScanfabNote, stacklevel=1)

@@ -19,8 +19,7 @@ from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox
 from scanfab.pipeline.options import as_options
-from scanfab.pipeline.record import read_manifest, restored_settings
-from scanfab.pipeline.repeat import reopen, repeat_command
+from scanfab.pipeline.record import read_manifest, reopen, repeat_command, restored_settings
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import Length
 from scanfab.table.compare import Comparison, compare_tables

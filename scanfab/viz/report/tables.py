@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from scanfab.base.option import flag_of
 from scanfab.pipeline.options import MEANINGS
-from scanfab.pipeline.repeat import given_settings
+from scanfab.pipeline.record import given_settings
 from scanfab.table.curves import STRAINS, is_turned, spelt_strain, strain_column
 from scanfab.table.row import Row as TableRow
 from scanfab.table.row import groups_of, number_of, numbers_of, total_error, variant_of
