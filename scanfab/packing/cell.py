@@ -12,7 +12,7 @@ from scanfab.base.arrays import MOST, all_within
 from scanfab.base.errors import PackingError
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import spelt_place
-from scanfab.base.typing import FloatArray, IntArray
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.lattice import Lattice
 
 # longest periodic edge over the smallest height: the search for images cannot count further
@@ -243,11 +243,11 @@ class Cell:
         """
         return self.lattice.nearest(np.asarray(branch, dtype=np.float64))
 
-    def with_images(
+    def images_outside(
         self, position: FloatArray, margin: float
-    ) -> tuple[FloatArray, npt.NDArray[np.intp], IntArray]:
+    ) -> tuple[FloatArray, IntArray, IntArray]:
         """
-        Points in the cell, and their periodic images that lie outside within a margin of it.
+        Periodic images of points in the cell that lie outside within a margin of it.
 
         Parameters
         ----------
@@ -259,29 +259,33 @@ class Cell:
         Returns
         -------
         position : ndarray, shape (K, 3)
-            The points and their images, all of one point behind one another.
+            The images.
         row : ndarray of int, shape (K,)
-            The point that each one is, or repeats.
+            The point that each image repeats.
         image : ndarray of int, shape (K, 3)
-            Lattice translation from that point; 0 for the point itself. Those of one point ascend.
+            Lattice translation from that point.
         """
         periodic = list(self.periodic)
         fractions, reach = self.fractional(position)[:, periodic], margin / self.heights[periodic]
         # only points near a face have images near the cell
-        near = np.flatnonzero(np.any((fractions <= reach) | (fractions >= 1.0 - reach), axis=1))
-        shifts = np.array(list(product(*(range(-int(n), int(n) + 1) for n in np.ceil(reach)))))
-        rows = []
-        for shift in shifts:
-            moved = fractions[near] + shift
-            inside = np.all((moved >= -reach) & (moved <= 1.0 + reach), axis=1)
-            rows.append(near[inside] if shift.any() else np.arange(len(position)))
+        is_near = np.zeros(len(position), np.bool_)
+        for along, most in zip(fractions.T, reach, strict=True):
+            is_near |= (along <= most) | (along >= 1.0 - most)
+        near = np.flatnonzero(is_near)
+        # along each periodic vector: which points a number of steps brings near enough
+        fits: list[dict[int, BoolArray]] = []
+        for along, most in zip(fractions[near].T, reach, strict=True):
+            steps = range(-int(most) - 1, int(most) + 2)
+            fits.append({n: (along + n >= -most) & (along + n <= 1.0 + most) for n in steps})
+        shifts = [shift for shift in product(*fits) if any(shift)]
+        rows = [
+            near[np.all([fit[n] for fit, n in zip(fits, shift, strict=True)], axis=0)]
+            for shift in shifts
+        ]
         row = np.concatenate(rows)
         image = np.zeros((len(row), 3), np.int64)
         image[:, periodic] = np.repeat(shifts, [len(some) for some in rows], axis=0)
-        order = np.argsort(row, kind="stable")
-        row, image = row[order], image[order]
-        places = np.take(position, row, axis=0) + image.astype(np.float64) @ self.vectors
-        return places, row, image
+        return np.take(position, row, axis=0) + image.astype(np.float64) @ self.vectors, row, image
 
     def images_near_origin(
         self, position: FloatArray, reach: FloatArray

@@ -89,9 +89,9 @@ def test_contacts_are_those_of_the_slow_twin(check, times):
 def test_contacts_are_those_of_the_slow_twin_uncompiled():
     run_uncompiled(
         "import numpy as np\n"
-        "from scanfab.packing import kernels\n"
+        "from scanfab.packing import search\n"
         "from tests.packing import test_search as here\n"
-        "assert not hasattr(kernels.find_pairs, 'py_func')\n"
+        "assert not hasattr(search.find_pairs, 'py_func')\n"
         "for seed in range(20):\n"
         "    here.check_random_open(np.random.default_rng(seed))\n"
         "    here.check_random_periodic(np.random.default_rng(seed))\n"
