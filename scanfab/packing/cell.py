@@ -15,7 +15,7 @@ from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.lattice import Lattice
 
-# longest periodic edge over the smallest height: the search for images cannot count further
+# The longest periodic edge over the smallest height; the search for images can count so far.
 WIDEST = 1e9
 
 
@@ -33,12 +33,12 @@ class Cell:
     origin : array_like, shape (3,), optional
         Corner of the cell, in the dump's length unit.
     space : Space, optional
-        The plane of the discs in it: all vectors lie there but one, which does not repeat.
+        The plane of discs: two vectors lie in it, and the third does not repeat.
 
     Raises
     ------
     PackingError
-        If the vectors span no volume, or one that repeats is absurdly longer than the cell is high.
+        If the vectors span no volume, or if the cell is absurdly flat.
 
     Examples
     --------
@@ -114,12 +114,12 @@ class Cell:
 
     @property
     def is_endless(self) -> bool:
-        """Whether the packing repeats along all vectors; in a plane along both that lie in it."""
+        """Whether the packing repeats along all vectors; of discs, along both in their plane."""
         return sum(self.periodic) == self.space.dimension
 
     @property
     def own_vectors(self) -> FloatArray:
-        """The vectors, shape (3, 3); in a plane those that lie in it, there, shape (2, 2)."""
+        """The vectors, shape (3, 3); of discs the two in their plane, shape (2, 2)."""
         if self.space.across is None:
             return self.vectors
         inside = self.vectors[:, self.space.across] == 0.0
@@ -156,9 +156,9 @@ class Cell:
         """
         Whether all positions lie in the cell along its periodic vectors, as in most dumps.
 
-        The corners of the box around the positions settle it, as fractions are linear; in a tilted
-        cell the box may reach beyond the cell though no position does. To place them all would take
-        ten times as long, and three times their memory.
+        Only the corners of the box around the positions are tested, which suffices as fractions are
+        linear. In a tilted cell the box may reach beyond the cell although no position does. To
+        place all positions would take ten times as long, and three times their memory.
 
         Parameters
         ----------
@@ -168,7 +168,7 @@ class Cell:
         Returns
         -------
         bool
-            False where the box does not settle it, too.
+            False also if the box reaches beyond the cell.
         """
         if len(position) == 0:
             return True
@@ -178,7 +178,7 @@ class Cell:
 
     def place(self, position: npt.ArrayLike) -> tuple[FloatArray, IntArray]:
         """
-        Positions moved into the cell, and by how many lattice vectors each had left it.
+        Move positions into the cell, and count the lattice vectors that this takes.
 
         Parameters
         ----------
@@ -190,7 +190,7 @@ class Cell:
         position : ndarray, shape (N, 3)
             Inside the cell along its periodic vectors.
         turns : ndarray of int, shape (N, 3)
-            Lattice vectors from there to where it was; 0 along vectors that do not repeat.
+            Lattice vectors from there to the given position; 0 along vectors that do not repeat.
         """
         position = np.asarray(position, dtype=np.float64)
         turns = np.where(self.periodic, np.floor(self.fractional(position)), 0.0)
@@ -217,12 +217,12 @@ class Cell:
 
     @cached_property
     def lattice(self) -> Lattice:
-        """The periodic vectors, reduced: the same lattice by vectors that are short."""
+        """The lattice of the periodic vectors, by its shortest vectors."""
         return Lattice.of(self.vectors, self.periodic)
 
     @property
     def short_vectors(self) -> FloatArray:
-        """The cell by its reduced periodic vectors and its other ones, shape (3, 3)."""
+        """The vectors of the cell, with the periodic ones reduced, shape (3, 3)."""
         vectors = self.vectors.copy()
         vectors[np.flatnonzero(self.periodic)] = self.lattice.vectors
         return vectors

@@ -4,33 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from scanfab.base.errors import PackingError, SettingsError
 from scanfab.base.jit import inner, kernel
 from scanfab.base.space import SPACE, Space
-from scanfab.base.typing import FloatArray, IntArray, RowArray
+from scanfab.base.typing import BoolArray, FloatArray, IntArray, RowArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import contacts_of, geometry
 from scanfab.packing.packing import Packing
+from scanfab.packing.window import Window
 
-if TYPE_CHECKING:
-    from scanfab.packing.sample import Sample, Variant
-    from scanfab.packing.window import Window
-
-# Grains of one grid differ by no more than this factor, so that dust is not sought in bins that are
-# as wide as boulders.
+# The radii in one grid differ by at most this factor, so that bins are not much wider than grains.
 CLASS_RATIO = 3.5
-# Bins are a little wider than the longest contact: rounding moves no grain two bins away.
+# Bins are a little wider than the longest contact, so that rounding moves no grain two bins away.
 ROOM = 1.0 + 1e-9
-# Contacts a grain that the first attempt has room for, and, in the mean of all grains, that only a
-# mistake of units makes.
+# The first attempt has room for so many contacts a grain. A mean above MOST_CONTACTS is a mistake
+# of units.
 USUAL_CONTACTS, MOST_CONTACTS = 4, 1000
-# grains that tell where the others are
+# The extents of the grains are estimated from so many of them.
 SAMPLE = 10_000
-# cells that a contact may span: a grain as large as that is a mistake of units
+# A grain that spans more periodic cells is a mistake of units.
 MOST_CELLS = 20
 
 
@@ -82,7 +78,7 @@ def find_contacts(packing: Packing, tolerance: float = 0.0) -> Packing:
 
 class NearPairs(NamedTuple):
     """
-    Pairs of a region's grains whose surfaces are near, and how much the grains shade.
+    Pairs of grains in a region whose surfaces are near, and the shadow of the grains.
 
     Attributes
     ----------
@@ -93,11 +89,11 @@ class NearPairs(NamedTuple):
     reduced_radius : ndarray, shape (M,)
         r1 r2 / (r1 + r2), dump's length unit.
     shadow : float
-        What lines of one direction meet of all grains: Σ π r², of discs Σ 2 r.
+        Projected area of all grains: Σ π r², of discs Σ 2 r.
     volume : float
-        Of the region, of discs its area.
+        Volume of the region, of discs its area.
     space : Space
-        The plane in which discs lie.
+        The plane of the discs, if the grains are discs.
     """
 
     normal: FloatArray
@@ -108,28 +104,28 @@ class NearPairs(NamedTuple):
     space: Space = SPACE
 
 
-def near_pairs(sample: Sample, variant: Variant, window: Window | None, gap: float) -> NearPairs:
+def near_pairs(
+    packing: Packing, solid: BoolArray, counted: BoolArray, window: Window | None, gap: float
+) -> NearPairs:
     """
-    The pairs of a variant's solids whose surfaces are no more than a gap apart.
+    The pairs of solid grains whose surfaces are no more than a gap apart.
 
     Parameters
     ----------
-    sample : Sample
-        Of spheres, without clumps.
-    variant : Variant
-        Whose solids.
+    packing : Packing
+        Spheres, without clumps.
+    solid, counted : ndarray of bool, shape (N,)
+        Grains that form pairs, and grains in the region; only solid ones have a shadow.
     window : Window or None
-        The RV, in which the pairs' middles and the grains' centres lie; None for a whole that
-        repeats along all vectors of its cell.
+        The RV, in which the middles of the pairs lie. None for a sample that repeats along all
+        vectors of its cell.
     gap : float
-        Between surfaces, dump's length unit.
+        Largest gap between surfaces, dump's length unit.
 
     Returns
     -------
     NearPairs
     """
-    packing = sample.packing
-    solid = sample.grains & ~sample.removed(variant)
     position, radius = packing.position[solid], packing.radius[solid]
     pairs, image = overlapping_pairs(position, radius + 0.5 * gap, 1.0, packing.cell)
     normal, middle, distance = geometry(position, radius, pairs, image, packing.cell)
@@ -142,7 +138,7 @@ def near_pairs(sample: Sample, variant: Variant, window: Window | None, gap: flo
         volume = packing.cell.volume
     one, two = radius[pairs[chosen]].T
     overlap, reduced = one + two - distance[chosen], one * two / (one + two)
-    shadow = packing.space.shadow(radius[sample.counted(variant, window)[solid]])
+    shadow = packing.space.shadow(radius[counted[solid]])
     return NearPairs(normal[chosen], overlap, reduced, shadow, volume, packing.space)
 
 
