@@ -141,7 +141,8 @@ def _grains_at(grains: GrainTable, points: FloatArray) -> IntArray:
         points, position = grains.cell.wrap(points), grains.cell.wrap(position)
         # rounding may put a point and its centre at opposite faces: search images outside, too
         margin = min(SAME_PLACE * float(radius.max()), float(grains.cell.heights.min()))
-        position, row, _ = grains.cell.with_images(position, margin)
+        images, repeated, _ = grains.cell.images_outside(position, margin)
+        position, row = np.concatenate([position, images]), np.append(row, repeated)
     distance, nearest = KDTree(position).query(points)
     same = distance < SAME_PLACE * radius[row[nearest]]
     return np.where(same, row[nearest], -1)

@@ -137,7 +137,9 @@ class VariantColumns:
             return None
         if self.cutoff > longest or self.measured.void is None:
             return None
-        pairs = near_pairs(self.sample, self.variant, self.window, self.cutoff)
+        solids = self.sample.grains & ~self.sample.removed(self.variant)
+        counted = self.sample.counted(self.variant, self.window)
+        pairs = near_pairs(packing, solids, counted, self.window, self.cutoff)
         return predicted.predicted_alpha(pairs, 1.0 - solid, self.cutoff, settings.axis)
 
     @property

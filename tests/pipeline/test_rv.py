@@ -149,7 +149,7 @@ BEYOND, NOTHING, IMAGE = (
             "flat", "box", {"rv_size": "0.1,0.1,0.1", "rv_center": "10.8,8.8,5.8"},
             "holds no grain: choose another `rv_center` or a larger RV",
         ),
-        ("tilted", "sphere", {"rv": 1.5}, "wider than the cell's shortest period"),
+        ("tilted", "sphere", {"rv": 1.5}, IMAGE),
         ("tilted", "box", {"rv_size": "6.1,1,1"}, rf"{IMAGE}, \(.*\) away"),
         ("tilted", "ellipsoid", {"rv_size": "3.1,1,1"}, IMAGE),
         ("tilted", "cylinder", {"rv_size": "0.4,100"}, IMAGE),
