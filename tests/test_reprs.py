@@ -76,7 +76,6 @@ OBJECTS = [
         Sample(Packing(np.eye(3), 0.7, contacts=PAIRS), np.array([False, False, True]), 1),
         "Sample: 2 grains, 0 rattlers (fewer than 1 contact); 1 boundary particle",
     ),
-    (Sample(Packing(np.eye(3), 0.1), np.zeros(3, bool)), "Sample: 3 grains"),
     (direction_rule("lebedev:11"), "DirectionRule lebedev:11: 25 axes, exact to degree 11"),
     (
         direction_rule("equal-angle-full:10"),
@@ -116,7 +115,6 @@ def test_of_a_scan():
 @pytest.mark.parametrize(
     ("options", "shown"),
     [
-        ({}, "Settings()"),
         ({"variants": "cd", "cutoff": "0.5rmin"}, "Settings(variants='cd', cutoff='0.5rmin')"),
         ({"cutoff": 0.25, "axis": "x"}, "Settings(cutoff=0.25, axis='x')"),
         ({"boundary": ["type=2", "id>7"]}, "Settings(boundary=['type=2', 'id>7'])"),

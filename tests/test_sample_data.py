@@ -15,7 +15,6 @@ from tests.helpers.truth import (
     PERIODIC,
     SAMPLE_DATA,
     TRIAXIAL,
-    YADE,
     csv_rows,
 )
 
@@ -113,31 +112,6 @@ def test_the_small_liggghts_states_have_their_true_numbers(state, files):
     fabric = scanfab.contact_fabric(packing.contacts.normal).components()
     for name in COMPONENTS:
         assert fabric[name] == pytest.approx(truth[f"gc_{name}"], abs=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("prefix", "grains", "contacts", "options"),
-    [
-        ("", "id-spheres-00000000.vtk.gz", "id-intrs-00000000.vtk.gz", {}),
-        ("", "ascii_spheres.30000.vtu", "ascii_intrs.30000.vtp", {}),
-        ("", "zlib_spheres.30000.vtu", "zlib_intrs.30000.vtp", {}),
-        (
-            "periodic_",
-            "periodic-spheres-00000000.vtk.gz",
-            "periodic-intrs-00000000.vtk.gz",
-            {"cell": (0.02863940766875124, 0.03212233831079451, 0.03546973927065077)},
-        ),
-    ],
-)
-def test_the_small_yade_states_have_their_true_numbers(prefix, grains, contacts, options):
-    truth = csv_rows(YADE / f"{prefix}truth_contacts.csv")
-    packing = scanfab.read(YADE / grains, contacts=YADE / contacts, **options)
-    assert len(packing.contacts) == len(truth)
-    normal = np.column_stack([truth["nx"], truth["ny"], truth["nz"]])
-    expected = scanfab.contact_fabric(normal).components()
-    fabric = scanfab.contact_fabric(packing.contacts.normal).components()
-    for name in COMPONENTS:
-        assert fabric[name] == pytest.approx(expected[name], abs=1e-5)
 
 
 POURED, SHEARED = SAMPLE_DATA / "liggghts_clumps", SAMPLE_DATA / "yade_clumps"

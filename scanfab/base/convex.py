@@ -2,8 +2,8 @@
 Convex regions about the origin: which points, segments and spheres lie in them.
 
 A region is the image of a body under a linear map. The map makes every ellipsoid from the unit ball
-and every box from a cube. The closed formulas of the body hold for the image too, so a window that
-deforms with its sample needs no formulas of its own.
+and every box from a cube. The formulas of the body hold for the image too, so a window that deforms
+with its sample needs no formulas of its own.
 
 The first two columns of the map span a region in a plane, and the third column is the unit normal.
 Such a flat region has an area in place of a volume, and lengths in place of areas.
@@ -11,17 +11,96 @@ Such a flat region has an area in place of a volume, and lengths in place of are
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.bodies import AXES, POINTS, Hull, Product, on_circle, on_sphere
 from scanfab.base.typing import BoolArray, FloatArray
 
 # STEPS: most steps of the walk to the point of a region that is nearest to a sphere.
 # ROUNDING: relative differences of lengths below this are rounding.
 STEPS, ROUNDING = 200, 1e-12
+# a polyhedron and its copy share nothing unless a ball of this size, relative to both, fits in
+SLIVER = 1e-9
+# number of points on a sphere and on a circle
+POINTS, POINTS_OF_A_RIM = 2000, 128
+
+
+def on_sphere() -> FloatArray:
+    """Points of the unit sphere along a spiral; each stands for nearly the same area."""
+    z = 1.0 - (2.0 * np.arange(POINTS) + 1.0) / POINTS
+    turn = np.arange(POINTS) * np.pi * (3.0 - np.sqrt(5.0))
+    across = np.sqrt(1.0 - z**2)
+    return np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
+
+
+def on_circle() -> FloatArray:
+    """Points of the circle of radius 1 about z."""
+    turn = np.arange(POINTS_OF_A_RIM) * 2.0 * np.pi / POINTS_OF_A_RIM
+    return np.column_stack([np.cos(turn), np.sin(turn), np.zeros(POINTS_OF_A_RIM)])
+
+
+@dataclass(eq=False)
+class Body:
+    """
+    A convex polyhedron that contains the origin; :mod:`scanfab.base.shapes` adds round bodies.
+
+    Points above and below a body that lies in a plane count as inside.
+    """
+
+    outline: FloatArray
+    """Points of its surface, shape (K, 3); their hull is the body, or nearly if it is curved."""
+    planes: FloatArray
+    """Its flat faces, shape (P, 4): each row n, d keeps the side n·x < d."""
+    volume: float
+    form: FloatArray = field(default_factory=lambda: np.zeros(3))
+    """The diagonal of M in x·M x < 1, which bounds its curved face; 0 if there is none."""
+    is_symmetric: bool = False
+    """Whether it contains -x with each x."""
+    is_flat: bool = False
+    """Whether it lies in a plane."""
+
+    def support(self, along: FloatArray) -> FloatArray:
+        """The point of the body that lies furthest along each vector, shape (N, 3)."""
+        return np.asarray(self.outline[np.argmax(along @ self.outline.T, axis=1)])
+
+    def reach(self, frame: FloatArray) -> float:
+        """Radius of a ball about the origin that holds the image frame @ x."""
+        return float(np.linalg.norm(self.outline @ frame.T, axis=1).max())
+
+    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
+        """
+        Volume shared with a copy moved by ``length * shift``, and its slope; see `Convex.overlap`.
+
+        The slope is the projected area of the shared part along the shift, times its length.
+        """
+        from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+        shared, slope = np.zeros((2, len(shift)))
+        for k, vector in enumerate(shift):
+            room, ball = self.shared_with(length * vector)
+            if ball[3] > SLIVER * self.reach(np.eye(3)):
+                bounds = np.column_stack([self.planes[:, :3], -room])
+                part = ConvexHull(HalfspaceIntersection(bounds, ball[:3]).intersections)
+                a, b, c = np.moveaxis(part.points[part.simplices], 1, 0)
+                shared[k] = part.volume
+                slope[k] = 0.25 * np.abs(np.cross(b - a, c - a) @ vector).sum()
+        return shared, slope
+
+    def shared_with(self, shift: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """
+        The part that a polyhedron shares with a copy that is moved by a vector.
+
+        It is returned as the distance of each plane from the origin, shape (P,), and as centre and
+        radius (four numbers) of its largest ball; if there is no such part, the radius is negative.
+        """
+        from scipy.optimize import linprog
+
+        normals, distance = self.planes[:, :3], self.planes[:, 3]
+        room = distance + np.minimum(normals @ shift, 0.0)
+        depth = np.column_stack([normals, np.ones(len(normals))])
+        return room, linprog([0, 0, 0, -1], depth, room, bounds=[(None, None)] * 4).x
 
 
 class Quadric(NamedTuple):
@@ -68,7 +147,7 @@ class Convex:
         Radius of a ball about the origin that holds the region; for a sphere its own radius.
     size : str
         Size in words for messages, for instance ``radius 2``.
-    body : Product or Hull
+    body : Body
         The body that is mapped.
     frame : ndarray, shape (3, 3)
         The linear map: the region holds the points frame @ x for all x in the body.
@@ -89,7 +168,7 @@ class Convex:
     high: FloatArray
     reach: float
     size: str
-    body: Product | Hull
+    body: Body
     frame: FloatArray
 
     def __repr__(self) -> str:
@@ -116,7 +195,7 @@ class Convex:
     @property
     def mean_shadow(self) -> float:
         """Projected area, averaged over all directions to a few per cent; in a plane a length."""
-        axes = on_sphere()[:: POINTS // AXES]
+        axes = on_sphere()[::10]
         if self.is_flat:
             axes = on_circle()[:, :2] @ np.linalg.qr(self.frame[:, :2])[0].T
         return float(self.overlap(axes, 0.0)[1].mean())
@@ -271,29 +350,12 @@ class Convex:
         return scale * shared, scale * slope
 
     def meets_itself(self, shift: FloatArray) -> bool:
-        """
-        Whether the region overlaps a copy of itself that is moved by a vector.
-
-        Parameters
-        ----------
-        shift : ndarray, shape (3,)
-            Dump's length unit.
-
-        Returns
-        -------
-        bool
-        """
+        """Whether the region overlaps a copy that is moved by a vector, in dump's length unit."""
         if self.body.is_symmetric:
             # two copies of a symmetric body meet if the point halfway between their centres does
             return bool(self.contains(0.5 * shift[None])[0])
-        from scipy.optimize import linprog
-
-        # the radius of the largest ball that fits into both copies
-        normals, distance = self.planes[:, :3], self.planes[:, 3]
-        both = distance + np.minimum(normals @ shift, 0.0)
-        depth = np.column_stack([normals, np.ones(len(normals))])
-        solution = linprog([0, 0, 0, -1], depth, both, bounds=[(None, None)] * 4)
-        return bool(solution.x[3] > ROUNDING * self.reach)
+        _, ball = self.body.shared_with(np.asarray(np.linalg.solve(self.frame, shift)))
+        return bool(ball[3] > SLIVER * self.body.reach(np.eye(3)))
 
     def deformed(self, gradient: FloatArray) -> Convex:
         """
@@ -315,7 +377,7 @@ class Convex:
         return image_of(self.body, gradient @ self.frame, f"deformed, first {self.size}")
 
 
-def image_of(body: Product | Hull, frame: FloatArray, size: str) -> Convex:
+def image_of(body: Body, frame: FloatArray, size: str) -> Convex:
     """The region of the points frame @ x for all x in the body."""
     inverse = np.linalg.inv(frame)
     planes = np.column_stack([body.planes[:, :3] @ inverse, body.planes[:, 3]])

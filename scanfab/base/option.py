@@ -56,7 +56,7 @@ class Option:
     """Default value as users would write it."""
     parse: Parse = lambda name, value: value
     """Function of name and value that checks and converts; converted values pass unchanged."""
-    choices: Sequence[str] | Callable[[], Iterable[str]] = ()
+    choices: Iterable[str] | Callable[[], Iterable[str]] = ()
     """Words that a shell completes. An option without a parser accepts no others."""
     also: str = ""
     """What is accepted beside the choices; for FILE a shell also completes file names."""

@@ -1,4 +1,4 @@
-"""Shapes of windows, from sizes or from a triangulated surface."""
+"""Shapes of windows, from sizes or from a triangulated surface, and the bodies they are made of."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.bodies import Hull, Product
-from scanfab.base.convex import Convex, Quadric, image_of
+from scanfab.base.convex import Body, Convex, Quadric, image_of, on_circle, on_sphere
 from scanfab.base.errors import SettingsError
 from scanfab.base.option import number
 from scanfab.base.space import SPACE, Space
@@ -20,6 +19,72 @@ from scanfab.base.typing import FloatArray, IntArray
 TOLERANCE = 1e-6
 # Every line is cut by every face, so the faces must not be too many.
 MOST_FACES = 1000
+# volume of the unit ball (3 axes) and area of the unit disc (2 axes); 1 for no round part
+VOLUME_OF_BALL = {0: 1.0, 2: math.pi, 3: 4.0 / 3.0 * math.pi}
+
+
+class Product(Body):
+    """
+    The product of a ball or disc of radius 1 and of edges from -1 to 1 along the other axes.
+
+    A cylinder is a disc times an edge; a cube is three edges. ``is_round`` is the number of axes of
+    the round part: 3 for a ball, 2 for a disc, 0 for none.
+    """
+
+    def __init__(self, is_round: int, edges: int) -> None:
+        size = is_round + edges
+        axes = np.eye(3)[is_round:size]
+        planes = np.column_stack([np.concatenate([axes, -axes]), np.ones(2 * edges)])
+        outline = {0: np.zeros((1, 3)), 2: on_circle(), 3: on_sphere()}[is_round]
+        for axis in axes:
+            # one copy is reversed, so that the corners of a square follow one another around it
+            outline = np.concatenate([outline + axis, outline[::-1] - axis])
+        volume = VOLUME_OF_BALL[is_round] * 2.0**edges
+        form = np.repeat([1.0, 0.0], [is_round, 3 - is_round])
+        super().__init__(outline, planes, volume, form, is_symmetric=True, is_flat=size == 2)
+        self.is_round, self.size = is_round, size
+
+    def support(self, along: FloatArray) -> FloatArray:
+        """The point of the body that lies furthest along each vector, shape (N, 3)."""
+        place = np.where(along < 0.0, -1.0, 1.0) * (np.arange(3) < self.size)
+        across = np.linalg.norm(along[:, : self.is_round], axis=1, keepdims=True)
+        place[:, : self.is_round] = along[:, : self.is_round] / np.where(across > 0.0, across, 1.0)
+        return place
+
+    def reach(self, frame: FloatArray) -> float:
+        """
+        Radius of a ball about the origin that holds the image frame @ x.
+
+        It is slightly too large for a sheared cylinder, whose axis is not normal to its ends.
+        """
+        if not self.is_round:
+            return super().reach(frame)
+        ends, axis = frame[:, : self.is_round], frame[:, self.is_round : self.size].sum(axis=1)
+        widest = np.linalg.svd(ends, compute_uv=False)[0]
+        square = widest**2 + axis @ axis
+        return float(np.sqrt(square + 2.0 * np.linalg.norm(ends.T @ axis)))
+
+    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
+        """
+        Volume shared with a copy moved by ``length * shift``, and its slope.
+
+        The results are those of :meth:`scanfab.Convex.overlap`. They are products over the factors
+        of the body: an edge shares a shorter edge, a disc a lens, and a ball two caps.
+        """
+        step = np.abs(shift[:, self.is_round : self.size]).T
+        edge = np.maximum(2.0 - length * step, 0.0)
+        shared, slope = [*edge], [*np.where(edge > 0.0, step, 0.0)]
+        across = np.linalg.norm(shift[:, : self.is_round], axis=1)
+        q = np.minimum(length * across, 2.0)
+        if self.is_round == 2:
+            chord = np.sqrt(4.0 - q**2)
+            shared.append(2.0 * np.arccos(0.5 * q) - 0.5 * q * chord)
+            slope.append(across * chord)
+        elif self.is_round == 3:
+            shared.append(self.volume * (1.0 - 0.75 * q + q**3 / 16.0))
+            slope.append(np.pi * across * (1.0 - 0.25 * q**2))
+        others = [np.prod(shared[:i] + shared[i + 1 :], axis=0) for i in range(len(shared))]
+        return np.prod(shared, axis=0), np.sum(np.multiply(slope, others), axis=0)
 
 
 BALL, DISC, COLUMN = Product(3, 0), Product(2, 0), Product(2, 1)
@@ -235,10 +300,5 @@ def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatAr
     volume = np.abs(np.linalg.det(corners))
     centroid = volume @ corners.sum(axis=1) / (4.0 * volume.sum())
     planes[:, 3] -= planes[:, :3] @ centroid
-    # each triangle is assigned to the plane with the most similar normal
-    sides = corners[:, 1:] - corners[:, :1]
-    each = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    face = np.argmax(hull.equations[:, :3] @ planes[:, :3].T, axis=1)
-    areas = np.bincount(face, weights=each, minlength=len(planes)).astype(float)
-    body = Hull(points[hull.vertices] - centroid, planes, areas, float(hull.volume))
+    body = Body(points[hull.vertices] - centroid, planes, float(hull.volume))
     return image_of(body, np.eye(3), f"surface of {len(planes)} faces"), middle + centroid

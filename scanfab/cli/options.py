@@ -43,7 +43,7 @@ SETS: dict[str, Sequence[str]] = {
         "rv_size",
         "rv_axis",
         "rv_follows",
-    ),  # fmt: skip
+    ),
     "EXCERPT": ("fields", "digits"),
 }
 # --cutoff of commands that take tables
@@ -87,10 +87,10 @@ class SourceCommand(Command):
         for parameter in self.get_params(ctx):
             record = parameter.get_help_record(ctx) if isinstance(parameter, click.Option) else None
             if record is not None:
-                option = DECLARED.get(str(parameter.name))
-                group = "output" if option is None else "" if option.first else option.group
+                option = DECLARED.get(str(parameter.name), Option("", str, ""))
                 # pad, so that the texts of all groups are aligned
-                records[group].append((record[0].ljust(COLUMN), record[1]))
+                padded = record[0].ljust(COLUMN), record[1]
+                records["" if option.first else option.group].append(padded)
         for group in (group for group in TITLES if records[group]):
             with formatter.section(TITLES[group]):
                 formatter.write_dl(records[group], col_max=COLUMN)
@@ -146,7 +146,7 @@ def _click_option(option: Option, changes: Mapping[str, Any]) -> Callable[[Funct
     }
     words, default = as_options(attributes["help"]), attributes.get("default")
     # show the default 0 of a number, but not the default False of a switch
-    if default is not None and default != () and default is not False and "(default: " not in words:
+    if default not in (None, ()) and default is not False and "(default: " not in words:
         # click would write 10000000000.0 and 0.0 instead of 1e10 and 0
         short = f"{default:g}".replace("e+", "e") if isinstance(default, float) else default
         words += f"  [default: {short}]"
@@ -184,11 +184,11 @@ def take_output(chosen: dict[str, Any], *kinds: str) -> Output:
     outputs = Output(**{name: chosen.pop(name) for name in vars(Output()) if name in chosen})
     if outputs.plot is None and outputs.figure is not None:
         raise click.UsageError("--figure goes with --plot FILE")
-    if outputs.figure is not None:
-        with usage_errors():
+    with usage_errors():
+        if outputs.figure is not None:
             find_figure(outputs.figure, *kinds)
-    if outputs.plot is not None:
-        with usage_errors("--plot: "):
+    with usage_errors("--plot: "):
+        if outputs.plot is not None:
             check_plot_file(outputs.plot)
     return outputs
 
@@ -211,10 +211,9 @@ def tables_argument(**more: Any) -> Callable[[Function], Function]:
 
 def check_labels(labels: tuple[str, ...], tables: tuple[Any, ...]) -> None:
     """Raise a usage error unless there is one label for each table, or none at all."""
-    if labels and len(labels) != len(tables):
-        raise click.UsageError(
-            f"--label: expected one per table: {len(tables)}, found {len(labels)}"
-        )
+    if len(labels) not in (0, len(tables)):
+        expected = f"expected one per table: {len(tables)}"
+        raise click.UsageError(f"--label: {expected}, found {len(labels)}")
 
 
 def _expanded(

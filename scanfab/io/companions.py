@@ -8,7 +8,6 @@ whatever its ending. :func:`scanfab.convert` writes them, and reading the grain 
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,7 +19,7 @@ from scanfab.io.columns import BODIES, WALLS, whole_numbers
 from scanfab.io.contacts import join_ids
 from scanfab.io.families import numbers_in
 from scanfab.io.files import bare_name, check_memory, first_bytes, plain
-from scanfab.io.reader import GrainTable, JoinedContacts, Snapshot
+from scanfab.io.reader import GrainTable, JoinedContacts
 from scanfab.io.writer import Left, as_arrays, csv_bytes, more_columns
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
@@ -158,10 +157,6 @@ class FrameData(NamedTuple):
     """The number of grains; None if the file does not say."""
     contacts: int | None
     """The number of contacts; None if no contacts file is needed."""
-
-    def moment_of(self, snapshot: Snapshot) -> Snapshot:
-        """The snapshot with this step and time; without a step, numbers in its name are ignored."""
-        return replace(snapshot, step=self.step, time=self.time, stepless=self.step is None)
 
 
 def read_frame(path: Path) -> FrameData | None:

@@ -141,7 +141,8 @@ def _grains_at(grains: GrainTable, points: FloatArray) -> IntArray:
         points, position = grains.cell.wrap(points), grains.cell.wrap(position)
         # rounding may put a point and its centre at opposite faces: search images outside, too
         margin = min(SAME_PLACE * float(radius.max()), float(grains.cell.heights.min()))
-        position, row, _ = grains.cell.with_images(position, margin)
+        images, repeated, _ = grains.cell.images_outside(position, margin)
+        position, row = np.concatenate([position, images]), np.append(row, repeated)
     distance, nearest = KDTree(position).query(points)
     same = distance < SAME_PLACE * radius[row[nearest]]
     return np.where(same, row[nearest], -1)
@@ -289,6 +290,8 @@ def join_table(path: Path, grains: GrainTable, columns: Columns) -> JoinedContac
     force = _force(path, grains, rows, columns) if (rows >= 0).all() else None
     force_n = columns.get("fn") if force is None else None
     if force_n is not None:
+        if force_n.dtype.kind not in "biuf":
+            raise ReadError(f"{path}: expected numbers in the column fn, found text")
         # compression is positive, and nearly all contacts are under compression
         doubt = "are above 0, so it is unclear which sign means compression"
         sign = _sign(doubles(force_n), f"{path}: the normal forces are left out", doubt)

@@ -92,7 +92,7 @@ def convert(
     pattern = out / f"frame_{STEP}{writer.extensions[0]}" if is_folder else out
     check_folder(pattern if out.is_dir() else out)
     refuse_unknown("convert", reading, [*READING, "to", "frames"])
-    packings = _packings(source, parse_frames(frames), reading)
+    packings = _packings(source, parse_frames("frames", frames), reading)
     if STEP not in pattern.name:
         # look for a second frame before the file is written
         first = list(islice(packings, 2))
@@ -154,10 +154,16 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
     """
     writer = writer or writer_for(path)
     companions = [file for kind in HEADS if (file := companion_there(path, kind))]
-    other = _other_grains(path) if companions else None
-    if other is not None:
-        names = " and ".join(file.name for file in companions)
-        raise SettingsError(f"{path}: {names} may belong to {other.name}: choose another name")
+    if companions:
+        # they may belong to another grain file of the same stem
+        offers = [*installed_writers().values(), *installed_readers().values()]
+        endings = sorted({ending for offer in offers for ending in offer.plugin.extensions})
+        stem, packed = Path(bare_name(path)).stem, ("", *COMPRESSED_SUFFIXES)
+        names = [f"{stem}{ending}{more}" for ending in endings for more in packed]
+        for other in (name for name in names if name != path.name):
+            if path.with_name(other).is_file():
+                theirs = " and ".join(file.name for file in companions)
+                raise SettingsError(f"{path}: {theirs} may belong to {other}: choose another name")
     with ExitStack() as files:
         # the stack is unwound in reverse: the grain file appears last, after its companion files
         left = writer.write(packing, files.enter_context(whole_file(path)))
@@ -172,13 +178,3 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
         note(f"{path.name}: {text}")
     if packing.wall_forces is not None:
         note(f"{path.name}: the forces of contacts with walls are left out: no format has them")
-
-
-def _other_grains(path: Path) -> Path | None:
-    """Another grain file of the same stem, to which existing companion files may belong."""
-    offers = [*installed_writers().values(), *installed_readers().values()]
-    endings = sorted({ending for offer in offers for ending in offer.plugin.extensions})
-    stem = Path(bare_name(path)).stem
-    names = [f"{stem}{ending}{more}" for ending in endings for more in ("", *COMPRESSED_SUFFIXES)]
-    others = [path.with_name(name) for name in names if name != path.name]
-    return next((file for file in others if file.is_file()), None)

@@ -12,7 +12,6 @@ import os
 import re
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from itertools import chain, takewhile
@@ -35,6 +34,8 @@ NUMBER = re.compile(r"\d+")
 
 def expanded(source: PathLike) -> list[PathLike]:
     """The paths that a quoted glob matches (no shell expanded it); any other source as it is."""
+    if not os.fspath(source):
+        raise ReadError("'': expected the name of a folder or file, found an empty name")
     if Path(source).exists() or not glob.has_magic(os.fspath(source)):
         return [source]
     paths: list[PathLike] = [*sorted(glob.glob(os.fspath(source)))]
@@ -78,15 +79,6 @@ def files_in(folder: Path) -> list[Path]:
     names = [name for name in sorted(os.listdir(folder)) if name != SETTINGS_FILE]
     files = [folder / name for name in names if name[0] != "." and not name.endswith(LEFTOVERS)]
     return [file for file in files if file.is_file()]
-
-
-def files_around(files: Iterable[Path]) -> list[Path]:
-    """All files in the folders of the given files; folders that cannot be listed are skipped."""
-    around: list[Path] = []
-    for folder in {file.parent: None for file in files}:
-        with suppress(OSError):
-            around += files_in(folder)
-    return around
 
 
 @dataclass(frozen=True)
@@ -201,14 +193,12 @@ def _family_of(
             clash = f"two files for one step: {files[step]} and {file}: name one of them"
     pattern = _glob([file for _, file in members], among)
     family = Family(pattern, files, None, "other", None, clash, has_steps)
-    reader = None
     try:
-        reader = reader_for(family.largest, options)
-        kind = "other" if reader is None else reader.kind(family.largest)
+        family = replace(family, reader=reader_for(family.largest, options))
+        return replace(family, kind=family.reader.kind(family.largest)) if family.reader else family
     except ReadError as error:
         # kept, not raised: a folder is read without its damaged files
-        return replace(family, reader=reader, problem=str(error))
-    return replace(family, reader=reader, kind=kind)
+        return replace(family, problem=str(error))
 
 
 def _glob(members: list[Path], among: Iterable[Path]) -> str:

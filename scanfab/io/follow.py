@@ -14,6 +14,7 @@ from typing import Any
 
 from scanfab.base.errors import PackingError, ReadError, warn
 from scanfab.base.option import refuse_unknown, unusable
+from scanfab.base.spelling import counted
 from scanfab.io.families import Family, PathLike, files_in
 from scanfab.io.files import Stamp, growing, stamp_of
 from scanfab.io.frame import Frame
@@ -105,7 +106,7 @@ class FollowedSeries(Series):
         """Why the source cannot be opened, or the next frame cannot be read."""
 
     def __repr__(self) -> str:
-        return f"FollowedSeries {self.name}: {len(self._taken)} frames so far"
+        return f"FollowedSeries {self.name}: {counted(len(self._taken), 'frame')} so far"
 
     def _every(self) -> Iterator[Frame]:
         return (frame for frame in self.as_they_come() if frame is not None)

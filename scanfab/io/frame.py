@@ -163,6 +163,10 @@ class Frame:
         ):
             parts.append(JoinedContacts(None, grains.wall_contacts, grains.wall_forces))
         none = np.zeros(len(grains.radius), np.int64)
+        # forces of walls are known if all files that list contacts with walls have them
+        walls = [part.wall_forces for part in parts if part.wall_contacts.any()]
+        forces = [part for part in walls if part is not None]
+        are_known = bool(forces) and len(forces) == len(walls)
         return Packing(
             grains.position,
             grains.radius,
@@ -171,7 +175,9 @@ class Frame:
             bodies=body_numbers(path, grains, series.options.bodies),
             contacts=lists[0] if lists else None,
             wall_contacts=sum((part.wall_contacts for part in parts), none) if parts else None,
-            wall_forces=_wall_forces(parts),
+            wall_forces=ListedWallForces(*map(np.concatenate, zip(*forces, strict=True)))
+            if are_known
+            else None,
             cell=grains.cell,
             step=self.step,
             time=self.snapshot.time,
@@ -249,12 +255,3 @@ class Frame:
             frame = f"frame {self.number}, step {self.step}, {self.snapshot.path}"
             raise ReadError(f"{cells.path}: has no row with the cell of {frame}")
         return replace(options, cell=vectors)
-
-
-def _wall_forces(walls: list[JoinedContacts]) -> ListedWallForces | None:
-    """The forces of all contacts with walls; None if a file lists wall contacts without forces."""
-    parts = [part.wall_forces for part in walls if part.wall_contacts.any()]
-    forces = [part for part in parts if part is not None]
-    if not forces or len(forces) < len(parts):
-        return None
-    return ListedWallForces(*(np.concatenate(values) for values in zip(*forces, strict=True)))

@@ -117,21 +117,16 @@ def _read_one(path: Path) -> Mesh:
     if NO_POINTS.match(head):
         # VTK reports an empty file as an error
         return Mesh(np.zeros((0, 3)), {}, NO_LINES, {}, False, {})
-    if form == "Xdmf":
-        _check_xdmf(path)
+    for item in elements(path).iter() if form == "Xdmf" else ():
+        if "include" in item.tag.lower():
+            raise ReadError(f"{path}: XDMF that includes other files is not read")
+        if item.get("Format", "").upper() in ("HDF", "BINARY"):
+            # ReadError if this file is outside the folder
+            file_inside(path, (item.text or "").strip().partition(":")[0])
     mesh = fenced(mesh_in_worker, path)
     if TEXT.match(head) and not plain(path).read_bytes()[-1:].isspace():
         warn(f"{path}: the last line has no end: its last number may be cut off")
     return mesh
-
-
-def _check_xdmf(path: Path) -> None:
-    """ReadError if an XDMF file names a file outside its folder."""
-    for item in elements(path).iter():
-        if "include" in item.tag.lower():
-            raise ReadError(f"{path}: XDMF that includes other files is not read")
-        if item.get("Format", "").upper() in ("HDF", "BINARY"):
-            file_inside(path, (item.text or "").strip().partition(":")[0])
 
 
 def elements(path: Path) -> ElementTree.Element:

@@ -67,13 +67,11 @@ def parse_cell(name: str, value: Any) -> tuple[float, ...] | str | PathLike[str]
     return numbers(expected, lambda cell: len(cell) in (3, 6) and min(cell[:3]) > 0)(name, value)
 
 
-def parse_frames(text: str | int | slice | None, name: str = "frames") -> slice:
-    """A slice from ``A:B:C`` or a single number."""
-    if text is None:
-        return slice(None)
-    if isinstance(text, slice):
-        return text
-    words = str(text).split(":")
+def parse_frames(name: str, value: str | int | slice | None) -> slice:
+    """A slice from ``A:B:C`` or a single number; None gives all frames."""
+    if value is None or isinstance(value, slice):
+        return value or slice(None)
+    words = str(value).split(":")
     with suppress(ValueError):
         if len(words) == 1:
             first = int(words[0])
@@ -82,7 +80,7 @@ def parse_frames(text: str | int | slice | None, name: str = "frames") -> slice:
         parts = [int(word) if word.strip() else None for word in words]
         if len(parts) <= 3 and parts[2:] != [0]:
             return slice(*parts)
-    raise unusable(name, "a slice such as 0:10:2, :5 or -1:", text)
+    raise unusable(name, "a slice such as 0:10:2, :5 or -1:", value)
 
 
 def parse_periodic(name: str, value: Any) -> str | None:
@@ -161,6 +159,6 @@ def take_reading(options: dict[str, Any]) -> dict[str, Any]:
         If a value is not valid.
     """
     return {
-        option.name: option.parse(option.name, options.pop(option.name, option.default))
-        for option in READING_OPTIONS
+        known.name: known.parse(known.name, options.pop(known.name, known.default))
+        for known in READING_OPTIONS
     }

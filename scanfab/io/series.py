@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from itertools import chain, islice
 from operator import index
 from pathlib import Path
@@ -135,7 +135,8 @@ class Series:
         place = index(key)
         frames = list(islice(self, place, place + 1) if place >= 0 else deque(self, -place))
         if not frames or len(frames) < -place:
-            raise NoFrameError(f"{self.name}: has {len(self)} frames, there is no frame {place}")
+            count = counted(len(self), "frame")
+            raise NoFrameError(f"{self.name}: has {count}, there is no frame {place}")
         return frames[0]
 
     def _with(self, numbers: range) -> Series:
@@ -227,7 +228,9 @@ class Series:
             try:
                 snapshots = self._snapshots_of(self.grains, path)
                 if len(snapshots) == 1 and (frame_data := read_frame(path)) is not None:
-                    snapshots = [frame_data.moment_of(snapshots[0])]
+                    # without a step in the frame file, numbers in the name are not a step either
+                    step, time, stepless = frame_data.step, frame_data.time, frame_data.step is None
+                    snapshots = [replace(snapshots[0], step=step, time=time, stepless=stepless)]
             except ReadError as error:
                 snapshots, problem = [Snapshot(path)], error
             for snapshot in snapshots:

@@ -184,7 +184,12 @@ def _series(given: Sequence[PathLike], contacts: PathLike, options: ReadOptions)
     """Sort the files of the sources, and make a series of their grains and contacts."""
     paths = [Path(path) for path in given]
     files = [file for path in paths for file in sorting.files_of(path)]
-    around = [] if any(path.is_dir() for path in paths) else sorting.files_around(files)
+    around: list[Path] = []
+    if not any(path.is_dir() for path in paths):
+        # the contacts of single files may lie beside them
+        for folder in dict.fromkeys(file.parent for file in files):
+            with suppress(OSError):
+                around += sorting.files_in(folder)
     groups = sorting.group_by_name(files, around)
     families = sorting.sort_into_families(files, options, groups)
     if options.format is None:

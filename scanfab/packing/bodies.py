@@ -1,4 +1,4 @@
-"""Bodies, also called clumps: which spheres are one grain, where it is, and its volume."""
+"""Bodies, also called clumps: which spheres are one grain, where the grain is, and its volume."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ if TYPE_CHECKING:
     from scanfab.packing.cell import Cell
     from scanfab.packing.packing import Packing
 
-# columns of dumps, by their names in lower case: these number clumps, whatever the format
+# Names of columns in lower case. In any format, these columns number clumps.
 CLUMP_COLUMNS = ("id_multisphere", "clumpid", "clump_id", "clump")
-# and these molecules, which may be clumps, or species, or bonded spheres; 0 stands for none
+# These number molecules, which may be clumps, species or bonded spheres; 0 stands for none.
 MOLECULE_COLUMNS = ("mol", "molecule")
-# rays through pairs of spheres of one clump, all together: a second or two
+# Rays through all pairs of spheres of one clump together, which take a second or two.
 MOST_RAYS = 1 << 23
-# of a sphere, where clumps are so many that their errors cancel, and where they are few
+# Rays of a sphere: the errors of many clumps cancel, so a few rays do; few clumps need more.
 FEWEST_RAYS, ENOUGH_RAYS = 256, 4096
-# rays through pairs of spheres at a time: some tens of megabytes
+# Rays through pairs of spheres at a time, which take some tens of megabytes.
 CHUNK = 1 << 20
 
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
     """
-    The bodies of a packing of which at least one has several spheres.
+    The bodies of a packing in which at least one body has several spheres.
 
-    All arrays have a row for each sphere, so that nobody has to translate between spheres and
-    bodies: what is one for a whole body stands at each of its spheres.
+    All arrays have a row for each sphere. A value of a whole body stands at each of its spheres, so
+    that nobody has to translate between spheres and bodies.
 
     Attributes
     ----------
     number : ndarray of int, shape (N,)
-        As the source numbers the bodies; negative for a sphere that is a body of its own.
+        Number of the body in the source; negative for a sphere that is a body of its own.
     head : ndarray of int, shape (N,)
-        Row of the first sphere of each one's body.
+        Row of the first sphere of the body.
     turns : ndarray of int, shape (N, 3)
-        Lattice vectors from where the sphere is to where it is next to the first one of its body.
+        Lattice vectors from the sphere in the cell to its image next to the first sphere.
     place : ndarray, shape (N, 3)
         Place of the body next to its first sphere, dump's length unit: the mean of its spheres'
         centres, weighted by their volumes.
@@ -57,44 +57,42 @@ class Bodies:
 
     @property
     def is_head(self) -> BoolArray:
-        """Whether a sphere is the first one of its body: true once a body, shape (N,)."""
+        """Whether a sphere is the first one of its body, shape (N,)."""
         return np.asarray(self.head == np.arange(len(self.head)))
 
     @property
     def has_many(self) -> BoolArray:
-        """Whether a sphere's body has more spheres, shape (N,)."""
+        """Whether the body of a sphere has several spheres, shape (N,)."""
         return np.asarray(np.bincount(self.head, minlength=len(self.head))[self.head] > 1)
 
     def count(self, chosen: BoolArray) -> int:
-        """Of how many bodies some spheres are, shape (N,)."""
+        """Number of bodies with a chosen sphere; ``chosen`` has shape (N,)."""
         return len(np.unique(self.head[chosen]))
 
     def whole(self, chosen: BoolArray) -> BoolArray:
-        """All spheres of the bodies of which one is chosen, shape (N,)."""
+        """All spheres of bodies with a chosen sphere, shape (N,)."""
         some = np.zeros(len(self.head), np.bool_)
         some[self.head[chosen]] = True
         return some[self.head]
 
     def to_place(self, position: FloatArray, cell: Cell | None) -> FloatArray:
-        """From each sphere, where it lies in the cell, to the place of its body, shape (N, 3)."""
+        """Vectors from each sphere in the cell to the place of its body, shape (N, 3)."""
         vectors = np.zeros((3, 3)) if cell is None else cell.vectors
         return self.place - position - self.turns @ vectors
 
     def image(self, pairs: RowArray, image: RowArray) -> IntArray:
         """
-        Lattice translations from first body to second, of which spheres touch, shape (M, 3).
+        Lattice translations between bodies, shape (M, 3), from those between their spheres.
 
-        Those of the spheres are from where each of them lies in the cell; these are from where the
-        first spheres of both bodies lie.
+        The translation of spheres counts from the sphere in the cell, that of bodies from their
+        first spheres.
         """
-        one, two = pairs.T
-        moved: IntArray = image + self.turns[one] - self.turns[two]
-        return moved
+        return np.asarray(image + self.turns[pairs[:, 0]] - self.turns[pairs[:, 1]])
 
     def between(self, pairs: RowArray, image: RowArray) -> BoolArray:
-        """Which pairs of spheres are not of one body (or of it and its image), shape (M,)."""
+        """Which pairs of spheres belong to two bodies, or to a body and its image, shape (M,)."""
         one, two = pairs.T
-        # a sphere and itself are for others to judge
+        # a sphere that touches itself is an error, which the caller reports
         apart = (self.head[one] != self.head[two]) | (one == two)
         same = np.flatnonzero(~apart)
         apart[same] = self.image(pairs[same], image[same]).any(axis=1)
@@ -114,15 +112,15 @@ def bodies_of(
     Parameters
     ----------
     number : ndarray of int, shape (N,)
-        Spheres of one number are one body, each of a negative one is a body of its own.
+        Spheres of one number are one body. A sphere with a negative number is a body of its own.
     position : ndarray, shape (N, 3)
         Inside the cell, dump's length unit.
     radius : ndarray, shape (N,)
         Dump's length unit.
     cell : Cell, optional
-        Through its periodic faces each sphere is next to the first one of its body.
+        The spheres of a body may lie on both sides of its periodic faces.
     space : Space, optional
-        The plane of discs, whose places are weighted with their areas.
+        The plane of discs. Their areas take the place of volumes.
 
     Examples
     --------
@@ -144,7 +142,7 @@ def bodies_of(
     if cell is not None and cell.is_periodic:
         turns = cell.nearest_image(branch)
         branch = branch + turns @ cell.vectors
-    # over that of the body's largest sphere: the cube of a length may be beyond all numbers
+    # in units of the body's largest sphere, as the cube of a length may overflow
     largest = np.zeros(len(head))
     np.maximum.at(largest, head, radius)
     volume = (radius / largest[head]) ** space.dimension
@@ -155,34 +153,32 @@ def bodies_of(
 
 
 class Grouping(NamedTuple):
-    """The spheres of a frame, those of one body by one number."""
+    """The spheres of a frame, and the bodies that they belong to."""
 
     id: IntArray
-    """Shape (N,): as the dump numbers the spheres."""
+    """Number of each sphere in the dump, shape (N,)."""
     body: IntArray
-    """Shape (N,): the id of the first sphere of each one's body."""
+    """The id of the first sphere of the body of each sphere, shape (N,)."""
 
 
 def regrouped(first: int, before: Grouping, now: Grouping) -> Note | None:
     """
-    What to tell if other spheres are one body than before, or other spheres are there.
+    Say that bodies consist of other spheres than before, or that spheres have come or gone.
 
     Parameters
     ----------
     first : int
         Number of the frame before.
     before, now : Grouping
-        The numbers of bodies may be others, as long as the same spheres are one.
+        Bodies may have other numbers, as long as they consist of the same spheres.
     """
     common, early, late = np.intersect1d(before.id, now.id, return_indices=True)
     one, two = before.body[early], now.body[late]
     both = len(np.unique(np.column_stack([one, two]), axis=0))
     if not both == len(np.unique(one)) == len(np.unique(two)):
-        text = (
-            f"other spheres are one body than in frame {first}: each frame is computed with its "
-            f"own bodies; is the column that numbers them the right one (`bodies`)?"
-        )
-        return Note("other_bodies", text)
+        text = f"other spheres are one body than in frame {first}, so each frame has its own bodies"
+        cure = "does the column of `bodies` number bodies?"
+        return Note("other_bodies", f"{text}: {cure}")
     if len(common) == len(before.id) == len(now.id):
         return None
     here, there = (
@@ -195,18 +191,18 @@ def regrouped(first: int, before: Grouping, now: Grouping) -> Note | None:
 
 def own_shares(packing: Packing, directions: Callable[[int], FloatArray]) -> FloatArray:
     """
-    Of each sphere, the part of its volume that no sphere of the same clump before it covers.
+    The share of each sphere's volume that no earlier sphere of the same clump covers.
 
-    Rays run from its centre to its surface, and what the others cover of each ray is exact; so is
-    the volume of two spheres or a rod. Of clumps of another shape 1e-4 to 1e-3 are uncertain, each
-    by itself: over many of them it is less.
+    Rays run from the centre of a sphere to its surface. The part of each ray inside other spheres
+    is exact, and so is the volume of two spheres or of a rod. The volume of other clumps has a
+    relative error of 1e-4 to 1e-3, which averages out over many clumps.
 
     Parameters
     ----------
     packing : Packing
-        Of spheres that are grains, or parts of clumps.
+        Its spheres are grains, or parts of clumps.
     directions : callable
-        Gives so many unit vectors, evenly spread, shape (P, 3).
+        Makes a number of unit vectors that are evenly spread, shape (P, 3).
 
     Returns
     -------
@@ -218,7 +214,7 @@ def own_shares(packing: Packing, directions: Callable[[int], FloatArray]) -> Flo
     if bodies is None:
         return share
     position = -bodies.to_place(packing.position, packing.cell)
-    # all pairs of spheres of one body, the earlier and the later row
+    # all pairs of spheres of one body, the earlier row and the later one
     order = np.argsort(bodies.head, kind="stable")
     starts = np.searchsorted(bodies.head[order], bodies.head[order], side="left")
     place = np.arange(len(order)) - starts
@@ -230,7 +226,7 @@ def own_shares(packing: Packing, directions: Callable[[int], FloatArray]) -> Flo
     one, two, apart = one[meet], two[meet], apart[meet]
     rays = directions(int(np.clip(MOST_RAYS // max(len(one), 1), FEWEST_RAYS, ENOUGH_RAYS)))
     _, first, before = np.unique(two, return_index=True, return_counts=True)
-    # what the nearest covers is known; rays tell what the others cover beyond it
+    # the part that the nearest sphere covers is a lens; rays measure what others cover beyond it
     lens = lens_volumes(apart, radius[one], radius[two], space) / space.volume(radius[two])
     for count in np.unique(before):
         pairs = first[before == count][:, None] + np.arange(count)
@@ -251,20 +247,20 @@ def _beyond(
     place: FloatArray, radius: FloatArray, nearest: IntArray, rays: FloatArray, dimension: int
 ) -> FloatArray:
     """
-    The part of spheres' volumes that others cover beyond what the nearest does.
+    The share of spheres' volumes that others cover beyond the nearest one.
 
     Places and radii of the others, shape (spheres, others), are in radii of their sphere.
     """
     depth = place @ rays.T
     reach = np.square(radius) - np.einsum("...i,...i->...", place, place)
     half = np.sqrt(np.maximum(reach[..., None] + depth**2, 0.0))
-    # where rays enter and leave others
+    # where rays enter and leave other spheres
     into, out = np.clip(depth - half, 0.0, 1.0), np.clip(depth + half, 0.0, 1.0)
     row = np.arange(len(nearest))
     known = (out[row, nearest] ** dimension - into[row, nearest] ** dimension).mean(axis=1)
     order = np.argsort(into, axis=1)
     into, out = (np.take_along_axis(ends, order, axis=1) for ends in (into, out))
-    # of each stretch what lies beyond those that begin before it
+    # each stretch begins behind the stretches that begin before it
     until = np.maximum.accumulate(out, axis=1)
     into[:, 1:] = np.maximum(into[:, 1:], until[:, :-1])
     covered = np.maximum(out**dimension - into**dimension, 0.0)
@@ -276,7 +272,7 @@ def lens_volumes(
     apart: FloatArray, one: FloatArray, two: FloatArray | float, space: Space = SPACE
 ) -> FloatArray:
     """
-    Volumes that pairs of spheres share; of discs areas.
+    Volumes that pairs of spheres share; of discs the areas.
 
     Parameters
     ----------
@@ -291,18 +287,14 @@ def lens_volumes(
     is_inside = apart <= np.abs(two - one)
     distance = np.where(is_inside, 1.0, apart)
     if space.is_plane:
-        return np.where(is_inside, smaller, _lens_areas(distance, one, two))
+        # two segments of circles, each a sector less its triangle
+        lens = np.zeros_like(distance)
+        for r, other in ((one, two), (two, one)):
+            height = (distance**2 + np.square(r) - np.square(other)) / (2.0 * distance)
+            cosine = np.clip(height / r, -1.0, 1.0)
+            lens = lens + np.square(r) * (np.arccos(cosine) - cosine * np.sqrt(1.0 - cosine**2))
+        return np.where(is_inside, smaller, lens)
     deep = np.maximum(two + one - apart, 0.0)
     lens = np.pi * deep**2 / (12.0 * distance)
     lens *= distance**2 + 2.0 * distance * (one + two) - 3.0 * (one - two) ** 2
     return np.where(is_inside, smaller, lens)
-
-
-def _lens_areas(apart: FloatArray, one: FloatArray, two: FloatArray | float) -> FloatArray:
-    """Two segments of circles, each a sector less its triangle."""
-    found = np.zeros_like(apart)
-    for r, other in ((one, two), (two, one)):
-        height = (apart**2 + np.square(r) - np.square(other)) / (2.0 * apart)
-        cosine = np.clip(height / r, -1.0, 1.0)
-        found = found + np.square(r) * (np.arccos(cosine) - cosine * np.sqrt(1.0 - cosine**2))
-    return found

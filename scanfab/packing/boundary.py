@@ -14,11 +14,11 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.typing import BoolArray
 from scanfab.packing.packing import Packing
 
-# values that a message lists one by one
+# A message lists at most so many values one by one.
 MOST_LISTED = 10
-# classes of one column, and particles, with which it may tell a boundary
+# A column may name the boundary if it has no more classes, and the frame no fewer particles.
 MOST_CLASSES, FEWEST = 20, 50
-# columns that sort particles into classes
+# Columns that sort particles into classes, by their names in lower case.
 CLASS_COLUMNS = ("type", "mask", "material", "matid", "materialid", "mat", "group")
 
 
@@ -39,13 +39,13 @@ class BoundaryRule:
     text: str
     column: str
     ranges: tuple[tuple[float, float], ...]
-    """Smallest and largest values."""
+    """Smallest and largest value of each range."""
     is_negated: bool
-    """Whether the particles are those with values in none of the ranges."""
+    """Whether the rule selects the particles outside the ranges."""
 
     @classmethod
     def parse(cls, text: str) -> BoundaryRule:
-        """Read an expression; SettingsError if it is none."""
+        """Read an expression; SettingsError if the text is no expression."""
         match = re.fullmatch(r"\s*([^<>=!]+?)\s*(>=|<=|!=|==|=|>|<)\s*(.+?)\s*", text)
         try:
             if match is None:
@@ -74,7 +74,7 @@ class BoundaryRule:
         Raises
         ------
         SettingsError
-            If there is no such column, or it has gaps.
+            If there is no such column, or some particles have no value in it.
         """
         if len(packing) == 0:
             return np.zeros(0, dtype=bool)  # an empty frame may have lost its columns
@@ -83,8 +83,7 @@ class BoundaryRule:
         if gaps.any():
             raise SettingsError(
                 f"boundary: the column {self.column} has no value for {np.count_nonzero(gaps)} of "
-                f"{len(gaps)} particles (the first is in row {np.argmax(gaps) + 1}): expected one "
-                f"for each"
+                f"{len(gaps)} particles (the first is in row {np.argmax(gaps) + 1})"
             )
         within = [(values >= low) & (values <= high) for low, high in self.ranges]
         return np.asarray(np.any(within, axis=0) != self.is_negated)
@@ -92,30 +91,26 @@ class BoundaryRule:
 
 def select_boundary(packing: Packing, rules: Sequence[BoundaryRule]) -> BoolArray:
     """
-    The particles that any of the expressions holds for, shape (N,).
+    The particles for which any of the expressions holds, shape (N,).
 
     Raises
     ------
     SettingsError
         If a column does not exist.
     """
-    chosen = np.zeros(len(packing), dtype=bool)
-    for rule in rules:
-        chosen |= rule.select(packing)
-    return chosen
+    none = np.zeros(len(packing), dtype=bool)
+    return np.asarray(np.any([none, *(rule.select(packing) for rule in rules)], axis=0))
 
 
 def existing_values(packing: Packing, rules: Sequence[BoundaryRule]) -> str:
-    """The values that the columns of some expressions have, for messages."""
+    """Spell the values in the columns of some expressions, for messages."""
     if len(packing) == 0:
         return "there are no particles"
     told = []
     for name in dict.fromkeys(rule.column for rule in rules):
-        found = np.unique(_column(packing, name))
-        values = " or ".join(f"{value:g}" for value in found[:MOST_LISTED])
-        told.append(
-            f"{name} is {values if found.size <= MOST_LISTED else f'{found[0]:g} to {found[-1]:g}'}"
-        )
+        found = [f"{value:g}" for value in np.unique(_column(packing, name))]
+        is_short = len(found) <= MOST_LISTED
+        told.append(f"{name} is {' or '.join(found) if is_short else f'{found[0]} to {found[-1]}'}")
     return "; ".join(told)
 
 
@@ -123,8 +118,8 @@ def enclosing_class(packing: Packing) -> str | None:
     """
     The class of particles that encloses the others, as an expression; None if there is none.
 
-    All particles of the class lie farther out than nearly all others, measured in the box of the
-    sample, round or square.
+    All its particles are farther from the centre than 98 % of the others. Distances are in half the
+    sample's extents, and either Euclidean or the largest coordinate, for round or square samples.
     """
     classes: list[tuple[str, npt.NDArray[Any], npt.NDArray[Any]]] = []
     for name, values in packing.columns.items():

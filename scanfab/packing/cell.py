@@ -12,10 +12,10 @@ from scanfab.base.arrays import MOST, all_within
 from scanfab.base.errors import PackingError
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import spelt_place
-from scanfab.base.typing import FloatArray, IntArray
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.lattice import Lattice
 
-# longest periodic edge over the smallest height: the search for images cannot count further
+# The longest periodic edge over the smallest height; the search for images can count so far.
 WIDEST = 1e9
 
 
@@ -33,12 +33,12 @@ class Cell:
     origin : array_like, shape (3,), optional
         Corner of the cell, in the dump's length unit.
     space : Space, optional
-        The plane of the discs in it: all vectors lie there but one, which does not repeat.
+        The plane of discs: two vectors lie in it, and the third does not repeat.
 
     Raises
     ------
     PackingError
-        If the vectors span no volume, or one that repeats is absurdly longer than the cell is high.
+        If the vectors span no volume, or if the cell is absurdly flat.
 
     Examples
     --------
@@ -114,12 +114,12 @@ class Cell:
 
     @property
     def is_endless(self) -> bool:
-        """Whether the packing repeats along all vectors; in a plane along both that lie in it."""
+        """Whether the packing repeats along all vectors; of discs, along both in their plane."""
         return sum(self.periodic) == self.space.dimension
 
     @property
     def own_vectors(self) -> FloatArray:
-        """The vectors, shape (3, 3); in a plane those that lie in it, there, shape (2, 2)."""
+        """The vectors, shape (3, 3); of discs the two in their plane, shape (2, 2)."""
         if self.space.across is None:
             return self.vectors
         inside = self.vectors[:, self.space.across] == 0.0
@@ -156,9 +156,9 @@ class Cell:
         """
         Whether all positions lie in the cell along its periodic vectors, as in most dumps.
 
-        The corners of the box around the positions settle it, as fractions are linear; in a tilted
-        cell the box may reach beyond the cell though no position does. To place them all would take
-        ten times as long, and three times their memory.
+        Only the corners of the box around the positions are tested, which suffices as fractions are
+        linear. In a tilted cell the box may reach beyond the cell although no position does. To
+        place all positions would take ten times as long, and three times their memory.
 
         Parameters
         ----------
@@ -168,7 +168,7 @@ class Cell:
         Returns
         -------
         bool
-            False where the box does not settle it, too.
+            False also if the box reaches beyond the cell.
         """
         if len(position) == 0:
             return True
@@ -178,7 +178,7 @@ class Cell:
 
     def place(self, position: npt.ArrayLike) -> tuple[FloatArray, IntArray]:
         """
-        Positions moved into the cell, and by how many lattice vectors each had left it.
+        Move positions into the cell, and count the lattice vectors that this takes.
 
         Parameters
         ----------
@@ -190,7 +190,7 @@ class Cell:
         position : ndarray, shape (N, 3)
             Inside the cell along its periodic vectors.
         turns : ndarray of int, shape (N, 3)
-            Lattice vectors from there to where it was; 0 along vectors that do not repeat.
+            Lattice vectors from there to the given position; 0 along vectors that do not repeat.
         """
         position = np.asarray(position, dtype=np.float64)
         turns = np.where(self.periodic, np.floor(self.fractional(position)), 0.0)
@@ -217,12 +217,12 @@ class Cell:
 
     @cached_property
     def lattice(self) -> Lattice:
-        """The periodic vectors, reduced: the same lattice by vectors that are short."""
+        """The lattice of the periodic vectors, by its shortest vectors."""
         return Lattice.of(self.vectors, self.periodic)
 
     @property
     def short_vectors(self) -> FloatArray:
-        """The cell by its reduced periodic vectors and its other ones, shape (3, 3)."""
+        """The vectors of the cell, with the periodic ones reduced, shape (3, 3)."""
         vectors = self.vectors.copy()
         vectors[np.flatnonzero(self.periodic)] = self.lattice.vectors
         return vectors
@@ -243,11 +243,11 @@ class Cell:
         """
         return self.lattice.nearest(np.asarray(branch, dtype=np.float64))
 
-    def with_images(
+    def images_outside(
         self, position: FloatArray, margin: float
-    ) -> tuple[FloatArray, npt.NDArray[np.intp], IntArray]:
+    ) -> tuple[FloatArray, IntArray, IntArray]:
         """
-        Points in the cell, and their periodic images that lie outside within a margin of it.
+        Periodic images of points in the cell that lie outside within a margin of it.
 
         Parameters
         ----------
@@ -259,29 +259,33 @@ class Cell:
         Returns
         -------
         position : ndarray, shape (K, 3)
-            The points and their images, all of one point behind one another.
+            The images.
         row : ndarray of int, shape (K,)
-            The point that each one is, or repeats.
+            The point that each image repeats.
         image : ndarray of int, shape (K, 3)
-            Lattice translation from that point; 0 for the point itself. Those of one point ascend.
+            Lattice translation from that point.
         """
         periodic = list(self.periodic)
         fractions, reach = self.fractional(position)[:, periodic], margin / self.heights[periodic]
         # only points near a face have images near the cell
-        near = np.flatnonzero(np.any((fractions <= reach) | (fractions >= 1.0 - reach), axis=1))
-        shifts = np.array(list(product(*(range(-int(n), int(n) + 1) for n in np.ceil(reach)))))
-        rows = []
-        for shift in shifts:
-            moved = fractions[near] + shift
-            inside = np.all((moved >= -reach) & (moved <= 1.0 + reach), axis=1)
-            rows.append(near[inside] if shift.any() else np.arange(len(position)))
+        is_near = np.zeros(len(position), np.bool_)
+        for along, most in zip(fractions.T, reach, strict=True):
+            is_near |= (along <= most) | (along >= 1.0 - most)
+        near = np.flatnonzero(is_near)
+        # along each periodic vector: which points a number of steps brings near enough
+        fits: list[dict[int, BoolArray]] = []
+        for along, most in zip(fractions[near].T, reach, strict=True):
+            steps = range(-int(most) - 1, int(most) + 2)
+            fits.append({n: (along + n >= -most) & (along + n <= 1.0 + most) for n in steps})
+        shifts = [shift for shift in product(*fits) if any(shift)]
+        rows = [
+            near[np.all([fit[n] for fit, n in zip(fits, shift, strict=True)], axis=0)]
+            for shift in shifts
+        ]
         row = np.concatenate(rows)
         image = np.zeros((len(row), 3), np.int64)
         image[:, periodic] = np.repeat(shifts, [len(some) for some in rows], axis=0)
-        order = np.argsort(row, kind="stable")
-        row, image = row[order], image[order]
-        places = np.take(position, row, axis=0) + image.astype(np.float64) @ self.vectors
-        return places, row, image
+        return np.take(position, row, axis=0) + image.astype(np.float64) @ self.vectors, row, image
 
     def images_near_origin(
         self, position: FloatArray, reach: FloatArray

@@ -16,60 +16,56 @@ from scanfab.packing.packing import FEWEST, Packing, space_of, spelt_plane
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox
 
-# names of columns that may say which spheres are one body, in lower case
-COLUMNS = (*CLUMP_COLUMNS, *MOLECULE_COLUMNS)
-# A clump is smaller than this part of the sample, or of the period.
-SMALL = 0.5
-# A body that is no longer than this, over the median of all, is like the others.
-LONG = 3.0
-# contacts a grain that no packing of spheres has
+# A clump is smaller than this part of the sample, or of the period. A body whose length is at most
+# LONG times the median of all is like the others.
+SMALL, LONG = 0.5, 3.0
+# No packing of spheres has so many contacts a grain.
 MANY_CONTACTS = 30
-# Volume of the grains over that of the box of their surfaces: only clumps of many spheres overlap
+# Volume of the grains over that of the box of their surfaces. Only clumps of many spheres overlap
 # as much.
 SOLIDS = 20.0
-# part of a period without any grain
+# A period is doubtful if this part of it has no grain.
 EMPTY = 0.2
-# Over the sum of two radii: grains whose neighbours are not further apart touch, but for rounding.
+# If nearest neighbours are no further apart than this, in sums of their radii, the gap is rounding.
 CLOSED = 1.01
-# what formats without a cell lack, and what makes up for it
+# What formats without a cell lack, and the option that makes up for it.
 CELL_LACKS = {
     "nothing": ("this format carries no cell", "`cell=(LX, LY, LZ)`"),
     "box": ("this format has a box, but does not say whether it repeats", '`periodic="xyz"`'),
 }
-# grains of a face, at most, that tell whether it fits the opposite one
+# At most so many grains of a face are compared with the opposite face.
 MOST_GRAINS = 2000
-# In mean radii: lengths that differ by no more are one period, as contacts overlap a little.
+# Lengths that differ by less than this, in mean radii, are one period: contacts overlap a little.
 SAME = 0.1
 # Contacts through a face, over those through the middle: 0.6 to 1.5 in periodic samples, up to 0.3
 # between flat walls.
 FITS = 0.5
-# Of these contacts, the share that may overlap more, as those do where a contact is oblique.
+# This share of the contacts through a face may overlap more, as oblique contacts do.
 BEYOND = 0.4
 
 
 def refuse_impossible(sample: Sample) -> None:
     """
-    Refuse what cannot be measured.
+    Refuse a frame that cannot be measured.
 
     Raises
     ------
     PackingError
-        If the solids do not fit into their own box by far.
+        If the grains have many times the volume of the box around them.
     """
     packing, radius = sample.packing, sample.packing.radius[sample.grains]
-    # a program that lists contacts knew the radii; in clumps, spheres may lie on top of one another
+    # A program that lists contacts knows the radii. The spheres of a clump may overlap.
     listed = packing.contacts is not None and packing.contacts.source == "file"
     if len(radius) < FEWEST or listed or packing.bodies is not None:
         return
     extents = SurfaceBox.of(packing, sample.grains).extents[list(packing.space.along)]
-    # relative to the box, as the volumes of many grains may be beyond all numbers
+    # in units of the box, as the volume in the dump's unit may overflow
     scale = np.exp(np.log(extents).mean())
     solid = float(np.sum(packing.space.volume(radius / scale)))
     if solid >= SOLIDS:
         raise PackingError(
-            f"the grains' volumes add up to {solid:.3g} times that of the box that they lie in "
-            f"({_sizes(packing.position[sample.grains], radius)}): check the units of radius and "
-            f"position"
+            f"the grains have {solid:.3g} times the volume of the box that they lie in "
+            f"({_sizes(sample)}): check the units of radius and position"
         )
 
 
@@ -77,30 +73,29 @@ def doubts_of(
     sample: Sample, *, cell_is_named: bool = False, bodies_are_named: bool = False
 ) -> list[Note]:
     """
-    What a user should know of a frame whose contacts are known.
+    Notes on what looks wrong in a frame whose contacts are known.
 
     Parameters
     ----------
     sample : Sample
         One frame.
     cell_is_named : bool, optional
-        Whether the user has said what the cell is, or what is periodic, and may be mistaken.
+        Whether the user has named the cell, or along which axes it repeats, and may be mistaken.
     bodies_are_named : bool, optional
-        Whether the user has said which spheres are one body: that each is one, if none are.
+        Whether the user has said which spheres are one body, or that each is one of its own.
     """
     if len(sample.packing) < FEWEST:
         return []
     asked = {"clumps": not bodies_are_named, "empty_period": cell_is_named}
     texts = {code: rule(sample) for code, rule in RULES.items() if asked.get(code, True)}
     if texts.get("clumps"):
-        # the spheres of a clump overlap
-        texts["many_contacts"] = ""
+        texts["many_contacts"] = ""  # the spheres of a clump overlap
     return [Note(code, text) for code, text in texts.items() if text]
 
 
 def cell_doubt(sample: Sample, carries: str) -> str:
     """
-    What to tell of a sample whose opposite faces fit together, if its format has no cell.
+    Say that opposite faces of a sample fit together, if its format has no cell.
 
     Parameters
     ----------
@@ -123,7 +118,7 @@ def cell_doubt(sample: Sample, carries: str) -> str:
 
 
 def cell_hint(sample: Sample, carries: str) -> str:
-    """What to tell of any sample whose format has no cell: most are open, and nothing is wrong."""
+    """Say that a format has no cell; nothing is wrong with it, as most samples are open."""
     if carries == "cell" or sample.packing.is_periodic:
         return ""
     lacks, cure = CELL_LACKS[carries]
@@ -131,27 +126,26 @@ def cell_hint(sample: Sample, carries: str) -> str:
 
 
 def _read_as_spheres(sample: Sample) -> str:
+    """Centres that lie in a plane are those of discs."""
     packing, plane = sample.packing, space_of(sample.packing.position)
     if packing.space.is_plane or not plane.is_plane:
         return ""
     return (
         f"all {len(packing)} centres lie in {plane} ({spelt_plane(packing.position, plane)}), but "
-        f"are taken for spheres in three dimensions: discs are read with `dim=2`"
+        f"are taken for spheres: `dim=2` reads discs"
     )
 
 
 def _clumps(sample: Sample) -> str:
     """
-    A column that numbers clumps, where each sphere counts as a grain.
+    A column may number clumps although each sphere counts as a grain.
 
-    A clump has several spheres that lie close together. A number that many spheres all over the
-    sample have in common is that of a species or a molecule.
+    The spheres of a clump lie close together. If spheres all over the sample share a number, it is
+    that of a species or a molecule.
     """
-    packing = sample.packing
-    if packing.bodies is not None:
-        return ""
-    for name, values in packing.columns.items():
-        if name.lower() not in COLUMNS or values.ndim != 1 or values.dtype.kind not in "iuf":
+    packing, known = sample.packing, (*CLUMP_COLUMNS, *MOLECULE_COLUMNS)
+    for name, values in packing.columns.items() if packing.bodies is None else ():
+        if name.lower() not in known or values.ndim != 1 or values.dtype.kind not in "iuf":
             continue
         rows = np.flatnonzero(values > 0)
         _, counts, extents = _extents_of(packing.position[rows], values[rows])
@@ -161,38 +155,33 @@ def _clumps(sample: Sample) -> str:
         if several.any() and close.sum() >= 0.5 * several.sum():
             return (
                 f"the column {name} names {several.sum()} clumps of {counts[several].sum()} "
-                f"spheres, but each sphere counts as a grain in contacts, coordination and "
-                f'rattlers (variants b and d): if the clumps are rigid, `bodies="{name}"` makes '
-                f"each of them one grain"
+                f"spheres, but each sphere counts as a grain: if the clumps are rigid, "
+                f'`bodies="{name}"` makes each of them one grain'
             )
     return ""
 
 
 def _spread_bodies(sample: Sample) -> str:
-    """Bodies that a periodic face may cut, or whose column may number something else."""
+    """A periodic face may cut a body, or the column may number something else."""
     bodies, cell, position = sample.packing.bodies, sample.packing.cell, sample.packing.position
     if bodies is None:
         return ""
     periodic = np.zeros(3, np.bool_)
     if cell is not None and cell.is_periodic:
-        # along the shortest vectors of the cell, in periods where these repeat
+        # fractions along the shortest vectors of the cell
         position = (position + bodies.turns @ cell.vectors) @ np.linalg.inv(cell.short_vectors)
         periodic = np.array(cell.periodic)
     rows = np.flatnonzero(bodies.has_many)
     heads, _, extents = _extents_of(position[rows], bodies.head[rows])
     wide = extents > SMALL * np.where(periodic, 1.0, np.ptp(position, axis=0))
-    # in a sample of few large clumps all are as long
+    # if the sample consists of few large clumps, all are as long
     alone = (extents > LONG * np.median(extents, axis=0)) | wide.all(axis=1, keepdims=True)
     spread = heads[(wide & (periodic | alone)).any(axis=1)]
     if spread.size == 0:
         return ""
     where, cure = "sample", "if the sample is periodic, name its cell (`cell`, `periodic`)"
     if periodic.any():
-        where = "cell"
-        cure = (
-            "their spheres are put together next to the first of them, which is right for bodies "
-            "that are shorter than half a period"
-        )
+        where, cure = "cell", "a body longer than half a period is put together wrongly"
     return (
         f"{counted(len(spread), 'body', 'bodies')} of several spheres, such as number "
         f"{bodies.number[spread[0]]}, reach through more than half of the {where}: {cure}; or are "
@@ -209,19 +198,20 @@ def _extents_of(position: FloatArray, body: npt.NDArray[Any]) -> tuple[Any, IntA
 
 
 def _own_images(sample: Sample) -> str:
+    """A grain that is larger than the cell touches its own image."""
     packing, pairs = sample.packing, sample.contacts.pairs
     itself = np.unique(pairs[pairs[:, 0] == pairs[:, 1], 0])
     if itself.size == 0 or packing.cell is None:
         return ""
     return (
-        f"{itself.size} grains touch themselves, through a face of the cell: its shortest period "
-        f"({packing.cell.lattice.shortest:.3g}) is not above their diameter (up to "
-        f"{2 * packing.radius[itself].max():.3g}); is this a 2D sample, or the unit of the cell "
-        f"another?"
+        f"{itself.size} grains touch themselves, through a face of the cell: the shortest period "
+        f"is {packing.cell.lattice.shortest:.3g}, their diameter up to "
+        f"{2 * packing.radius[itself].max():.3g}; is the sample 2D, or the cell in another unit?"
     )
 
 
 def _empty_period(sample: Sample) -> str:
+    """A period that is wider than the sample leaves a layer without grains."""
     cell = sample.packing.cell
     if cell is None:
         return ""
@@ -231,24 +221,24 @@ def _empty_period(sample: Sample) -> str:
     for axis in np.flatnonzero(is_wide & cell.periodic):
         return (
             f"the grains fill {1.0 - gaps[axis]:.0%} of the cell's period along {'xyz'[axis]} "
-            f"({cell.heights[axis]:.4g}), the rest of it is empty: is the sample periodic "
-            f"there, and with this period (`periodic`, `cell`)?"
+            f"({cell.heights[axis]:.4g}), the rest of it is empty: does the sample repeat along "
+            f"it, and with this period (`periodic`, `cell`)?"
         )
     return ""
 
 
 def _many_contacts(sample: Sample) -> str:
+    """Radii in a smaller unit than the positions make grains overlap."""
     numbers = sample.contact_numbers[sample.grains]
     mean = float(numbers.mean()) if numbers.size else 0.0
     if sample.contacts.source != "geometric" or mean < MANY_CONTACTS:
         return ""
-    sizes = _sizes(sample.packing.position, sample.packing.radius[sample.grains])
-    return (
-        f"{mean:.0f} contacts a grain by geometry ({sizes}): check the units of radius and position"
-    )
+    told = f"{mean:.0f} contacts a grain by geometry ({_sizes(sample)})"
+    return f"{told}: check the units of radius and position"
 
 
 def _no_contacts(sample: Sample) -> str:
+    """Radii in a larger unit than the positions, or gaps by rounding, leave no contact."""
     if sample.contact_numbers[sample.grains].any() or sample.contacts.source == "file":
         return ""
     from scipy.spatial import KDTree
@@ -268,14 +258,17 @@ def _no_contacts(sample: Sample) -> str:
     )
 
 
-def _sizes(position: FloatArray, radius: FloatArray) -> str:
-    extent = np.ptp(position, axis=0).max()
+def _sizes(sample: Sample) -> str:
+    radius = sample.packing.radius[sample.grains]
+    extent = np.ptp(sample.packing.position[sample.grains], axis=0).max()
     return f"radii {radius.min():.3g} to {radius.max():.3g}, centres within {extent:.3g}"
 
 
 def fitting_periods(packing: Packing) -> list[float | None]:
     """
     The period along x, y and z at which grains of opposite faces touch; None where they do not.
+
+    A face is moved by this length so that about as many pairs of grains touch as inside.
 
     Parameters
     ----------
@@ -286,14 +279,13 @@ def fitting_periods(packing: Packing) -> list[float | None]:
 
 
 def _period(packing: Packing, axis: int) -> float | None:
-    """The length by which one face is moved so that about as many pairs touch as inside."""
     from scipy.spatial import KDTree
 
     along, radius = packing.position[:, axis], packing.radius
     if len(along) < FEWEST:
         return None
     low, high, layer = float(along.min()), float(along.max()), 2.0 * float(radius.max())
-    # where rounding leaves nothing of the layer there is no face
+    # there is no face if the sample is thin, or if the layer vanishes by rounding
     if not 3.0 * layer <= high - low < layer / np.finfo(float).eps:
         return None
     face, opposite = np.flatnonzero(along < low + layer), np.flatnonzero(along > high - layer)

@@ -1,4 +1,4 @@
-"""Grains that flew away: a few, far from all others, that say nothing of the sample's size."""
+"""Grains that flew away: a few that lie far from all others and must not widen the sample."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.packing import Packing
 from scanfab.packing.window import SurfaceBox
 
-# Gap between surfaces from which on grains are far away: so many largest radii, and so many times
-# the gap to the nearest neighbour that all but a part of the grains are below. In dense samples, of
-# boxes, cells and shells, no outer grain was more than 0.5 radii away from the others; in loose
-# ones and gases none more than 3.0 times that gap, in grains that still fall 4.3 times.
+# A gap between surfaces is wide if it is above RADII largest radii, and above TIMES the usual gap.
+# The usual gap is the one to the nearest neighbour that only a share LONELY of the grains exceeds.
+# In dense samples (boxes, cells, shells) no outer grain was more than 0.5 radii away from the
+# others; in loose samples and gases no more than 3.0 usual gaps, in falling grains 4.3.
 RADII, TIMES, LONELY = 1.25, 5.0, 0.05
-# Fewer grains are no crowd that one of them could be far away from.
+# Among fewer grains none counts as far away from the others.
 FEWEST = 50
 ESCAPED = "escaped"
-"""The code of the note on such grains, which comes once a series."""
-# Grains of the sample that are left out at most, and how many may have flown away together: more of
-# them may be a part of the sample, for the user to decide.
+"""The code of the note on escaped grains, which comes once a series."""
+# At most this share of the grains is left out, and at most so many that flew away together. More
+# grains may be a part of the sample, which the user has to decide.
 SHARE, TOGETHER = 0.01, 20
-# Spheres that a message names.
+# A message names so many spheres.
 MOST_NAMED = 20
-# Grains that tell how far apart they are.
+# The usual gap is measured at so many grains.
 SOME = 10_000
 
 
@@ -38,14 +38,14 @@ class Escaped(NamedTuple):
     gap: float
     """The smallest gap between one of them and the rest, dump's length unit; 0 without any."""
     are_many: bool
-    """Too many to be left out: these were found first, and there may be more."""
+    """Whether they are too many to be left out; the search stopped, so there may be more."""
 
 
 def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
     """
-    Find the grains that lie far outside the others, by their positions and radii alone.
+    Find the grains that lie far outside the others, by their positions and radii.
 
-    Only those count that would make the sample larger along a direction that does not repeat.
+    Only grains that widen the sample along a direction that does not repeat count.
 
     Parameters
     ----------
@@ -69,12 +69,12 @@ def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
     count = _number(packing, rows)
     most = max(SHARE * count, 1.0)
     flown: list[int] = []
-    # no image of a grain lies elsewhere along these axes
+    # along these axes a grain has no image at another place
     periods = np.zeros((0, 3)) if packing.cell is None else packing.cell.lattice.vectors
     axes = [axis for axis in sorted(packing.space.along) if not periods[:, axis].any()]
     ends = list(product(axes, (-1.0, 1.0))) if count >= FEWEST else []
     far = RADII * float(packing.radius[rows].max(initial=0.0))
-    # Nearly always nothing is even that far away. SciPy takes longer to load than that to see.
+    # This quick test nearly always finds nothing, which spares loading SciPy.
     if any(_group_at_end(packing, left, *end, far) for end in ends):
         far = max(far, TIMES * _usual_gap(packing, rows))
         for axis, sign in ends:
@@ -89,7 +89,7 @@ def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
 
 
 def notes_of_escaped(packing: Packing, grains: BoolArray, escaped: Escaped) -> list[Note]:
-    """What to tell of the grains that have escaped; nothing without any."""
+    """The note on grains that have escaped; an empty list if there are none."""
     rows = np.flatnonzero(escaped.grains)
     if not rows.size:
         return []
@@ -119,7 +119,7 @@ def _number(packing: Packing, rows: IntArray | list[int]) -> int:
 
 
 def _usual_gap(packing: Packing, rows: IntArray) -> float:
-    """The gap to the nearest neighbour that all but a few grains are below."""
+    """The gap to the nearest neighbour that only a few grains exceed."""
     from scipy.spatial import KDTree
 
     some = rows[:: len(rows) // SOME + 1]
@@ -131,12 +131,12 @@ def _usual_gap(packing: Packing, rows: IntArray) -> float:
 def _group_at_end(
     packing: Packing, left: BoolArray, axis: int, sign: float, far: float
 ) -> list[int]:
-    """The outermost grain along an axis and those near it; none if there are too many of these."""
+    """The outermost grain along an axis with the grains near it; none if they are too many."""
     along, radius = packing.position[:, axis], packing.radius
     group = [int(np.argmax(np.where(left, sign * along + radius, -np.inf)))]
     most = min(TOGETHER, _number(packing, np.flatnonzero(left)) // 2)
     for member in group:
-        # of a large sample few lie in the layer that is near enough
+        # only grains in a layer around this one can be near enough
         layer = far + radius[member] + radius.max()
         rows = np.flatnonzero(left & (np.abs(along - along[member]) <= layer))
         near = rows[_gaps(packing, member, rows) <= far]
@@ -147,7 +147,7 @@ def _group_at_end(
 
 
 def _gaps(packing: Packing, row: int, others: IntArray) -> FloatArray:
-    """Gaps between the surface of a particle and those of others, nearest image."""
+    """Gaps between the surfaces of a particle and of the nearest images of others."""
     branch = packing.position[others] - packing.position[row]
     if packing.cell is not None:
         branch = branch + packing.cell.nearest_image(branch) @ packing.cell.vectors

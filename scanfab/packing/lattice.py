@@ -9,7 +9,7 @@ import numpy as np
 
 from scanfab.base.typing import FloatArray, IntArray
 
-# A step that makes a vector shorter by less is rounding; without this, reducing might never end.
+# A step counts only if it makes a vector shorter than this factor; the rest is rounding.
 SHORTER = 1.0 - 1e-9
 
 
@@ -31,7 +31,7 @@ class Lattice:
 
     @classmethod
     def of(cls, vectors: FloatArray, periodic: tuple[bool, bool, bool]) -> Lattice:
-        """That of the vectors of a cell, as rows, that repeat."""
+        """The lattice of those vectors of a cell, its rows, along which it repeats."""
         combination = np.eye(3, dtype=np.int64)[list(periodic)]
         reduced = vectors[list(periodic)]
         while (found := _shortening(reduced)) is not None:
@@ -53,7 +53,7 @@ class Lattice:
 
     @property
     def half_extent(self) -> float:
-        """No branch to a nearest image is longer, of those in the span of the lattice."""
+        """An upper limit for branches to the nearest image, in the span of the lattice."""
         return 0.5 * float(np.linalg.norm(self.vectors, axis=1).sum())
 
     def steps(self, most: FloatArray) -> FloatArray:
@@ -70,44 +70,32 @@ class Lattice:
 
     def nearest(self, branch: FloatArray) -> IntArray:
         """Vectors of the cell to add to each branch, shape (M, 3), to make it shortest."""
-        if len(self.vectors) == 0:
-            return np.zeros((len(branch), 3), np.int64)
         # components outside the span are the same for all images
         inverse = np.linalg.pinv(self.vectors)
         image = -np.rint(branch @ inverse)
         gram = self.vectors @ self.vectors.T
         if np.any(gram - np.diag(np.diagonal(gram))):
             rest = branch @ inverse @ self.vectors + image @ self.vectors
-            # what is shorter than half of the shortest vector has no shorter image
+            # a branch that is shorter than half of the shortest vector has no shorter image
             far = np.flatnonzero(np.linalg.norm(rest, axis=1) >= 0.5 * self.shortest)
-            image[far] += self._steps_to_nearest(rest[far])
+            rest, best = rest[far], np.zeros((len(far), len(self.vectors)))
+            shortest = np.linalg.norm(rest, axis=1)
+            # between vectors that are as short as can be, one step along each is enough
+            steps = self.steps(np.ones(len(self.vectors)))
+            for step in steps[np.argsort(np.abs(steps).sum(axis=1), kind="stable")]:
+                length = np.linalg.norm(rest + step @ self.vectors, axis=1)
+                # of equal lengths the first one counts, which has fewer steps
+                better = length < shortest * (1.0 - 1e-12)
+                best[better], shortest[better] = step, length[better]
+            image[far] += best
         return image.astype(np.int64) @ self.combination
-
-    def _steps_to_nearest(self, rest: FloatArray) -> FloatArray:
-        """
-        Further steps for branches whose components are at most half a vector each, shape (M, K).
-
-        A shorter image is no longer than the longest of these branches, so it lies between planes
-        of the lattice that are no further away than that.
-        """
-        corners = 0.5 * self.steps(np.ones(len(self.vectors))) @ self.vectors
-        longest = np.linalg.norm(corners, axis=1).max()
-        steps = self.steps(np.floor(0.5 + longest / self.heights + 1e-9))
-        steps = steps[np.argsort(np.abs(steps).sum(axis=1), kind="stable")]
-        best, shortest = np.zeros((len(rest), steps.shape[1])), np.full(len(rest), np.inf)
-        for step in steps:
-            length = np.linalg.norm(rest + step @ self.vectors, axis=1)
-            # the first of equals: no step rather than some
-            better = length < shortest * (1.0 - 1e-12)
-            best[better], shortest[better] = step, length[better]
-        return best
 
 
 def _shortening(vectors: FloatArray) -> tuple[int, IntArray] | None:
     """
-    A vector, and how many of each vector to add to make it shorter; None if nothing does.
+    Find a vector that others make shorter, and how many of each to add; None if there is none.
 
-    Long steps along one other vector are tried first, then short ones along all others.
+    Long steps along one other vector are tried first, then single steps along all others.
     """
     count = len(vectors)
     for place in np.argsort(-np.linalg.norm(vectors, axis=1), kind="stable").tolist():

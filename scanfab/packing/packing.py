@@ -1,9 +1,10 @@
-"""The common table: the grains and contacts of one frame, cast and checked once, here."""
+"""The common table: the grains and contacts of one frame, which are cast and checked here."""
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from scanfab.packing.contacts import (
     resolve_contacts,
 )
 
-# centres below which to lie in one plane may be chance
+# Fewer centres may share a coordinate by chance.
 FEWEST = 10
 
 
@@ -42,25 +43,25 @@ class Packing:
     id : array_like of int, shape (N,), optional
         The dump's own numbers of the grains; the row numbers by default.
     columns : mapping of str to array_like, optional
-        What else the dump says of each grain (``type``, ``mask``, ...), N rows each.
+        Further columns of the dump (``type``, ``mask``, ...), N rows each.
     bodies : array_like of int, shape (N,), optional
-        Number of the rigid body that each sphere is a part of: a body is one grain, and has no
-        contacts with itself. Spheres of negative numbers are grains of their own, as all are by
-        default.
+        Number of the rigid body that each sphere is a part of. A body is one grain, and has no
+        contacts with itself. A sphere with a negative number is a grain of its own. By default each
+        sphere is one.
     contacts : array_like of int, shape (M, 2), or ContactList, optional
-        Pairs of rows. Without it contacts are to be found from geometry.
+        Pairs of rows. Without them, :func:`scanfab.find_contacts` finds contacts by geometry.
     wall_contacts : array_like of int, shape (N,), optional
-        Number of contacts of each grain with walls, that is with bodies that are not in the table.
+        Number of contacts of each grain with walls, which are not in the table.
     wall_forces : ListedWallForces, optional
-        The forces of these contacts, for sources that say them.
+        The forces of these contacts, if the source lists them.
     cell : Cell, optional
         The (periodic) cell.
     step, time : int, float, optional
         Of the dump.
     dim : {2, 3}, optional
-        2: discs, whose centres share one coordinate; by default 3, but 2 of positions that have
-        two. What the cell says of the direction across the plane is ignored. A series, whose
-        plane is that of its first frame, names the space itself.
+        2 for discs, whose centres share one coordinate. The default is 3, or 2 if positions have
+        two coordinates. The cell of discs does not repeat across their plane. A series gives the
+        :class:`~scanfab.base.space.Space` of its first frame.
 
     Raises
     ------
@@ -103,7 +104,12 @@ class Packing:
         )
         self.id: IntArray = cast("id", np.arange(count) if id is None else id, np.int64, (count,))
         check_lengths(centres, self.radius, self.id)
-        _refuse_repeated(self.id)
+        ordered = np.sort(self.id)
+        again = ordered[1:][ordered[1:] == ordered[:-1]]
+        if again.size:
+            raise PackingError(
+                f"the id {again[0]} occurs twice: {count - again.size} ids for {count} grains"
+            )
         if isinstance(space, Space):
             _refuse_outside(centres, space)
         else:
@@ -138,16 +144,17 @@ class Packing:
         return len(self.radius)
 
     def __repr__(self) -> str:
-        what = counted(len(self), "particle")
+        parts = [counted(len(self), "particle")]
         if len(self):
             low, high = self.radius.min(), self.radius.max()
-            what += f" of radius {low:.4g}" + ("" if low == high else f" to {high:.4g}")
-        what += f", 2D in {self.space}" if self.space.is_plane else ""
+            parts[0] += f" of radius {low:.4g}" + ("" if low == high else f" to {high:.4g}")
+        parts += [f"2D in {self.space}"] * self.space.is_plane
         if self.bodies is not None:
-            what += f", parts of {counted(int(self.bodies.is_head.sum()), 'grain')}"
-        what += ", contacts not known" if self.contacts is None else f", {self.contacts.in_words()}"
-        what += "" if self.step is None else f", step {self.step}"
-        return f"Packing: {what}" + ("" if self.cell is None else f"\n  {self.cell!r}")
+            parts.append(f"parts of {counted(int(self.bodies.is_head.sum()), 'grain')}")
+        parts.append("contacts not known" if self.contacts is None else self.contacts.in_words())
+        parts += [] if self.step is None else [f"step {self.step}"]
+        cell = "" if self.cell is None else f"\n  {self.cell!r}"
+        return f"Packing: {', '.join(parts)}{cell}"
 
     @property
     def dimension(self) -> int:
@@ -156,7 +163,7 @@ class Packing:
 
     @property
     def place_across(self) -> float:
-        """Of discs the coordinate that all their centres share, dump's length unit."""
+        """The coordinate that the centres of all discs share, dump's length unit."""
         assert self.space.across is not None
         return float(self.position[0, self.space.across]) if len(self) else 0.0
 
@@ -174,10 +181,9 @@ class Packing:
         Parameters
         ----------
         contacts : ContactList or Contacts
-            Images in a list are from the wrapped positions. Contacts that are worked out already
-            are taken as they are.
+            The images in a list count from the wrapped positions. Contacts are taken as they are.
         wall_contacts : array_like of int, shape (N,), optional
-            Those of this packing by default; of others the forces are not known.
+            Without it the packing keeps its wall contacts. The forces of others are not known.
 
         Returns
         -------
@@ -194,24 +200,21 @@ class Packing:
 
 
 def _centres(position: npt.ArrayLike, dim: int | Space | None) -> tuple[FloatArray, int | Space]:
-    """Positions with three coordinates, of discs 0 along z, and 2, 3 or the space they lie in."""
+    """Positions with three coordinates (z = 0 of discs), and 2, 3 or the space they lie in."""
     if dim not in (None, 2, 3) and not isinstance(dim, Space):
         raise PackingError(f"dim: expected 2 or 3, found {dim!r}")
-    try:
-        is_flat = np.shape(position)[1:] == (2,)
-    except ValueError:
-        is_flat = False  # rows of different lengths
-    if not is_flat:
-        return cast("position", position, np.float64, (None, 3)), dim or 3
-    if dim == 3:
-        raise PackingError("dim: expected 2, as the positions have two coordinates, found 3")
-    flat: FloatArray = cast("position", position, np.float64, (None, 2))
-    return np.column_stack([flat, np.zeros(len(flat))]), dim or 2
+    with suppress(ValueError):  # rows of different lengths
+        if np.shape(position)[1:] == (2,):
+            if dim == 3:
+                raise PackingError("dim: expected 2 for positions of two coordinates, found 3")
+            flat: FloatArray = cast("position", position, np.float64, (None, 2))
+            return np.column_stack([flat, np.zeros(len(flat))]), dim or 2
+    return cast("position", position, np.float64, (None, 3)), dim or 3
 
 
 def _wall_contacts(values: npt.ArrayLike | None, count: int) -> IntArray:
+    """Numbers of contacts with walls; 0 for all grains if none are given."""
     if values is None:
-        # one zero, seen at all places
         return np.broadcast_to(np.int64(0), count)
     numbers = cast("wall_contacts", values, np.int64, (count,))
     if np.any(numbers < 0):
@@ -220,7 +223,7 @@ def _wall_contacts(values: npt.ArrayLike | None, count: int) -> IntArray:
 
 
 def _wall_forces(listed: ListedWallForces, position: FloatArray, cell: Cell | None) -> WallForces:
-    """Listed forces of walls, each beside its grain; PackingError if they cannot be forces."""
+    """Check listed forces of walls, and move each point to the grain that it touches."""
     row = cast("wall_forces: row", listed.row, np.int64, (None,))
     point = cast("wall_forces: point", listed.point, np.float64, (len(row), 3))
     force = cast("wall_forces: force", listed.force, np.float64, (len(row), 3))
@@ -234,7 +237,7 @@ def _wall_forces(listed: ListedWallForces, position: FloatArray, cell: Cell | No
 
 
 def check_lengths(position: FloatArray, radius: FloatArray, id: IntArray) -> None:
-    """PackingError that names the first grain whose position or radius cannot be a length."""
+    """Raise a PackingError that names the first grain whose position or radius is no length."""
     if all_within(position, -MOST, MOST) and all_within(radius, LEAST, MOST):
         return
     finite = np.isfinite(position).all(axis=1) & np.isfinite(radius)
@@ -254,9 +257,9 @@ def check_lengths(position: FloatArray, radius: FloatArray, id: IntArray) -> Non
 
 def space_of(position: FloatArray) -> Space:
     """
-    The plane in which centres surely lie; all space where that is not sure.
+    The plane in which centres lie, or all space.
 
-    They lie in one if they are ten at least, and all share exactly one coordinate.
+    There is a plane if at least ten centres all share exactly one coordinate.
 
     Examples
     --------
@@ -268,7 +271,7 @@ def space_of(position: FloatArray) -> Space:
     """
     if len(position) < FEWEST:
         return SPACE
-    # as a rule a few centres show that no coordinate is shared by all
+    # in most packings the first centres show that no coordinate is shared
     few = np.flatnonzero((position[:FEWEST] == position[0]).all(axis=0))
     shared = [int(axis) for axis in few if np.all(position[:, axis] == position[0, axis])]
     return Space(shared[0]) if len(shared) == 1 else SPACE
@@ -276,7 +279,7 @@ def space_of(position: FloatArray) -> Space:
 
 def flat_space(position: FloatArray) -> Space:
     """
-    The plane of discs; of several that hold all centres the one across z, or else y.
+    The plane of discs; if centres share several coordinates, the last of them is constant.
 
     Raises
     ------
@@ -287,37 +290,27 @@ def flat_space(position: FloatArray) -> Space:
     if len(shared) == 0:
         extents = ", ".join(f"{edge:.4g}" for edge in np.ptp(position, axis=0))
         raise PackingError(
-            f"the centres do not lie in one coordinate plane (they take {extents} along x, y, z): "
-            f"expected discs that share one coordinate exactly; `dim=3` reads them as spheres"
+            f"the centres do not lie in one coordinate plane (their extents along x, y, z are "
+            f"{extents}): discs share one coordinate exactly; `dim=3` reads spheres"
         )
     return Space(int(shared[-1]))
 
 
 def spelt_plane(position: FloatArray, space: Space) -> str:
-    """Where the plane of some centres lies: ``z = 0``."""
+    """Spell the coordinate that some centres share, such as ``z = 0``."""
     assert space.across is not None
     return f"{'xyz'[space.across]} = {position[0, space.across]:g}"
-
-
-def _refuse_repeated(id: IntArray) -> None:
-    ordered = np.sort(id)
-    again = ordered[1:][ordered[1:] == ordered[:-1]]
-    if again.size:
-        raise PackingError(
-            f"the id {again[0]} occurs twice: {len(id) - again.size} ids for {len(id)} grains"
-        )
 
 
 def _refuse_outside(position: FloatArray, space: Space) -> None:
     """PackingError if centres do not lie in the plane of a series."""
     if space.across is None or not len(position):
         return
-    along, name = position[:, space.across], "xyz"[space.across]
-    elsewhere = along[along != along[0]]
-    if elsewhere.size:
+    elsewhere = position[position[:, space.across] != position[0, space.across]]
+    if len(elsewhere):
         raise PackingError(
-            f"the series is read as discs in {space}, as its first frame has them, but here "
-            f"centres lie at {name} = {along[0]:g} and at {name} = {elsewhere[0]:g}: `dim=3` reads "
+            f"the first frame of the series has discs in {space}, but here centres lie at "
+            f"{spelt_plane(position, space)} and at {spelt_plane(elsewhere, space)}: `dim=3` reads "
             f"all frames as spheres"
         )
 
@@ -326,14 +319,13 @@ def _cell_in_plane(cell: Cell, space: Space) -> Cell:
     """
     The cell of discs, which does not repeat across their plane.
 
-    One of its vectors stands across the plane, and the others lie in it; PackingError if they
-    cannot.
+    Two of its vectors must lie in the plane, else PackingError. The third is turned to the normal.
     """
     leaving = np.flatnonzero(cell.vectors[:, space.across])
     if len(leaving) != 1:
         raise PackingError(
-            f"the cell's vectors {cell.vectors.tolist()} do not fit discs in {space}: expected two "
-            f"of them in the plane, and one that leads out of it"
+            f"the cell's vectors {cell.vectors.tolist()} do not fit discs in {space}: expected "
+            f"two of them in the plane"
         )
     vectors, periodic = cell.vectors.copy(), list(cell.periodic)
     vectors[leaving[0]] *= space.normal

@@ -1,11 +1,11 @@
 """
-Rattlers, grains that too few neighbours hold: the rules that tell them, by name.
+Rattlers are grains that too few neighbours hold; this file has the rules that find them.
 
-Grains that are single spheres have as many neighbours as contacts. A clump may touch another one in
-several points: that is one neighbour.
+A grain that is a single sphere has as many neighbours as contacts. Two clumps that touch in several
+points are one neighbour of each other.
 
-A rule is a function of :class:`Touching`. A package offers one under the entry point
-``scanfab.rattlers``, where those of this file register too.
+A rule is a function of :class:`Touching`. Packages offer rules under the entry point
+``scanfab.rattlers``, as this file does.
 """
 
 from __future__ import annotations
@@ -27,27 +27,28 @@ GROUP = "scanfab.rattlers"
 
 @dataclass(frozen=True, eq=False)
 class Touching:
-    """What a rule tells the rattlers of a frame by."""
+    """The data of a frame by which a rule finds the rattlers."""
 
     contacts: Contacts
-    """Those of all particles, M of them, with their forces where the dump has some."""
+    """The M contacts of all particles, with forces if the dump has them."""
     numbers: IntArray
     """
     Number of neighbours of each particle, shape (N,): grains, boundary particles and wall contacts.
 
-    A grain that touches an image of itself has two by that. Each sphere of a clump has the clump's.
+    A grain that touches an image of itself counts it twice, once on each side. Each sphere of a
+    clump has the number of the clump.
     """
     grains: BoolArray
     """Particles that are not boundary, shape (N,); only these can be rattlers."""
     min_contacts: int = 2
-    """What the option `min_contacts` says: with fewer neighbours a grain is not held."""
+    """The option `min_contacts`: with fewer neighbours a grain is a rattler."""
     bodies: Bodies | None = None
-    """Which spheres are one grain; None if each is one."""
+    """The bodies of the packing; None if each sphere is a grain."""
     min_force: float = 0.0
-    """What the option `min_force` says, relative to the mean normal force."""
+    """The option `min_force`, relative to the mean normal force."""
 
     def numbers_without(self, left_out: BoolArray) -> IntArray:
-        """The numbers of neighbours, shape (N,), if some contacts, shape (M,), do not count."""
+        """Numbers of neighbours, shape (N,), without some contacts, shape (M,)."""
         left = self.contacts.neighbours(self.bodies, left_out)
         return self.numbers - self.ends(self.neighbours) + self.ends(left)
 
@@ -57,29 +58,29 @@ class Touching:
         return self.contacts.neighbours(self.bodies)
 
     def ends(self, pairs: RowArray) -> IntArray:
-        """How often each grain stands in some pairs, at each of its spheres, shape (N,)."""
+        """How many of some pairs each grain belongs to, at each of its spheres, shape (N,)."""
         numbers = np.bincount(pairs.ravel(), minlength=len(self.grains))
         return numbers if self.bodies is None else numbers[self.bodies.head]
 
 
 RattlerRule = Callable[[Touching], BoolArray]
-"""Gives the rattlers, shape (N,); of a clump, what it says of the first sphere holds."""
+"""A function that gives the rattlers, shape (N,). The first sphere speaks for its clump."""
 
 
 def count(touching: Touching) -> BoolArray:
     """
     Grains with fewer than ``min_contacts`` neighbours, in one pass: the rule of the 2017 paper.
 
-    Other rattlers are neighbours, too.
+    Rattlers count as neighbours of other grains.
     """
     return np.asarray(touching.grains & (touching.numbers < touching.min_contacts))
 
 
 def recursive(touching: Touching) -> BoolArray:
     """
-    The same over and over, each time without the rattlers as neighbours, until none is new.
+    The rule ``count`` over and over, without the rattlers found before, until it finds no more.
 
-    What is left is held by grains that are held themselves, by the boundary and by walls.
+    The grains that are left are held by grains that are held themselves, by the boundary and walls.
     """
     pairs, numbers = touching.neighbours, touching.numbers
     while True:
@@ -117,8 +118,8 @@ def force(touching: Touching) -> BoolArray:
     mean = contacts.force_n.mean() if len(contacts) else 0.0
     if mean < 0.0:
         raise ReadError(
-            'the rule `rattlers="force"`: the contacts pull in the mean, as where a file lists '
-            "the force on the other grain: name id1 and id2 the other way round"
+            'the rule `rattlers="force"`: the mean normal force is a pull: if the file lists the '
+            "force on the other grain, name id1 and id2 the other way round"
         )
     pressing = contacts.force_n > touching.min_force * mean
     found = touching.numbers_without(~pressing) < touching.min_contacts

@@ -41,18 +41,18 @@ VARIANTS = {name: Variant(name, name in "cd", name in "bd") for name in "abcd"}
 @dataclass(frozen=True, eq=False)
 class Sample:
     """
-    A packing whose particles are told apart: boundary, grains, rattlers.
+    A packing whose particles are sorted into boundary, grains and rattlers.
 
     Parameters
     ----------
     packing : Packing
-        Its contacts tell the rattlers.
+        Its contacts decide which grains are rattlers.
     boundary : ndarray of bool, shape (N,)
         Particles that are boundary, not grains. A clump is boundary if one of its spheres is.
     min_contacts : int, optional
         A grain with fewer neighbours is a rattler.
     rattler_rule : callable, optional
-        Tells them by their contacts; by default every grain on its own, in one pass.
+        The rule that finds the rattlers, by default :func:`~scanfab.packing.rattlers.count`.
     min_force : float, optional
         For the rule ``force``, relative to the mean normal force.
 
@@ -113,12 +113,12 @@ class Sample:
 
     @cached_property
     def grains(self) -> BoolArray:
-        """Particles that are not boundary, shape (N,): of clumps, each of the spheres."""
+        """Particles that are not boundary, shape (N,)."""
         return ~self.boundary
 
     def number(self, chosen: BoolArray) -> int:
         """
-        How many grains some spheres are: a clump is one.
+        Number of grains that some spheres belong to: a clump is one grain.
 
         Parameters
         ----------
@@ -134,7 +134,7 @@ class Sample:
 
     def once(self, chosen: BoolArray) -> BoolArray:
         """
-        One sphere each of grains all of whose spheres are chosen.
+        The first sphere of each chosen grain, where all spheres of a grain are chosen or none.
 
         Parameters
         ----------
@@ -161,31 +161,31 @@ class Sample:
 
     @property
     def gathered(self) -> BoolArray:
-        """Grains that the sample's extents are those of: none that have escaped, shape (N,)."""
+        """Grains without those that have escaped, shape (N,); the extents are theirs."""
         return self.grains if self.escaped.are_many else self.grains & ~self.escaped.grains
 
     def doubts_of_escaped(self) -> list[Note]:
         """
-        What to tell of grains that have escaped.
+        The note on grains that have escaped.
 
         Returns
         -------
         list of Note
-            Empty without any.
+            Empty if there are none.
         """
         return notes_of_escaped(self.packing, self.grains, self.escaped)
 
     @cached_property
     def touching(self) -> Touching:
-        """What a rule tells the rattlers by."""
+        """The data by which a rule finds the rattlers."""
         options = self.min_contacts, self.packing.bodies, self.min_force
         return Touching(self.contacts, self.contact_numbers, self.grains, *options)
 
     @cached_property
     def rattlers(self) -> BoolArray:
         """Grains that are rattlers by the rule, shape (N,)."""
-        told = self.rattler_rule(self.touching)
-        found: BoolArray = cast("rattlers", told, np.bool_, (len(self.packing),))
+        named = self.rattler_rule(self.touching)
+        found: BoolArray = cast("rattlers", named, np.bool_, (len(self.packing),))
         if self.packing.bodies is not None:
             found = found[self.packing.bodies.head]
         return self.grains & found
@@ -195,7 +195,8 @@ class Sample:
         """
         Number of neighbours of each particle, contacts with walls included, shape (N,).
 
-        Spheres have one neighbour a contact; each sphere of a clump has those of the clump.
+        Grains that are spheres have one neighbour a contact. Each sphere of a clump has the number
+        of the clump.
         """
         bodies, walls = self.packing.bodies, self.packing.wall_contacts
         pairs = self.contacts.neighbours(bodies)
@@ -207,7 +208,7 @@ class Sample:
 
     def numbers_of(self, variant: Variant) -> IntArray:
         """
-        Number of neighbours of each particle, those that the variant leaves out not counted.
+        Number of neighbours of each particle, without grains that the variant leaves out.
 
         Parameters
         ----------
@@ -244,8 +245,8 @@ class Sample:
         """
         Grains whose centre lies in the variant's window, rattlers included.
 
-        The centre of a clump is its place, the mean of its spheres' centres by their volumes; with
-        it all its spheres are counted, wherever they are.
+        The centre of a clump is the mean of its spheres' centres, weighted by their volumes. If it
+        lies in the window, all spheres of the clump are counted.
 
         Parameters
         ----------
@@ -286,7 +287,7 @@ class Sample:
 
     def contacts_without(self, left_out: BoolArray) -> BoolArray:
         """
-        Contacts of which neither particle is left out.
+        Contacts between particles that are not left out.
 
         Parameters
         ----------
@@ -322,9 +323,9 @@ class Sample:
 
     def coordination(self, variant: Variant, window: Window | None) -> float | None:
         """
-        Mean number of contacts of the variant's grains, boundary's included; of clumps, neighbours.
+        Mean number of contacts of the variant's grains, including contacts with the boundary.
 
-        Those with removed grains are left out.
+        Contacts with removed grains do not count. Clumps are counted by neighbours.
 
         Parameters
         ----------
@@ -344,27 +345,27 @@ class Sample:
 
 @dataclass(frozen=True)
 class SampleRule:
-    """How particles are told apart, and contacts found: the same for all frames of a series."""
+    """How particles are sorted, and contacts found: the same rules for all frames of a series."""
 
     boundary: tuple[BoundaryRule, ...] = ()
-    """Particles that fit one of them are boundary."""
+    """Particles for which one of these rules holds are boundary."""
     min_contacts: int = 2
     """A grain with fewer neighbours is a rattler."""
     rattlers: str = "count"
-    """By which of the installed rules."""
+    """Name of an installed rule."""
     min_force: float = 0.0
     """For the rule ``force``, relative to the mean normal force."""
     contact_tolerance: float = 0.0
-    """Of contacts by geometry, where no file lists them; relative to the sum of the radii."""
+    """Tolerance of contacts by geometry, relative to the sum of the radii."""
 
     def sample(self, packing: Packing) -> Sample:
         """
-        The packing told apart.
+        Sort the particles of a packing, whose contacts are found by geometry if no file lists them.
 
         Raises
         ------
         SettingsError
-            If the packing lacks a column that a rule for the boundary names.
+            If the packing lacks the column of a boundary rule.
         """
         if packing.contacts is None:
             packing = find_contacts(packing, self.contact_tolerance)

@@ -2,34 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from scanfab.base.errors import PackingError, SettingsError
+from scanfab.base.jit import inner, kernel
 from scanfab.base.space import SPACE, Space
-from scanfab.base.typing import BoolArray, FloatArray
+from scanfab.base.typing import BoolArray, FloatArray, IntArray, RowArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import contacts_of, geometry
-from scanfab.packing.kernels import Grid, PairArray, find_pairs
 from scanfab.packing.packing import Packing
+from scanfab.packing.window import Window
 
-if TYPE_CHECKING:
-    from scanfab.packing.sample import Sample, Variant
-    from scanfab.packing.window import Window
-
-# Grains of one grid differ by no more than this factor, so that dust is not sought in bins that are
-# as wide as boulders.
+# The radii in one grid differ by at most this factor, so that bins are not much wider than grains.
 CLASS_RATIO = 3.5
-# Bins are a little wider than the longest contact: rounding moves no grain two bins away.
+# Bins are a little wider than the longest contact, so that rounding moves no grain two bins away.
 ROOM = 1.0 + 1e-9
-# Contacts a grain that the first attempt has room for, and, in the mean of all grains, that only a
-# mistake of units makes.
+# The first attempt has room for so many contacts a grain. A mean above MOST_CONTACTS is a mistake
+# of units.
 USUAL_CONTACTS, MOST_CONTACTS = 4, 1000
-# grains that tell where the others are
+# The extents of the grains are estimated from so many of them.
 SAMPLE = 10_000
-# cells that a contact may span: a grain as large as that is a mistake of units
+# A grain that spans more periodic cells is a mistake of units.
 MOST_CELLS = 20
 
 
@@ -81,7 +78,7 @@ def find_contacts(packing: Packing, tolerance: float = 0.0) -> Packing:
 
 class NearPairs(NamedTuple):
     """
-    Pairs of a region's grains whose surfaces are near, and how much the grains shade.
+    Pairs of grains in a region whose surfaces are near, and the shadow of the grains.
 
     Attributes
     ----------
@@ -92,11 +89,11 @@ class NearPairs(NamedTuple):
     reduced_radius : ndarray, shape (M,)
         r1 r2 / (r1 + r2), dump's length unit.
     shadow : float
-        What lines of one direction meet of all grains: Σ π r², of discs Σ 2 r.
+        Projected area of all grains: Σ π r², of discs Σ 2 r.
     volume : float
-        Of the region, of discs its area.
+        Volume of the region, of discs its area.
     space : Space
-        The plane in which discs lie.
+        The plane of the discs, if the grains are discs.
     """
 
     normal: FloatArray
@@ -107,28 +104,28 @@ class NearPairs(NamedTuple):
     space: Space = SPACE
 
 
-def near_pairs(sample: Sample, variant: Variant, window: Window | None, gap: float) -> NearPairs:
+def near_pairs(
+    packing: Packing, solid: BoolArray, counted: BoolArray, window: Window | None, gap: float
+) -> NearPairs:
     """
-    The pairs of a variant's solids whose surfaces are no more than a gap apart.
+    The pairs of solid grains whose surfaces are no more than a gap apart.
 
     Parameters
     ----------
-    sample : Sample
-        Of spheres, without clumps.
-    variant : Variant
-        Whose solids.
+    packing : Packing
+        Spheres, without clumps.
+    solid, counted : ndarray of bool, shape (N,)
+        Grains that form pairs, and grains in the region; only solid ones have a shadow.
     window : Window or None
-        The RV, in which the pairs' middles and the grains' centres lie; None for a whole that
-        repeats along all vectors of its cell.
+        The RV, in which the middles of the pairs lie. None for a sample that repeats along all
+        vectors of its cell.
     gap : float
-        Between surfaces, dump's length unit.
+        Largest gap between surfaces, dump's length unit.
 
     Returns
     -------
     NearPairs
     """
-    packing = sample.packing
-    solid = sample.grains & ~sample.removed(variant)
     position, radius = packing.position[solid], packing.radius[solid]
     pairs, image = overlapping_pairs(position, radius + 0.5 * gap, 1.0, packing.cell)
     normal, middle, distance = geometry(position, radius, pairs, image, packing.cell)
@@ -141,13 +138,13 @@ def near_pairs(sample: Sample, variant: Variant, window: Window | None, gap: flo
         volume = packing.cell.volume
     one, two = radius[pairs[chosen]].T
     overlap, reduced = one + two - distance[chosen], one * two / (one + two)
-    shadow = packing.space.shadow(radius[sample.counted(variant, window)[solid]])
+    shadow = packing.space.shadow(radius[counted[solid]])
     return NearPairs(normal[chosen], overlap, reduced, shadow, volume, packing.space)
 
 
 def overlapping_pairs(
     position: FloatArray, radius: FloatArray, scale: float = 1.0, cell: Cell | None = None
-) -> tuple[PairArray, PairArray]:
+) -> tuple[RowArray, RowArray]:
     """
     Pairs of spheres whose distance is below (r_i + r_j) * scale, in linear time.
 
@@ -169,67 +166,151 @@ def overlapping_pairs(
     image : ndarray of int, shape (M, 3)
         Lattice translation of the second sphere.
     """
+    count = len(radius)
     if cell is None or not cell.is_periodic:
-        pairs = _pairs_in_order(position, radius, np.ones(len(radius), np.bool_), scale)
+        numbers = _numbered_pairs(position, radius, np.arange(count), count, 1, scale)
+        pairs = np.column_stack(np.divmod(numbers, max(count, 1))).astype(np.int32)
         return pairs, np.broadcast_to(np.int32(0), (len(pairs), 3))
-    reach = 2.0 * scale * float(radius.max(initial=0.0)) * ROOM
-    # cut by its shortest vectors, a tilted cell has the fewest images around it
+    # a tilted cell has the fewest images around it by its shortest vectors
     short, turns = Cell(cell.short_vectors, cell.periodic, cell.origin), None
-    if reach > MOST_CELLS * short.heights[list(cell.periodic)].min():
-        cells = reach / short.heights[list(cell.periodic)].min()
+    reach = 2.0 * scale * float(radius.max(initial=0.0)) * ROOM
+    cells = reach / short.heights[list(cell.periodic)].min()
+    if cells > MOST_CELLS:
         raise PackingError(
             f"a grain of radius {radius.max():g} spans {cells:g} periodic cells: "
             f"have the cell and the radii the same unit?"
         )
     if not np.array_equal(short.vectors, cell.vectors):
         position, turns = short.place(position)
-    # Images come in the order of the spheres that they repeat, the sphere itself among them. Both
-    # spheres of a pair see an image of the other, but only one of the images comes later.
-    places, row, shift = short.with_images(position, reach)
-    one, two = _pairs_in_order(places, radius[row], (shift == 0).all(axis=1), scale).T
-    pairs, image = np.column_stack([row[one], row[two]]), shift[two]
+    places, row, image = short.images_outside(position, reach)
+    most = int(np.abs(image).max(initial=0))
+    shape = (2 * most + 1,) * 3
+    images = math.prod(shape)
+    codes = np.append(
+        np.full(count, images // 2), np.ravel_multi_index(tuple((image + most).T), shape)
+    )
+    label = np.append(np.arange(count), row) * images + codes
+    position, radius = np.concatenate([position, places]), np.append(radius, radius[row])
+    numbers = _numbered_pairs(position, radius, label, count, images, scale)
+    one, two = np.divmod(numbers, max(count * images, 1))
+    pairs = np.column_stack([one, two // images]).astype(np.int32)
+    image = np.column_stack(np.unravel_index(two % images, shape)) - most
     if turns is not None:
-        image = image + turns[pairs[:, 0]] - turns[pairs[:, 1]]
-        image = image[:, list(cell.periodic)] @ cell.lattice.combination
-    return pairs.astype(np.int32), image.astype(np.int32)
+        image += turns[pairs[:, 0]] - turns[pairs[:, 1]]
+        image = image[:, np.array(cell.periodic)] @ cell.lattice.combination
+    return pairs, image.astype(np.int32)
 
 
-def _pairs_in_order(
-    position: FloatArray, radius: FloatArray, is_real: BoolArray, scale: float
-) -> PairArray:
-    """Near pairs of rows, of which the smaller stands first and is real, in ascending order."""
-    count = len(radius)
-    grids = list(_grids(position, radius, scale)) if count else []
+class Grid(NamedTuple):
+    """Spheres in the order of the bins of a box; a sphere outside belongs to an outermost bin."""
+
+    spheres: FloatArray
+    """Shape (N, 4): centre and radius."""
+    label: IntArray
+    """Shape (N,): see :func:`find_pairs`."""
+    start: IntArray
+    """Shape (bins + 1,): where each bin starts. Bins along z follow one another."""
+    shape: IntArray
+    """Shape (3,): number of bins along x, y and z."""
+    low: FloatArray
+    """Shape (3,): corner of the box."""
+    width: FloatArray
+    """Shape (3,): edges of a bin. Two spheres of the grid in contact are closer than that."""
+
+
+@inner()
+def _bin(grid: Grid, sphere: FloatArray, axis: int) -> int:
+    place = (sphere[axis] - grid.low[axis]) / grid.width[axis]
+    number: int = int(min(max(place, 0.0), grid.shape[axis] - 1.0))
+    return number
+
+
+@kernel
+def find_pairs(
+    grid: Grid,
+    other: Grid,
+    own: bool,
+    count: int,
+    images: int,
+    scale: float,
+    most: int,
+    pairs: IntArray,
+    found: int,
+) -> int:
+    """
+    Add the pairs whose distance is below (r_i + r_j) * scale; how many there are then.
+
+    One sphere is of a grid, the second of its own grid or of another one with larger spheres, whose
+    bins around the first sphere hold all that can be near.
+
+    The label of a sphere is its row of ``count`` times ``images``, plus the number of the image,
+    which is images // 2 for the sphere itself. Both spheres of a pair see an image of the other. So
+    a pair counts once if its smaller label is that of a sphere itself. Its number is the smaller
+    row times (count * images), plus the larger label. Pairs that find no room in ``pairs``, shape
+    (M,), are counted only, and the search ends once there are more than ``most``.
+    """
+    shape, b = other.shape, other.spheres
+    for i in range(len(grid.label)):
+        if found > most:
+            return found
+        a, one = grid.spheres[i], grid.label[i]
+        x, y, z = _bin(other, a, 0), _bin(other, a, 1), _bin(other, a, 2)
+        low, high = max(z - 1, 0), min(z + 2, shape[2])
+        for bx in range(max(x - 1, 0), min(x + 2, shape[0])):
+            for by in range(max(y - 1, 0), min(y + 2, shape[1])):
+                column = (bx * shape[1] + by) * shape[2]
+                first = other.start[column + low]
+                # in its own grid a sphere meets those that come behind it
+                for j in range(max(first, i + 1) if own else first, other.start[column + high]):
+                    dx, dy, dz = b[j, 0] - a[0], b[j, 1] - a[1], b[j, 2] - a[2]
+                    reach = (a[3] + b[j, 3]) * scale
+                    if dx * dx + dy * dy + dz * dz < reach * reach:
+                        smaller, larger = min(one, other.label[j]), max(one, other.label[j])
+                        row = smaller // images
+                        if smaller - row * images == images // 2:
+                            if found < len(pairs):
+                                pairs[found] = row * (count * images) + larger
+                            found += 1
+    return found
+
+
+def _numbered_pairs(
+    position: FloatArray,
+    radius: FloatArray,
+    label: IntArray,
+    count: int,
+    images: int,
+    scale: float,
+) -> IntArray:
+    """The numbers of the pairs, as :func:`find_pairs` defines them, in ascending order."""
+    grids = list(_grids(position, radius, label, scale)) if count else []
     room, most = USUAL_CONTACTS * count, MOST_CONTACTS * count
     while True:
-        pairs, found = np.empty((room, 2), np.int32), 0
+        pairs, found = np.empty(room, np.int64), 0
         for place, grid in enumerate(grids):
             for other in grids[: place + 1]:
-                found = find_pairs(grid, other, other is grid, is_real, scale, most, pairs, found)
-        if found <= room:
-            break
+                own = other is grid
+                found = find_pairs(grid, other, own, count, images, scale, most, pairs, found)
         if found > most:
             raise PackingError(
-                f"more than {MOST_CONTACTS} contacts a grain by geometry: {is_real.sum()} grains "
+                f"more than {MOST_CONTACTS} contacts a grain by geometry: {count} grains "
                 f"lie on top of one another; check the units of radii and positions"
             )
+        if found <= room:
+            pairs = pairs[:found]
+            pairs.sort()
+            return pairs
         room = found
-    numbers = pairs[:found, 0].astype(np.int64)
-    numbers *= count
-    numbers += pairs[:found, 1]
-    numbers.sort()
-    for side, part in enumerate(np.divmod(numbers, max(count, 1))):
-        pairs[:found, side] = part
-    # a copy, as the room may be several times as large
-    return pairs[:found].copy()
 
 
-def _grids(position: FloatArray, radius: FloatArray, scale: float) -> Iterator[Grid]:
+def _grids(
+    position: FloatArray, radius: FloatArray, label: IntArray, scale: float
+) -> Iterator[Grid]:
     """Grids of grains of like size, the largest grains first."""
     low, high = _extents(position)
     classes = np.floor(np.log(radius.max() / radius) / np.log(CLASS_RATIO)).astype(np.int16)
-    for one in np.unique(classes):
-        rows = np.flatnonzero(classes == one).astype(np.int32)
+    for one in np.flatnonzero(np.bincount(classes)):
+        rows = np.flatnonzero(classes == one)
         edge = 2.0 * scale * float(radius[rows].max()) * ROOM
         size = np.maximum(high - low, edge)
         parts = size / edge
@@ -239,15 +320,15 @@ def _grids(position: FloatArray, radius: FloatArray, scale: float) -> Iterator[G
             parts = np.maximum(parts / max(excess, 1.01), 1.0)
         shape = parts.astype(np.int64)
         width, number = size / shape, np.zeros(len(rows), np.int64)
-        spheres = np.column_stack([np.take(position, rows, axis=0), radius[rows]])
         for axis in range(3):
-            place = (spheres[:, axis] - low[axis]) / width[axis]
+            place = (np.take(position[:, axis], rows) - low[axis]) / width[axis]
             number *= shape[axis]
             number += np.clip(place, 0.0, shape[axis] - 1.0).astype(np.int64)
         start = np.append(0, np.cumsum(np.bincount(number, minlength=int(np.prod(shape)))))
-        order = np.argsort(number)
-        spheres, rows = np.take(spheres, order, axis=0), rows[order]
-        yield Grid(spheres, rows, start, shape, low, width)
+        rows = rows[np.argsort(number)]
+        spheres = np.empty((len(rows), 4))
+        spheres[:, :3], spheres[:, 3] = np.take(position, rows, axis=0), radius[rows]
+        yield Grid(spheres, label[rows], start, shape, low, width)
 
 
 def _extents(position: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -255,10 +336,12 @@ def _extents(position: FloatArray) -> tuple[FloatArray, FloatArray]:
     The smallest and largest coordinates of nearly all grains.
 
     The box is at most three times as wide as that of 98 % of the grains. A few grains that flew far
-    away would make all bins large; they go to the outermost bins, which parts no neighbours.
+    away would make all bins large; instead they go to the outermost bins, and neighbours stay in
+    bins side by side.
     """
     some = position[:: len(position) // SAMPLE + 1]
     least, most = np.quantile(some, [0.01, 0.99], axis=0)
     width = most - least
-    low, high = np.maximum(position.min(axis=0), least - width), most + width
-    return low, np.minimum(position.max(axis=0), high)
+    # one coordinate after the other: that takes a third of the time
+    low, high = ([end(along) for along in position.T] for end in (np.min, np.max))
+    return np.maximum(low, least - width), np.minimum(high, most + width)

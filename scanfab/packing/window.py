@@ -1,7 +1,7 @@
 """
-Windows: the RV (representative volume) of c and d, and that of a whole sample, an ellipsoid.
+Windows: regions of a sample that are measured, and which grains and contacts lie in them.
 
-They say which grains and contacts lie in them.
+The RV (representative volume) of variants c and d is a window, and so is the ellipsoid of a sample.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
-# for messages: who writes 70 means per cent
+# In messages, because some users write 70 for 70 %.
 RV_MEANING = "which is a fraction of half the sample's smallest extent, such as 0.7"
 
-# half a window's length, in periods: a rod so long would have to miss thousands of its images
+# Half a window may span so many periods. A longer rod would have to miss thousands of its images.
 MOST_PERIODS = 10
 
 
 @dataclass(frozen=True, eq=False)
 class Window:
     """
-    An RV, fixed for a series: a region about a centre; lengths in the dump's unit.
+    A region about a centre, such as the RV of a series.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Window:
 
     @property
     def radius(self) -> float:
-        """Of a ball about the centre that holds the window; of a sphere its own."""
+        """Radius of the ball about the centre that just holds the window, dump's length unit."""
         return self.shape.reach
 
     def contains(self, points: FloatArray, packing: Packing) -> BoolArray:
@@ -85,7 +85,9 @@ class Window:
 
     def may_meet(self, points: FloatArray, radius: FloatArray, packing: Packing) -> BoolArray:
         """
-        Which spheres may reach into the window, likewise: see :meth:`Convex.may_meet`.
+        Which spheres may reach into the window, through periodic faces too.
+
+        See :meth:`Convex.may_meet`.
 
         Parameters
         ----------
@@ -103,7 +105,7 @@ class Window:
         largest = float(radius.max(initial=0.0))
 
         def meets_any_image(points: FloatArray, radius: FloatArray) -> BoolArray:
-            # which image is the nearest to the centre says little of a long window
+            # a long window may be met by an image that is not the nearest one
             branch, shifts = self.images(points, packing, largest)
             meets = np.zeros(len(points), bool)
             for shift in shifts:
@@ -135,18 +137,11 @@ class Window:
         Raises
         ------
         SettingsError
-            If it is wider than a period.
+            If two images of the window overlap.
         """
         if packing.cell is None or not packing.is_periodic:
             return
         lattice = packing.cell.lattice
-        if self.shape.reach <= 0.5 * lattice.shortest:
-            return
-        if self.shape.is_sphere:
-            raise SettingsError(
-                f"the {self} is wider than the cell's shortest period ({lattice.shortest:g}): "
-                f"choose a smaller `rv`, {RV_MEANING}"
-            )
         if self.shape.reach > MOST_PERIODS * lattice.shortest:
             raise SettingsError(
                 f"the {self} reaches through more than {MOST_PERIODS} periods of the cell "
@@ -162,9 +157,9 @@ class Window:
 
     def branches(self, points: FloatArray, packing: Packing) -> FloatArray:
         """
-        From the window's centre to an image of each point.
+        Vectors from the window's centre to the image of each point that lies in the window.
 
-        To the image that lies in the window, if there is one; else to the nearest.
+        If no image lies in it, the vector leads to the nearest image.
 
         Parameters
         ----------
@@ -189,7 +184,7 @@ class Window:
         self, points: FloatArray, packing: Packing, margin: float = 0.0
     ) -> tuple[FloatArray, FloatArray]:
         """
-        From the window's centre to all images of points that may lie near the window.
+        Vectors from the window's centre to all images of points that may lie near the window.
 
         Parameters
         ----------
@@ -198,21 +193,21 @@ class Window:
         packing : Packing
             Whose cell repeats, if it does.
         margin : float, optional
-            How near: from the window's surface, dump's length unit.
+            Distance from the window's surface, dump's length unit.
 
         Returns
         -------
         branch : ndarray, shape (N, 3)
-            To the nearest image of each point.
+            Vectors to the nearest image of each point.
         shifts : ndarray, shape (T, 3)
-            From there to other images; the first is 0.
+            Vectors from the nearest image to the others; the first is 0.
         """
         branch = points - self.center
         shifts = np.zeros((1, 3))
         if packing.cell is not None and packing.is_periodic:
             branch = branch + packing.cell.nearest_image(branch) @ packing.cell.vectors
             reach, lattice = self.shape.reach + margin, packing.cell.lattice
-            # of images closer than half a period there is one only
+            # only one image of a point is closer than half a period
             if reach > 0.5 * lattice.shortest:
                 shifts = np.concatenate([shifts, lattice.within(reach + lattice.half_extent)])
         return branch, shifts
@@ -220,7 +215,7 @@ class Window:
 
 @dataclass(frozen=True, eq=False)
 class SurfaceBox:
-    """The box of the grains' surfaces; what is asked of it is the cell's where that is periodic."""
+    """The box around the grains' surfaces; along periodic directions the cell takes its place."""
 
     low: FloatArray
     """Shape (3,)."""
@@ -231,11 +226,9 @@ class SurfaceBox:
 
     @classmethod
     def of(cls, packing: Packing, grains: BoolArray) -> SurfaceBox:
-        """That of some particles of a packing."""
-        position, radius = (
-            compressed(grains, values) for values in (packing.position, packing.radius)
-        )
-        # one coordinate at a time: that is faster by far for millions of grains
+        """The box around some particles of a packing."""
+        position, radius = compressed(grains, packing.position), compressed(grains, packing.radius)
+        # one coordinate at a time is much faster for millions of grains
         low = np.array([(along - radius).min() for along in position.T])
         high = np.array([(along + radius).max() for along in position.T])
         if packing.space.across is not None:
@@ -245,29 +238,30 @@ class SurfaceBox:
     @property
     def extents(self) -> FloatArray:
         """Edges of the box (heights of the cell, along its periodic vectors), shape (3,)."""
-        extents = self.high - self.low
-        if self.cell is not None:
-            extents = np.where(self.cell.periodic, self.cell.heights, extents)
-        return extents
+        extents: FloatArray = self.high - self.low
+        if self.cell is None:
+            return extents
+        return np.where(self.cell.periodic, self.cell.heights, extents)
 
     @property
     def smallest_extent(self) -> float:
-        """The shortest of the edges; of discs in their plane."""
+        """The shortest edge; of discs the shortest edge in their plane."""
         return float(self.extents[list(self.space.along)].min())
 
     @property
     def center(self) -> FloatArray:
         """The middle of the box (of the cell, along its periodic vectors)."""
         middle: FloatArray = 0.5 * (self.low + self.high)
-        if self.cell is not None:
-            middle = np.where(self.cell.periodic, self.cell.center, middle)
-        return middle
+        if self.cell is None:
+            return middle
+        return np.where(self.cell.periodic, self.cell.center, middle)
 
     def room_around(self, window: Window) -> float:
         """
-        The smallest distance from a window's box to a face.
+        The smallest distance from a window's box to a face of this box.
 
-        Negative if it reaches beyond; infinite if all directions are periodic, as there is no face.
+        It is negative if the window reaches beyond a face, and infinite if there is no face, as all
+        directions are periodic.
         """
         below, above = window.center - self.low, self.high - window.center
         nearest = np.minimum(below + window.shape.low, above - window.shape.high)
@@ -278,12 +272,12 @@ class SurfaceBox:
 
 def inner_ellipsoid(position: FloatArray, largest: float, space: Space = SPACE) -> Window | None:
     """
-    The ellipsoid of a sample's shape that lies a largest radius within the hull of its centres.
+    The ellipsoid of the shape of a sample, one largest radius inside the hull of the centres.
 
     With σ_k the standard deviations of the centres along their principal axes, and facets of their
     convex hull with normals n and distances d from the mean, its semi-axes are σ_k times the
-    smallest of (d - r_max) / √(Σ σ_k² n_k²): then it touches the hull moved inwards by r_max, and
-    each grain that reaches into it has its centre in the hull.
+    smallest of (d - r_max) / √(Σ σ_k² n_k²). So it touches the hull that is moved inwards by r_max,
+    and each grain that reaches into it has its centre in the hull.
 
     Parameters
     ----------
@@ -292,16 +286,16 @@ def inner_ellipsoid(position: FloatArray, largest: float, space: Space = SPACE) 
     largest : float
         Radius of the largest grain.
     space : Space, optional
-        The plane in which the centres lie, if they do: then it is an ellipse there.
+        The plane in which the centres lie. There the window is an ellipse.
 
     Returns
     -------
     Window or None
-        None of a sample that is flat, or too small to hold any.
+        None if the sample is flat, or too small to hold an ellipsoid.
 
     Examples
     --------
-    A cube of 11 x 11 x 11 grains, 10 from centre to centre, has the sphere of radius 5 - 0.5:
+    The centres of 11 x 11 x 11 grains span a cube of edge 10, which gives a sphere of radius 4.5:
 
     >>> import numpy as np
     >>> from scanfab.packing.window import inner_ellipsoid
@@ -309,7 +303,7 @@ def inner_ellipsoid(position: FloatArray, largest: float, space: Space = SPACE) 
     >>> round(inner_ellipsoid(grid, 0.5).radius, 9)
     4.5
     """
-    # loaded here, as few scans need it
+    # few scans need it, so it is loaded here
     from scipy.spatial import ConvexHull, QhullError
 
     if not len(position):

@@ -202,8 +202,8 @@ class _OneFrame:
     """One frame that is scanned repeatedly with different settings."""
 
     def __init__(self, source: Source, settings: Settings, frame: int) -> None:
-        frames = Frames(source, replace(settings, frames=parse_frames(frame, "frame")))
-        self.name, (self.number, wanted) = frames.name, frames.one()
+        frames = Frames(source, replace(settings, frames=parse_frames("frame", frame)))
+        self.number, wanted = frames.one()
         # the first frame of the series that has grains makes the plan
         first = frames.reference()
         if first is None:
@@ -252,10 +252,8 @@ class _OneFrame:
         rows, _ = self.step("cutoff", None, replace(self.settings, cutoffs=lengths))
         for variant in self.settings.variants:
             if all(row.alpha_vs_axial is None for row in rows if row.variant == variant):
-                raise SettingsError(
-                    f"frame {self.number}: variant {variant} has no void fabric at any cut-off: "
-                    f"it has too few grains, only rattlers, or no voids"
-                )
+                text = f"variant {variant} has no void fabric at any cut-off"
+                raise SettingsError(f"frame {self.number}: {text}: it has too few grains or voids")
         return rows
 
     def step(
@@ -267,10 +265,8 @@ class _OneFrame:
         shadow = self.space.shadow(radius[self.sample.grains])
         chords = self.space.lines(shadow, plan.spacing) * plan.replicates * len(plan.rule)
         if ladder in ("spacing", "directions") and chords > settings.budget:
-            raise SettingsError(
-                f"it would cut {chords:.2g} chords from grains, more than `max_chords` allows "
-                f"({settings.budget:g})"
-            )
+            allowed = f"more than `max_chords` allows ({settings.budget:g})"
+            raise SettingsError(f"it would cut {chords:.2g} chords from grains, {allowed}")
         result = compute_frame(self.sample, plan, number=self.number, source=self.name)
         seconds = time.perf_counter() - begun
         LOGGER.info("%s %s: %.2g s", ladder, "" if value is None else f"{value:g}", seconds)

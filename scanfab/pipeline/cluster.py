@@ -1,4 +1,4 @@
-"""dask_executor(): frames go to the workers of a Dask cluster; it computes again what is lost."""
+"""dask_executor(): send frames to the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from typing import Any
 from scanfab.base.errors import ReadError, ScanfabError, SettingsError, warn
 from scanfab.io.families import PathLike
 
-# what decides numbers, or reads what is sent
+# packages that decide numbers, or that send and receive frames
 PACKAGES = ("scanfab", "numpy", "numba", "scipy", "polars", "dask", "distributed")
 # seconds within which a scheduler answers when it is called
 TIMEOUT = 10.0
@@ -30,11 +30,11 @@ RETRIES = 2
 
 
 class ClusterError(ScanfabError):
-    """The scheduler or the workers cannot be used; says what was found and what to do."""
+    """The scheduler or the workers cannot be used; the message says what to do."""
 
 
 class DeadWorkersError(ClusterError):
-    """All workers that computed a frame have died, as one does that has too little memory."""
+    """All workers that tried to compute a frame have died, for instance for lack of memory."""
 
 
 @contextmanager
@@ -44,30 +44,30 @@ def dask_executor(
     """
     Connect to a Dask cluster: an executor for :func:`scanfab.compute` and the other functions.
 
-    Each worker reads the files of its frames itself, so it sees the same files by the same paths.
-    If a worker dies, Dask gives its frames to others. A frame that raises an error is computed
-    twice more before the error counts.
+    Each worker reads the files of its frames itself, so all workers need the same files at the
+    same paths. If a worker dies, Dask gives its frames to other workers. A frame that raises an
+    error is tried twice more.
 
     Parameters
     ----------
     scheduler : str, optional
-        Its address, such as ``tcp://10.0.0.5:8786``.
+        Address of the scheduler, such as ``tcp://10.0.0.5:8786``.
     scheduler_file : path, optional
-        In its place the file that ``dask scheduler --scheduler-file``, ``dask-mpi`` and
+        Instead of the address: the file that ``dask scheduler --scheduler-file``, ``dask-mpi`` and
         ``dask-jobqueue`` write.
 
     Yields
     ------
     DaskExecutor
-        Until the end of the block.
+        An executor that works until the end of the block.
 
     Raises
     ------
     ScanfabError
-        If no scheduler answers; while frames are computed, if workers have other versions or do not
-        see the files.
+        If no scheduler answers; while frames are computed, if workers have other versions or cannot
+        read the files.
     SettingsError
-        If not just one of the two is named, or distributed is not installed.
+        If not exactly one of the two is given, or distributed is not installed.
 
     Examples
     --------
@@ -77,38 +77,38 @@ def dask_executor(
     ...         return scanfab.compute(scanfab.read_series(folder), executor=executor)
     """
     if (scheduler is None) == (scheduler_file is None):
-        raise SettingsError("a cluster is named by just one of `scheduler` and `scheduler_file`")
+        raise SettingsError("name a cluster by either `scheduler` or `scheduler_file`")
     try:
         from distributed import Client
     except ImportError:
-        raise SettingsError(
-            "a Dask cluster needs the package distributed: pip install 'scanfab[cluster]'"
-        ) from None
+        install = "pip install 'scanfab[cluster]'"
+        raise SettingsError(f"a Dask cluster needs the package distributed: {install}") from None
     address = str(scheduler) if scheduler_file is None else _address_in(Path(scheduler_file))
-    # Dask logs lost connections, which the error that we raise says
-    levels = {name: logging.getLogger(name).level for name in ("distributed", "distributed.client")}
-    for name in levels:
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    # Dask logs lost connections; our error says the same
+    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
+    levels = [logger.level for logger in loggers]
     client = None
     try:
+        for logger in loggers:
+            logger.setLevel(logging.CRITICAL + 1)
         client = _connected(Client, address)
         yield DaskExecutor(client, address)
     finally:
         if client is not None:
             client.close(timeout=2)
-        for name, level in levels.items():
-            logging.getLogger(name).setLevel(level)
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
 
 
 def _connected(connect: Any, address: str) -> Any:
-    """The client of a scheduler; ClusterError if none answers at this address."""
+    """The client of a scheduler; ClusterError if no scheduler answers at this address."""
     kind, _, place = address.rpartition("://")
     host, _, port = place.rpartition(":")
     try:
         if kind in ("", "tcp"):
+            # a scheduler speaks first; for a server that stays silent Dask would wait for ever
             with socket.create_connection((host.strip("[]"), int(port)), TIMEOUT) as stream:
                 stream.settimeout(TIMEOUT)
-                # a scheduler speaks first; Dask would wait without an end for one that does not
                 if not stream.recv(1):
                     raise ConnectionError("it says nothing")
         return connect(address, timeout=TIMEOUT, set_as_default=False)
@@ -119,7 +119,7 @@ def _connected(connect: Any, address: str) -> Any:
 
 
 def _address_in(path: Path) -> str:
-    """The address in a scheduler file, which the scheduler may just be about to write."""
+    """The address in a scheduler file; waits for a scheduler that is about to write it."""
     end = time.monotonic() + TIMEOUT
     while time.monotonic() < end:
         with suppress(OSError, ValueError, KeyError, TypeError):
@@ -143,7 +143,7 @@ class DaskExecutor(Executor):
             warn(f"{address}: {what}: start some with `dask worker {address}`")
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Have a function computed by a worker; one that has a ``path`` reads that file."""
+        """Let a worker call a function; a function with a ``path`` reads that file."""
         return self._submit(computed_there, fn, versions_here(), *args, **kwargs)
 
     def room(self) -> int:
@@ -152,10 +152,10 @@ class DaskExecutor(Executor):
 
     def _threads(self) -> int:
         """
-        How many threads the workers have now; ClusterError if the scheduler does not say it.
+        The number of threads of all workers; ClusterError if the scheduler does not answer.
 
-        A scheduler that is stopped, or lies behind a network that swallows what is sent, closes no
-        connection: without this question a run would wait for its frames for ever.
+        If a scheduler is stopped, or the network loses what is sent, no connection is closed.
+        Without this question a run would wait for its frames for ever.
         """
         try:
             return sum(self.client.nthreads(callback_timeout=SILENCE).values())
@@ -163,7 +163,7 @@ class DaskExecutor(Executor):
             raise self.explained(error, "") from None
 
     def explained(self, error: Exception, job: object) -> Exception:
-        """What users are told of an error of a job, or of asking the scheduler."""
+        """The error to show for an error of a job, or of a question to the scheduler."""
         from distributed.scheduler import KilledWorker
 
         if isinstance(error, ScanfabError):
@@ -171,25 +171,23 @@ class DaskExecutor(Executor):
         if isinstance(error, KilledWorker):
             died = f"{error.allowed_failures + 1} one after the other: had they too little memory?"
             return DeadWorkersError(f"{job}: the workers that computed it died, {died}")
-        if isinstance(error, CancelledError) or not job:
-            is_silent = isinstance(error, TimeoutError)
-            what = f"has not answered for {SILENCE:g} s" if is_silent else "has gone"
-            what = f"the scheduler {what} while frames were computed"
-            return ClusterError(f"{self.address}: {what}: start it again, and go on with `resume`")
-        return ClusterError(f"{job}: {type(error).__name__} at a worker: {error}")
+        if not isinstance(error, CancelledError) and job:
+            return ClusterError(f"{job}: {type(error).__name__} at a worker: {error}")
+        is_silent = isinstance(error, TimeoutError)
+        what = f"has not answered for {SILENCE:g} s" if is_silent else "has gone"
+        advice = "start it again, and go on with `resume`"
+        what = f"the scheduler {what} while frames were computed"
+        return ClusterError(f"{self.address}: {what}: {advice}")
 
 
 def computed_there(
     fn: Callable[..., Any], versions: dict[str, str], *args: Any, **kwargs: Any
 ) -> Any:
-    """What a function returns, called by a worker; ScanfabError if this worker cannot do it."""
+    """Call a function in a worker; ScanfabError if its versions or files are not those at home."""
     here, path, theirs = platform.node(), getattr(fn, "path", None), versions_here()
     if theirs != versions:
-        there, mine = (
-            dict(theirs.items() - versions.items()),
-            dict(versions.items() - theirs.items()),
-        )
-        what = f"the worker on {here} has {there}, but this process {mine}"
+        there, mine = dict(theirs.items() - versions.items()), versions.items() - theirs.items()
+        what = f"the worker on {here} has {there}, but this process {dict(mine)}"
         raise ClusterError(f"{what}: the same versions are needed for the same numbers")
     if path is not None and not os.access(path, os.R_OK):
         need = "workers need the same files by the same paths as this process"
@@ -199,6 +197,6 @@ def computed_there(
 
 @cache
 def versions_here() -> dict[str, str]:
-    """Of Python and of the packages that count, in this process."""
+    """The versions of Python and of the packages that count, in this process."""
     python = ".".join(platform.python_version_tuple()[:2])
     return {"Python": python, **{name: version(name) for name in PACKAGES}}

@@ -96,8 +96,8 @@ def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
             warnings.warn(warning.message, stacklevel=2)
         else:
             doubts.append(str(warning.message))
-    if len(sample.packing):
-        doubts += [doubt.text for doubt in boundary_hints(sample, frames.settings)]
+    notes = boundary_hints(sample, frames.settings) if len(sample.packing) else []
+    doubts += [doubt.text for doubt in notes]
     try:
         refuse_impossible(sample)
     except PackingError as error:
@@ -107,8 +107,7 @@ def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
         doubts.append(no_cell)
     elif hint := cell_hint(sample, frame.carries):
         note(hint)
-    doubts += [doubt.text for doubt in sample.doubts_of_escaped()]
-    return sample, doubts
+    return sample, [*doubts, *(doubt.text for doubt in sample.doubts_of_escaped())]
 
 
 def _rv(frames: Frames, sample: Sample) -> Window | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import platform
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
@@ -26,8 +25,6 @@ from scanfab.pipeline.record import (
     PartFile,
     Record,
     asked_for,
-    differing_settings,
-    hash_of,
     input_entry,
     named_files,
     read_table,
@@ -100,10 +97,8 @@ class Job:
         self.series, self.settings = [one for one, _ in parts], parts[0][1]
         same = parts[0][0].reading, self.settings
         if any((one.reading, settings) != same for one, settings in parts):
-            raise SettingsError(
-                "the series of one table must be read with the same options, and be parts of the "
-                "same frames: compute each into a table of its own"
-            )
+            must = "must be read with the same options, and be parts of the same frames"
+            raise SettingsError(f"the series of one table {must}: make a table of each")
         names = [one.name for one in self.series]
         if twice := {name for name in names if names.count(name) > 1}:
             raise SettingsError(f"{min(twice)}: named twice among the series of one table")
@@ -199,15 +194,13 @@ class Job:
             self._part.begin(self.asked)
         known = set[Path]()
         for one, rows in self._computed(advance):
-            files = [*named_files(self.asked), *one.files(rows[0].frame, known)]
-            new = [file for file in dict.fromkeys(files) if file not in known]
-            self._part.add([input_entry(file) for file in new], rows)
-            known.update(new)
+            files = dict.fromkeys((*named_files(self.asked), *one.files(rows[0].frame, known)))
+            self._part.add([input_entry(file) for file in files if file not in known], rows)
+            known.update(files)
         if is_table and not self.finished and read_rows(self.output):
-            raise SettingsError(
-                f"{self.output}: this run has no rows, so the table that is there stays as it is: "
-                f"choose other `frames`, or another `output=FILE`"
-            )
+            what = "this run has no rows, so the table that is there stays as it is"
+            choose = "choose other `frames`, or another `output=FILE`"
+            raise SettingsError(f"{self.output}: {what}: {choose}")
         columns = self.settings.columns
         write_rows(self.output, self.every_row, columns, self.excerpt, self.save_manifests)
         self._part.remove()
@@ -239,9 +232,11 @@ class Job:
         for place, one in enumerate(self.series):
             done = {frame for source, frame in self.finished if source == one.name}
             observe = self.observers[place] if self.observers else None
-            words: Any = {"done": done, "observe": observe, "executor": self.executor}
+            computed = compute_frames(
+                one, self.settings, done=done, observe=observe, executor=self.executor
+            )
             try:
-                for rows in compute_frames(one, self.settings, **words):
+                for rows in computed:
                     yield one, rows
                     self.finished[one.name, rows[0].frame] = rows
                     advance()
@@ -315,60 +310,43 @@ def _objections(
     free : collection of str
         Settings that may differ.
     """
-    if differing := differing_settings(record.manifest["settings"], asked, free):
+    if differing := record.differing(asked, free):
         yield f"it was made with other settings ({differing})"
     if not record.rows:
         return
     for source in sorted({source for source, _ in record.rows} - {one.name for one in series}):
         yield f"its source {source} is not named now"
-    before = {str(entry.get("path")): entry for entry in record.manifest["inputs"]}
     named, cells = named_files(asked), [one.cells.path for one in series if one.cells is not None]
     read = {str(file) for file in (*named, *(file for one in series for file in one.files()))}
-    for gone in sorted(before.keys() - read):
+    for gone in sorted(record.inputs.keys() - read):
         yield f"{gone} is not among the files that are read now"
     for one in series:
-        if finished := {frame for source, frame in record.rows if source == one.name}:
-            yield from _changed_files(one, before, finished)
+        yield from _changed_files(one, record)
     # a new line may give a strain to a frame that had none
     lacks_strain = any(row.strain is None for rows in record.rows.values() for row in rows)
     for file in (*named, *cells):
         may_grow = file in cells or (str(file) == asked["strain"] and not lacks_strain)
-        if not _is_same(file, before, may_grow, by_lines=True):
+        if not record.has(file, may_grow, by_lines=True):
             yield f"{file} has changed since, in more than new lines at its end"
 
 
-def _changed_files(
-    series: Series, before: Mapping[str, Any], finished: Collection[int]
-) -> Iterator[str]:
-    """Changes in the files of a series up to its last finished frame."""
-    frames = list(islice(series, max(finished) + 1))
+def _changed_files(series: Series, record: Record) -> Iterator[str]:
+    """Changes in the files of a series up to the last frame of a record; not in its cells."""
+    finished = [frame for source, frame in record.rows if source == series.name]
+    frames = list(islice(series, max(finished, default=-1) + 1))
     families = (series.grains, *series.contacts)
     steps = {file: step for family in families for step, file in family.files.items()}
-    last = [step for step, file in series.grains.files.items() if str(file) in before][-1:]
-    for file in series.files(max(finished)):
+    known = [step for step, file in series.grains.files.items() if str(file) in record.inputs]
+    files = set(series.files(len(frames) - 1)) if frames else set()
+    for file in sorted(files - ({series.cells.path} if series.cells is not None else set())):
         step = steps.get(file, -1)
-        if series.cells is not None and file == series.cells.path:
-            continue  # it may get new lines
-        if str(file) not in before:
+        if str(file) not in record.inputs:
             yield f"{file} is new, and not behind the last frame"
-        elif not _is_same(file, before, may_grow=step in [None, *last]):
+        elif not record.has(file, may_grow=step in [None, *known[-1:]]):
             # a broken file counts as one frame: if it has more now, later frames have other numbers
             numbers = [frame.number for frame in frames if frame.name_step == step]
             if len(numbers) != 1 or numbers[0] in finished:
                 yield f"{file} has changed since"
-
-
-def _is_same(
-    file: Path, before: Mapping[str, Any], may_grow: bool = False, by_lines: bool = False
-) -> bool:
-    """Whether a file is unchanged, or only has grown, after a whole line if ``by_lines``."""
-    known, found = before.get(str(file), {}), file.stat()
-    size = known.get("size", math.inf)
-    if found.st_size < size or (found.st_size > size and not may_grow):
-        return False
-    digest, ends_line = hash_of(file, size, found.st_mtime_ns)
-    # a number at the end may have got more digits
-    return digest == known.get("sha256") and (ends_line or not by_lines)
 
 
 def _joined_frames(record: Record, chosen: slice, counts: Sequence[int]) -> slice:

@@ -194,20 +194,19 @@ def gap_scan(
 
 def _octants(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
     """Octants about the middle of the sample or its cell, and about the centre of the RV."""
-    packing, cell, axis = sample.packing, sample.packing.cell, plan.settings.axis
-    position = compressed(sample.gathered, packing.position)
-    radius = float(packing.radius.max())
+    packing, cell, window = sample.packing, sample.packing.cell, plan.window
+    position, largest = compressed(sample.gathered, packing.position), float(packing.radius.max())
+    axis, space = plan.settings.axis, plan.space
     if cell is not None and packing.is_periodic:
         periodic = np.array(cell.periodic)
-        whole = Blocks.of_periods(cell.vectors, cell.origin, periodic, position, plan.space)
+        whole = Blocks.of_periods(cell.vectors, cell.origin, periodic, position, space)
     else:
         low, high = position.min(axis=0), position.max(axis=0)
-        reach = float(np.linalg.norm(high - low)) + radius
-        whole = Blocks.about(0.5 * (low + high), reach, axis, plan.space)
-    if plan.window is None:
+        reach = float(np.linalg.norm(high - low)) + largest
+        whole = Blocks.about(0.5 * (low + high), reach, axis, space)
+    if window is None:
         return whole, whole
-    reach = plan.window.radius + radius
-    return whole, Blocks.about(plan.window.center, reach, axis, plan.space)
+    return whole, Blocks.about(window.center, window.radius + largest, axis, space)
 
 
 def coarse_spacing(

@@ -11,15 +11,7 @@ from typing import Any
 from scanfab.base.errors import ReadError, SettingsError, warn
 from scanfab.io.families import PathLike
 from scanfab.io.options import parse_frames
-from scanfab.pipeline.record import (
-    FREE,
-    Record,
-    differing_settings,
-    is_unfinished,
-    part_of,
-    read_table,
-    write_manifest,
-)
+from scanfab.pipeline.record import FREE, Record, part_of, read_table, write_manifest
 from scanfab.pipeline.values import as_written
 from scanfab.table.row import Row
 from scanfab.table.table import Table
@@ -79,7 +71,7 @@ def merge_tables(
     paths = list(dict.fromkeys(map(Path, named)))
     if not paths:
         raise SettingsError("expected the parts of a table, found none")
-    chosen = parse_frames(frames)
+    chosen = parse_frames("frames", frames)
     if output is not None:
         check_output(Path(output))
         if Path(output).resolve() in [path.resolve() for path in paths]:
@@ -109,14 +101,13 @@ def _joined_manifest(records: Sequence[Record], frames: slice) -> dict[str, Any]
     inputs: dict[str, tuple[Mapping[str, Any], Path]] = {}
     counts: dict[str, int] = {}
     for record in records:
-        other = record.manifest["settings"]
-        if differing := differing_settings(first.manifest["settings"], other, FREE):
+        if differing := first.differing(record.manifest["settings"], FREE):
             raise ReadError(f"{record.path}: has other settings ({differing}) than {first.path}")
-        for entry in record.manifest["inputs"]:
-            before, part = inputs.setdefault(str(entry.get("path")), (entry, record.path))
+        for path, entry in record.inputs.items():
+            before, part = inputs.setdefault(path, (entry, record.path))
             if before.get("sha256") != entry.get("sha256"):
-                changed = f"{entry.get('path')} has changed between the jobs"
-                raise ReadError(f"{record.path}: {changed} of it and of {part}: run them again")
+                what = f"{path} has changed between the jobs of it and of {part}"
+                raise ReadError(f"{record.path}: {what}: run them again")
         # the manifest of an older version does not say how many frames each series has
         last = [(source, frame + 1) for source, frame in record.rows]
         for source, count in (*record.manifest["frames"].items(), *last):
@@ -138,7 +129,7 @@ def _joined_manifest(records: Sequence[Record], frames: slice) -> dict[str, Any]
 
 def _read(path: Path) -> Record:
     """The record of a part; ReadError if it is not finished."""
-    if is_unfinished(path):
+    if part_of(path).exists():
         how = "the same command with `resume` goes on with it"
         raise ReadError(f"{path}: is not finished, as {part_of(path).name} is there: {how}")
     if not path.exists():

@@ -117,9 +117,9 @@ def as_options(message: str | Exception) -> str:
     """
     Rewrite a message of the library, which names Python arguments, for the command line.
 
-    Data from standard input is called so, not by the temporary file that holds it. A SettingsError
-    begins with the argument that is wrong. Other messages may begin with a file name that happens
-    to be the name of an option, so their first word stays.
+    The name of the temporary file that holds standard input is replaced as well. A SettingsError
+    begins with the argument that is wrong. Other messages may begin with the name of a file, which
+    may look like an option, so their first word stays.
 
     Examples
     --------

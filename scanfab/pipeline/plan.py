@@ -270,9 +270,8 @@ def _lines(
     spacing = settings.spacing.resolve(lengths)
     if not CLOSEST * reach <= spacing <= 2.0 * reach:
         raise SettingsError(
-            f"spacing: expected a length from {CLOSEST * reach:.2g} to {2.0 * reach:.4g}, the "
-            f"width of the scanned region, found {spacing:g}: lengths are in the dump's unit; did "
-            f"you mean 1rmin ({lengths['rmin']:g})?"
+            f"spacing: expected a length from {CLOSEST * reach:.2g} to {2.0 * reach:.4g}, found "
+            f"{spacing:g}: lengths have the dump's unit; did you mean 1rmin ({lengths['rmin']:g})?"
         )
     auto = "directions" if settings.directions is None else ""
     fewest, most = (REPLICATES, MOST_REPLICATES) if auto else (1, REPLICATES)

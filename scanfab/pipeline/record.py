@@ -9,13 +9,14 @@ FILE.part is a text that grows with each finished frame. Its first line holds th
 run. Each further line holds one frame: its rows, with all columns and digits, and size and hash of
 the input files that no earlier frame was made of. A last line without its end belongs to a frame
 that was not finished. At the end of the run the manifest is written, then FILE appears in one step,
-and FILE.part is removed last. So a run is finished if FILE exists and is not older than FILE.part.
+and FILE.part is removed last.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import shlex
 import shutil
@@ -68,6 +69,8 @@ class Record(NamedTuple):
     settings: Settings
     manifest: dict[str, Any]
     """The manifest of a table; of a FILE.part only the entries ``settings`` and ``inputs``."""
+    inputs: dict[str, dict[str, Any]]
+    """The entries of the inputs in the manifest, by path."""
     rows: FrameRows
     """Rows of a damaged table may be fewer than a frame has."""
     columns: frozenset[str]
@@ -84,7 +87,26 @@ class Record(NamedTuple):
         for row in rows:
             complete = row_of(settings.columns, row)
             found.setdefault((row["source"], row["frame"]), []).append(complete)
-        return cls(path, settings, manifest, found, frozenset(rows[0] if rows else ()))
+        inputs = {str(entry.get("path")): entry for entry in manifest["inputs"]}
+        columns = frozenset(rows[0] if rows else ())
+        return cls(path, settings, manifest, inputs, found, columns)
+
+    def differing(self, asked: Mapping[str, Any], free: Collection[str] = ()) -> str:
+        """The names of the settings that differ from others, except the ``free`` ones."""
+        before = self.manifest["settings"]
+        names = {name for name in (*before, *asked) if before.get(name) != asked.get(name)}
+        words = {"scanfab": "version of scanfab"}
+        return ", ".join(sorted(words.get(name, name) for name in names - {*free}))
+
+    def has(self, file: Path, may_grow: bool = False, by_lines: bool = False) -> bool:
+        """Whether an input is unchanged, or has only grown, behind a whole line if ``by_lines``."""
+        known, found = self.inputs.get(str(file), {}), file.stat()
+        size = known.get("size", math.inf)
+        if found.st_size < size or (found.st_size > size and not may_grow):
+            return False
+        digest, ends_line = hash_of(file, size, found.st_mtime_ns)
+        # if a line is not whole, its last number may have got more digits
+        return digest == known.get("sha256") and (ends_line or not by_lines)
 
 
 def asked_for(
@@ -111,14 +133,6 @@ def asked_for(
     named = {"scanfab": version("scanfab"), "sources": list(sources)}
     found = {**named, **reading, **written, **excerpt.asked()}
     return dict(json.loads(json.dumps(found, default=os.fspath)))
-
-
-def differing_settings(
-    before: Mapping[str, Any], asked: Mapping[str, Any], free: Collection[str] = ()
-) -> str:
-    """The names of the settings that differ, in alphabetical order, except the ``free`` ones."""
-    names = {name for name in (*before, *asked) if before.get(name) != asked.get(name)} - {*free}
-    return ", ".join(sorted("version of scanfab" if n == "scanfab" else n for n in names))
 
 
 def restored_settings(asked: Mapping[str, Any]) -> Settings:
@@ -276,14 +290,6 @@ def part_of(path: Path) -> Path:
     return path.with_name(f"{path.name}.part")
 
 
-def is_unfinished(path: Path) -> bool:
-    """Whether a table has a FILE.part with newer rows."""
-    part = part_of(path)
-    if not part.exists():
-        return False
-    return not path.exists() or path.stat().st_mtime_ns < part.stat().st_mtime_ns
-
-
 class PartFile:
     """
     The FILE.part of a table.
@@ -336,7 +342,7 @@ class PartFile:
             # copied, not renamed, because other runs must find this file locked
             shutil.copyfile(self.path, part_of(other))
             kept = f"{counted(self.frames, 'finished frame')} of an earlier run are kept"
-            how = f"what made it goes on with it by `output={other}` `resume`"
+            how = f"its command goes on with them by `output={other}` `resume`"
             note(f"{self.path}: {kept} as {part_of(other)}; {how}")
         with named_errors(self.path):
             self._stream.truncate(0)

@@ -76,8 +76,7 @@ def rvs_of(settings: Settings, sample: Sample | None = None) -> tuple[RV, ...]:
             center[space.across] = packing.place_across
         if 0.5 * (shape.high - shape.low)[list(space.along)].min() < SMALLEST * smallest:
             raise SettingsError(
-                f"rv: the {shape} is far too small for the smallest grain (radius {smallest:g}): "
-                f"choose a larger `rv`, `rv_radius` or `rv_size`"
+                f"rv: the {shape} is far too small for grains of radius {smallest:g}"
             )
         rvs[place] = RV(rvs[place].fraction, Window(center, shape))
     return tuple(rvs)
@@ -99,8 +98,8 @@ def _shape(settings: Settings, part: FloatArray, space: Space) -> tuple[Convex, 
     try:
         return shapes.polyhedron(*read_surface(Path(kind)))
     except SettingsError as error:
-        text = f"rv_shape: {kind}: {error}: expected a closed convex surface"
-        raise SettingsError(text) from None
+        text = f"{error}: expected a closed convex surface"
+        raise SettingsError(f"rv_shape: {kind}: {text}") from None
 
 
 def _cylinder_within(half: FloatArray, axis: Vector) -> tuple[float, float]:
@@ -194,10 +193,8 @@ class Deformation:
         """
         mode = strain_mode(sample, mode, axis)
         if not mode:
-            raise SettingsError(
-                "rv_follows: there is neither a periodic cell nor a boundary to measure how the "
-                'sample deforms: choose `strain="grains"`, or leave out `rv_follows`'
-            )
+            text = "there is neither a periodic cell nor a boundary to follow"
+            raise SettingsError(f'rv_follows: {text}: choose `strain="grains"`')
         origin, edges = _edges(sample, mode)
         space = sample.packing.space
         scale = float(np.abs(edges[list(space.along)]).max())

@@ -27,7 +27,7 @@ from scanfab.packing.boundary import BoundaryRule
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.rattlers import installed_rules
 from scanfab.pipeline import values
-from scanfab.pipeline.values import Axis, Length, StandardError, Vector, as_written
+from scanfab.pipeline.values import STRAIN_MODES, Axis, Length, StandardError, Vector, as_written
 from scanfab.scan.columns import EDGE_COLUMNS
 from scanfab.scan.directions import RULES, DirectionRule, rule_of
 from scanfab.scan.edges import CLIP, EDGES, ENDS
@@ -89,9 +89,7 @@ class Settings:
     """Radius of the spherical RV in the dump's units, instead of `rv`."""
     rv_center: Vector | None = window(values.parse_point, metavar="X Y Z")
     """Centre of the RV in the dump's units (default: middle of the sample)."""
-    rv_shape: str = window(
-        values.parse_shape, default="sphere", choices=tuple(values.SHAPES), also="FILE"
-    )
+    rv_shape: str = window(values.parse_shape, default="sphere", choices=values.SHAPES, also="FILE")
     """
     Shape of the RV; FILE is a closed convex surface in the dump's units (.stl .vtp .ply .obj).
     """
@@ -100,7 +98,7 @@ class Settings:
     Size of the RV in the dump's units, instead of `rv`: edges of the box, radius and height of the
     cylinder, semi-axes of the ellipsoid. Discs take two numbers.
     """
-    rv_axis: Axis | None = window(values.parse_rv_axis, choices=tuple(values.AXES), also="X,Y,Z")
+    rv_axis: Axis | None = window(values.parse_rv_axis, choices=values.AXES, also="X,Y,Z")
     """Axis of the cylinder (default: `axis`)."""
     rv_follows: str = window(default="none", choices=("none", "strain"))
     """
@@ -183,7 +181,7 @@ class Settings:
     """
     For contacts found by geometry: two grains touch if their distance is below (r1 + r2)(1 + X).
     """
-    axis: Axis = fabric(values.parse_axis, choices=tuple(values.AXES), also="X,Y,Z")
+    axis: Axis = fabric(values.parse_axis, choices=values.AXES, also="X,Y,Z")
     """
     Loading axis, along which the anisotropies are signed (default: z; for discs the second axis of
     their plane).
@@ -195,13 +193,9 @@ class Settings:
     Groups of further columns: forces (branches, strong and weak contacts), state (void ratio,
     stress, fabric against stress), invariants, harmonics. Several: forces,state.
     """
-    strain: str = sample(
-        values.parse_strain, default="auto", choices=values.STRAIN_MODES, also="FILE.csv"
-    )
+    strain: str = sample(values.parse_strain, default="auto", choices=STRAIN_MODES, also="FILE.csv")
     """Where the axial strain comes from; auto: the cell if it is periodic, else the boundary."""
-    frames: slice = reading(
-        lambda name, value: parse_frames(value, name), metavar="A:B:C", first=True
-    )
+    frames: slice = reading(parse_frames, metavar="A:B:C", first=True)
     """Which frames, as a Python slice (default: all)."""
     reference: int | None = reading(
         optional(whole("the number of a frame, such as 0 or -1", lambda _: True)), metavar="FRAME"
@@ -232,12 +226,10 @@ class Settings:
             self._check_sizes(3)
 
     def __repr__(self) -> str:
-        chosen = [
-            f"{option.name}={as_written(getattr(self, option.name))!r}"
-            for option in options_of(type(self))
-            if as_written(getattr(self, option.name))
-            != as_written(option.parse(option.name, option.default))
-        ]
+        options = options_of(type(self))
+        written = {one.name: as_written(getattr(self, one.name)) for one in options}
+        usual = {one.name: as_written(one.parse(one.name, one.default)) for one in options}
+        chosen = [f"{name}={value!r}" for name, value in written.items() if value != usual[name]]
         return f"{type(self).__name__}({', '.join(chosen)})"
 
     def _clashes(self) -> Iterator[str]:
@@ -255,29 +247,23 @@ class Settings:
             if getattr(self, name) and found != needed:
                 choose = f'leave out `{name}`, or choose `{other}="{needed}"`'
                 yield f"{name}: has no meaning if `{other}` is {found}: {choose}"
-        if self.rv_follows == "strain" and self.strain not in values.STRAIN_MODES:
-            yield (
-                f"rv_follows: a file of strains ({self.strain}) does not say how the sample "
-                f"deforms along all axes: choose another `strain`, or leave out `rv_follows`"
-            )
+        if self.rv_follows == "strain" and self.strain not in STRAIN_MODES:
+            lack = f"a file of strains ({self.strain}) does not give the strains along all axes"
+            yield f"rv_follows: {lack}: choose another `strain`, or leave out `rv_follows`"
         if self.edge == ENDS and self.moment != 1:
-            yield (
-                "moment: `edge=ends` counts only the parts inside the window, which do not give "
-                "the second moment of the full lengths: choose `edge=start`, or `moment=1`"
-            )
+            lack = "`edge=ends` does not give the second moment of the full lengths"
+            yield f"moment: {lack}: choose `edge=start`, or `moment=1`"
 
     def _check_sizes(self, dimension: int) -> None:
         """Raise DimensionError if the RV has too many or too few sizes for discs or spheres."""
         shape, takes = self.rv_shape, values.SHAPES.get(self.rv_shape)
-        if not self.rv_size or not takes:
-            return
-        if len(self.rv_size) != (2 if shape == "cylinder" else dimension):
+        count = 2 if shape == "cylinder" else dimension
+        if takes and len(self.rv_size) not in (0, count):
             found = ",".join(f"{size:g}" for size in self.rv_size)
             if dimension == 2:
                 takes = f"two, {takes.replace(',C', '')}, in the plane of the discs"
-            raise DimensionError(
-                f"rv_size: expected {takes} (`rv_shape` is {shape}), found {found}"
-            )
+            expected = f"expected {takes} (`rv_shape` is {shape})"
+            raise DimensionError(f"rv_size: {expected}, found {found}")
 
     def in_space(self, space: Space) -> Settings:
         """
@@ -288,22 +274,31 @@ class Settings:
         space : Space
             Space of the first frame that has grains: only a frame shows that the grains are discs.
 
+        Returns
+        -------
+        Settings
+            Settings with an axis in the plane, and with directions in the plane.
+
         Raises
         ------
-        DimensionError
+        SettingsError
             If the settings are for spheres and the grains are discs, or the other way round.
         """
         self._check_sizes(space.dimension)
         if space.across is None:
             return self
         if self.rv_shape not in ("sphere", "box", "ellipsoid"):
-            raise DimensionError(
-                f"rv_shape: {self.rv_shape} is no window for discs in {space}: choose sphere (a "
-                f"circle), box (a rectangle) or ellipsoid (an ellipse)"
-            )
-        return replace(
-            self, axis=self._axis_in(space, space.across), directions=self._directions_in(space)
-        )
+            choose = "choose sphere (a circle), box (a rectangle) or ellipsoid (an ellipse)"
+            what = f"{self.rv_shape} is no window for discs in {space}"
+            raise DimensionError(f"rv_shape: {what}: {choose}")
+        rule = self.directions
+        if rule is not None and rule.space != space:
+            if rule.asked is None:
+                what = f"{rule.name} is a rule for three dimensions, but all discs lie in {space}"
+                raise DimensionError(f"directions: {what}: choose a number of axes, such as 16")
+            # as many equal angles as axes were asked for
+            rule = rule_of(rule.asked, space)
+        return replace(self, axis=self._axis_in(space, space.across), directions=rule)
 
     def _axis_in(self, space: Space, across: int) -> Axis:
         """The loading axis in a plane; the default is the second axis of the plane."""
@@ -313,26 +308,13 @@ class Settings:
         if abs(axis[across]) > ROUNDING:
             named = as_written(axis)
             spelt = named if isinstance(named, str) else spelt_place(axis)
-            raise DimensionError(
-                f"axis: the axis {spelt} leads out of {space} of the discs: choose {first}, "
-                f"{second}, or another axis in the plane"
-            )
+            choose = f"choose {first}, {second}, or another axis in the plane"
+            what = f"the axis {spelt} leads out of {space} of the discs"
+            raise DimensionError(f"axis: {what}: {choose}")
         if axis[across] == 0.0:
             return axis
         flat = [0.0 if k == across else part for k, part in enumerate(axis)]
         return Axis(*(part / math.hypot(*flat) for part in flat))
-
-    def _directions_in(self, space: Space) -> DirectionRule | None:
-        """The direction rule in a plane: as many equal angles as axes were asked for."""
-        rule = self.directions
-        if rule is None or rule.space == space:
-            return rule
-        if rule.asked is None:
-            raise DimensionError(
-                f"directions: {rule.name} is a rule for three dimensions, but all discs lie in "
-                f"{space}: choose a number of axes, such as 16"
-            )
-        return rule_of(rule.asked, space)
 
     def aim(self, sample_error: float | None = None) -> float:
         """The error that the scan of a row aims at, given the row's error due to the sample."""
@@ -362,10 +344,8 @@ class Settings:
         columns = [name for name, asked in of_window.items() if asked and self.needs_window]
         columns += [column.name for column in EDGE_COLUMNS if self.edge != CLIP]
         columns += ["alpha_vs_axial_contacts"] * bool(self.cutoffs)
-        return (
-            *columns,
-            *(column.name for group in self.with_ for column in GROUPS[group].columns),
-        )
+        columns += [column.name for group in self.with_ for column in GROUPS[group].columns]
+        return tuple(columns)
 
     @property
     def columns(self) -> tuple[Column, ...]:
@@ -386,9 +366,9 @@ class Settings:
 
     @property
     def rows_per_frame(self) -> int:
-        """Number of rows per frame: one for each variant, RV and cut-off."""
+        """Number of rows per frame: one for each variant, RV, cut-off and block."""
         windows = sum(len(self.rvs) if variant in "cd" else 1 for variant in self.variants)
-        return windows * max(len(self.cutoffs), 1)
+        return windows * max(len(self.cutoffs), 1) * self.blocks
 
     @property
     def needs_window(self) -> bool:

@@ -79,11 +79,8 @@ def doubts_of_state(sample: Sample, window: Window | None) -> dict[str, str]:
         text = f"the contacts have {held}: all columns that need the stress are empty"
         return {"no_stress": text}
     if _volume(packing, window) is None:
-        text = (
-            "void ratio and stress of the whole are empty: they need the volume of an RV, or of a "
-            "cell that is periodic along all its vectors"
-        )
-        return {"no_volume": text}
+        text = "they need the volume of an RV, or of a cell that is periodic along all its vectors"
+        return {"no_volume": f"void ratio and stress of the whole are empty: {text}"}
     at_walls = packing.position[(packing.wall_contacts > 0) & sample.grains]
     if window is not None:
         at_walls = at_walls[window.contains(at_walls, packing)]

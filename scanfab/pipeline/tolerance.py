@@ -185,7 +185,7 @@ class _AutoScan:
                     self.plan, planned = better, better.spacing
                     continue
             more = math.ceil(max(min(missing, GROWTH), SMALLEST_ROUND) * stop)
-            more = min(more, MAX_REPLICATES, int(stop + self.left))
+            more = int(min(more, MAX_REPLICATES, stop + self.left))
             if missing <= 1.0 or self.plan.auto == "directions" or more <= stop:
                 return list(self._notes())
             start, stop = stop, more

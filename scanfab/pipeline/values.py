@@ -171,8 +171,8 @@ def parse_axis(name: str, text: str | Iterable[float] | None) -> Axis:
         return text
     if isinstance(text, str) and text in AXES:
         return AXES[text]
-    parse = numbers("x, y, z or three numbers X,Y,Z", lambda v: len(v) == 3 and math.hypot(*v) > 0)
-    vector = parse(name, text)
+    expected = "x, y, z or three numbers X,Y,Z"
+    vector = numbers(expected, lambda v: len(v) == 3 and math.hypot(*v) > 0)(name, text)
     return Axis(*(part / math.hypot(*vector) for part in vector))
 
 
@@ -246,10 +246,8 @@ def parse_directions(name: str, value: Any) -> DirectionRule | None:
         return None
     rule = value if isinstance(value, DirectionRule) else direction_rule(str(value))
     if rule.is_flat:
-        raise SettingsError(
-            f"{name}: the {len(rule)} axes of {rule.name} lie in one plane, so nothing is measured "
-            f"across it: choose more axes"
-        )
+        what = f"the {len(rule)} axes of {rule.name} lie in one plane"
+        raise SettingsError(f"{name}: {what}, so nothing is measured across it: choose more axes")
     return rule
 
 

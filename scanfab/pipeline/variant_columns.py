@@ -29,8 +29,8 @@ from scanfab.table.columns import installed_fabrics
 # the user is warned if a larger fraction of the segments leaves the sample
 MOST_LEFT_OUT = 0.01
 NO_INNER_WINDOW = (
-    "the sample is flat or too small for `edge=ends`: no ellipsoid fits that lies one largest "
-    "radius inside the hull of the grain centres"
+    "the sample is flat or too small for `edge=ends`: the whole is then measured in an ellipsoid "
+    "that lies one largest radius inside the hull of the grain centres, and none fits"
 )
 
 
@@ -135,21 +135,24 @@ class VariantColumns:
             return None
         if self.cutoff > longest or self.measured.void is None:
             return None
-        pairs = near_pairs(self.sample, self.variant, self.window, self.cutoff)
+        solids = self.sample.grains & ~self.sample.removed(self.variant)
+        counted = self.sample.counted(self.variant, self.window)
+        pairs = near_pairs(packing, solids, counted, self.window, self.cutoff)
         return predicted.predicted_alpha(pairs, 1.0 - solid, self.cutoff, settings.axis)
 
     @property
     def window_alpha(self) -> float | None:
         """Anisotropy due to the window alone; 0 if the edge rule cuts no segments."""
         fabric, settings = self.measured.void, self.plan.settings
-        if self.window is None or fabric is None:
+        if (
+            self.window is None
+            or fabric is None
+            or (settings.edge == CLIP and settings.moment != 1)
+        ):
             return None
         if settings.edge != CLIP:
             return 0.0
-        if settings.moment != 1:
-            return None
-        shape = self.window.shape
-        return predicted.window_alpha(shape, fabric, self.cutoff, self.measured.axis)
+        return predicted.window_alpha(self.window.shape, fabric, self.cutoff, self.measured.axis)
 
     def notes(self) -> Iterator[Note]:
         """Notes on a missing or doubtful fabric, and on lines that meet no grain."""
@@ -214,6 +217,7 @@ def doubts_of_lines(sums: ScanSums, variant: Variant, left_out: float | None) ->
     if left_out is not None and left_out > MOST_LEFT_OUT:
         texts["left_out"] = (
             f"{left_out:.1%} of the void segments of the RV leave the sample and are left out: "
-            f"the longest, so the mean length is too small: choose a smaller `rv`, or `edge=ends`"
+            f"these are long segments, so the mean length is too small: choose a smaller `rv`, or "
+            f"`edge=ends`, which needs nothing outside the RV"
         )
     return texts

@@ -16,6 +16,7 @@ from scanfab.base.column import Column
 from scanfab.base.errors import ReadError, SettingsError
 from scanfab.base.files import check_file, named_errors
 from scanfab.base.plugins import having, load_plugins
+from scanfab.base.spelling import counted
 from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
 
 if TYPE_CHECKING:
@@ -87,7 +88,8 @@ class SeparatedText(OwnFormat):
             names = next(lines, [])
             for line in lines:
                 if len(line) != len(names):
-                    raise csv.Error(f"expected {len(names)} cells, found {len(line)}")
+                    expected = f"expected {counted(len(names), 'cell')} as in line 1"
+                    raise csv.Error(f"{expected}, found {len(line)}: is this a table?")
                 rows.append({key: _value(key, cell) for key, cell in zip(names, line, strict=True)})
         except csv.Error as error:
             raise ReadError(f"{name}, line {lines.line_num}: {error}") from None

@@ -13,6 +13,8 @@ from pathlib import Path
 from random import Random
 from typing import TypeVar, get_args
 
+import numpy as np
+
 from scanfab.base.errors import ReadError, ScanfabError, ScanfabNote, ScanfabWarning
 from scanfab.io.files import bare_name, plain
 from scanfab.io.reader import FileKind, GrainTable, Reader, ReadOptions, Snapshot
@@ -42,6 +44,7 @@ def check_reader(
     files: Sequence[Path],
     folder: Path,
     *,
+    contacts: Sequence[tuple[Path, Path]] = (),
     options: ReadOptions | None = None,
     counts: bool = False,
 ) -> None:
@@ -56,6 +59,8 @@ def check_reader(
         Small sound files with grains, one for each kind of file of the format.
     folder : Path
         An empty folder for damaged files, such as pytest's ``tmp_path``.
+    contacts : sequence of (Path, Path), optional
+        Small sound files with contacts, each with the file of its grains.
     options : ReadOptions, optional
         Options that the reader needs to read the files.
     counts : bool, optional
@@ -93,8 +98,13 @@ def check_reader(
         _try_all(reader, path, options)
     assert files, "expected at least one file to try the reader on"
     for file in files:
-        grains = _check_sound(reader, file, folder, options)
-        _check_damaged(reader, file, folder, options, grains if counts else 0)
+        count = _check_sound(reader, file, folder, options)
+        _check_damaged(reader, file, folder, options, count if counts else 0)
+    for file, grain_file in contacts:
+        grains = reader.read_grains(reader.snapshots(grain_file)[0], options)
+        assert reader.kind(file) == "contacts", f"{file.name}: kind() must be 'contacts'"
+        assert _try_all(reader, file, options, grains), f"{file.name}: holds no contacts of grains"
+        _check_damaged(reader, file, folder, options, 0, grains)
 
 
 def _check_sound(reader: Reader, file: Path, folder: Path, options: ReadOptions) -> int:
@@ -133,19 +143,25 @@ def _packings(reader: Reader, path: Path, options: ReadOptions) -> list[Packing]
 
 
 def _check_damaged(
-    reader: Reader, file: Path, folder: Path, options: ReadOptions, least: int
+    reader: Reader,
+    file: Path,
+    folder: Path,
+    options: ReadOptions,
+    least: int,
+    grains: GrainTable | None = None,
 ) -> None:
     """Truncate the file, which must not leave fewer grains than ``least``, and damage it."""
     data, random = file.read_bytes(), Random(0)
     for place in sorted({random.randrange(len(data)) for _ in range(CUTS)}):
-        count = _try_all(reader, _put(folder, f"cut_{file.name}", data[:place]), options)
+        count = _try_all(reader, _put(folder, f"cut_{file.name}", data[:place]), options, grains)
         # a file that lacks only blanks at its end may be read
         assert count is None or count >= least or not data[place:].strip(), (
             f"{file.name} cut off after {place} bytes is read as {count} of {least} grains: a part "
             f"of a file must be an error"
         )
     for _ in range(DAMAGES):
-        _try_all(reader, _put(folder, f"damaged_{file.name}", _damaged(data, random)), options)
+        path = _put(folder, f"damaged_{file.name}", _damaged(data, random))
+        _try_all(reader, path, options, grains)
 
 
 def _damaged(data: bytes, random: Random) -> bytes:
@@ -164,17 +180,27 @@ def _damaged(data: bytes, random: Random) -> bytes:
     return data[: word.start()] + random.choice(TOKENS) + data[word.end() :]
 
 
-def _try_all(reader: Reader, path: Path, options: ReadOptions) -> int | None:
-    """Call all methods of a reader; return the number of grains if it reads the file."""
+def _try_all(
+    reader: Reader, path: Path, options: ReadOptions, grains: GrainTable | None = None
+) -> int | None:
+    """
+    Call all methods of a reader; return the number of grains if it reads the file.
+
+    With the grains of a contact file, return the number of its contacts with grains and walls.
+    """
 
     def count(path: Path) -> int:
-        tables = (reader.read_grains(snapshot, options) for snapshot in reader.snapshots(path))
-        return sum(len(table.radius) for table in tables)
+        snapshots = reader.snapshots(path)
+        if grains is None:
+            return sum(len(reader.read_grains(snapshot, options).radius) for snapshot in snapshots)
+        joined = [reader.read_contacts(snapshot, options, grains) for snapshot in snapshots]
+        pairs = (np.asarray(one.contacts.pairs) for one in joined if one.contacts is not None)
+        return sum(map(len, pairs)) + sum(int(one.wall_contacts.sum()) for one in joined)
 
     began = time.monotonic()
     _asked("recognises", reader.recognises, path)
     _asked("kind", reader.kind, path)
-    total = _asked("read_grains", count, path)
+    total = _asked("read_grains" if grains is None else "read_contacts", count, path)
     took = time.monotonic() - began
     assert took < LONGEST, f"{path.name}: took {took:.0f} s, expected at most {LONGEST:.0f} s"
     return total

@@ -1,4 +1,4 @@
-"""Meshes of what a frame holds and of what its scan says: for ParaView, and for the 3D view."""
+"""Meshes of a frame and of its results, for ParaView and for the 3D view."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from scanfab.scan.segments import Segments
 from scanfab.viz.scene import Grains, inside
 
 SOLID, DROPPED, KEPT = 0, 1, 2
-# cells of a shell, around the axis and from pole to pole
+# Cells of a shell around the axis, and from pole to pole.
 AZIMUTHS, POLAR = 36, 18
 
 
 def grain_mesh(grains: Grains) -> Any:
-    """Points with what is known of each particle."""
+    """A point for each particle, with its radius, id and other data."""
     mesh = pyvista.PolyData(grains.position) if len(grains.position) else pyvista.PolyData()
     names = ["radius", "id", "contacts", "rattler", "boundary", "in_window"]
     names += ["body"] * (grains.body is not None)
@@ -36,8 +36,7 @@ def contact_mesh(sample: Sample, window: Window | None) -> Any:
     """
     A line from centre to centre for each contact, through periodic faces too.
 
-    ``boundary`` says whether a boundary particle takes part, ``in_window`` whether the contact
-    point lies in the RV.
+    ``boundary`` marks contacts of a boundary particle, ``in_window`` contact points in the RV.
     """
     packing, contacts = sample.packing, sample.contacts
     first, second = packing.position[contacts.pairs].transpose(1, 0, 2)
@@ -72,7 +71,7 @@ def line_mesh(segments: Segments, cutoff: float) -> Any:
 
 
 def window_mesh(center: FloatArray, window: Convex, nsub: int = 4) -> Any:
-    """The surface of the RV, of discs its outline; ``nsub`` says how fine that of a sphere is."""
+    """The surface of the RV, or its outline for discs; ``nsub`` refines that of a sphere."""
     if window.is_sphere and not window.is_flat:
         return pyvista.Icosphere(radius=window.reach, center=tuple(center), nsub=nsub)
     return _surface(center + window.outline, window.outline, window.is_flat)
@@ -82,7 +81,7 @@ def distribution_mesh(
     directions: FloatArray, mean_length: FloatArray, weight: FloatArray, space: Space = SPACE
 ) -> Any:
     """
-    ℓ(n) as a closed surface about the origin, at ℓ in each direction n; of discs as a closed line.
+    ℓ(n) as a closed surface about the origin, at ℓ in each direction n; a closed line for discs.
 
     Parameters
     ----------
@@ -93,7 +92,7 @@ def distribution_mesh(
     weight : ndarray, shape (P,)
         Quadrature weights of the directions, sum 1.
     space : Space, optional
-        The plane in which the directions lie, one after the other, if they do.
+        The plane of the directions, if they lie in one; there they go around in order.
     """
     mesh = _surface(mean_length[:, None] * directions, directions, space.is_plane)
     return _with(
@@ -112,8 +111,8 @@ def ellipsoid_mesh(
     """
     Fabric tensors as ellipsoids side by side along x; isotropy gives spheres of radius ``size``.
 
-    The half axes are 3 size times the principal values, of discs 2 size times those of an ellipse;
-    ``kind`` numbers the tensors.
+    The half axes are 3 size times the principal values, for discs 2 size times. ``kind`` numbers
+    the tensors.
     """
     parts = []
     for kind, matrix in enumerate(tensors.values()):
@@ -133,7 +132,7 @@ def tensor_points(tensors: Mapping[str, FloatArray], center: FloatArray) -> Any:
 
 
 def block_mesh(blocks: Blocks, values: Mapping[str, npt.ArrayLike]) -> Any:
-    """The blocks of a map as hexahedra; a shell is many, each with the shell's values."""
+    """The blocks of a map as hexahedra; a shell has many, each with the values of the shell."""
     if not blocks.radius:
         steps = [np.linspace(0.0, 1.0, count + 1) for count in blocks.parts]
         at = blocks.corner + np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1) @ blocks.edges
@@ -153,7 +152,7 @@ def block_mesh(blocks: Blocks, values: Mapping[str, npt.ArrayLike]) -> Any:
 
 
 def _with(mesh: Any, data: Any, **arrays: npt.ArrayLike) -> Any:
-    """The mesh, with arrays in its ``point_data`` or ``cell_data``; pyvista takes no empty ones."""
+    """Add arrays to the point or cell data of a mesh, but for empty ones, which pyvista refuses."""
     for name, values in arrays.items():
         if np.size(values):
             data[name] = np.ascontiguousarray(values)
@@ -169,9 +168,9 @@ def _lines(ends: FloatArray) -> Any:
 
 def _surface(points: FloatArray, directions: FloatArray, is_flat: bool) -> Any:
     """
-    The closed surface through points that are seen in these directions from its inside.
+    The closed surface through points that lie in these directions from a point inside.
 
-    Its triangles are those of the hull of the directions, all counter-clockwise from outside. In a
+    Its triangles are those of the hull of the directions, counter-clockwise seen from outside. In a
     plane it is a closed line, from each point to the next.
     """
     if is_flat:

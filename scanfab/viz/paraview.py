@@ -38,7 +38,7 @@ def vtk_folders(
     folder: Path, count: int, settings: Settings, go_on: bool
 ) -> Sequence[Callable[[FrameResult], None]]:
     """
-    The folders of so many series; if there are several, each has its own in the one.
+    Make the folders for ParaView files; each of several series has a folder of its own.
 
     Raises
     ------
@@ -58,14 +58,14 @@ def frame_meshes(result: FrameResult) -> Meshes:
     """The grains, contacts and RVs of a frame, and what each variant's scan says."""
     from scanfab.viz import meshes
 
-    # only where there are several RVs does the name of a file tell which it is of
+    # the name of a file tells its RV only if there are several RVs
     windows = {
         _name("window", rv.fraction): rv.window
         for measured in result.measurements
         for rv in measured.plan.rvs[:1]
         if rv.window is not None
     }
-    # of several RVs the largest, which holds the others
+    # the largest RV holds the others
     window = [None, *windows.values()][-1]
     fields = _fields(result.rows)
     yield "grains", meshes.grain_mesh(grains_of(result.sample, window)), fields
@@ -122,7 +122,7 @@ def map_meshes(result: FrameResult) -> Meshes:
         return
     for variant in dict.fromkeys(row.variant for row in result.rows):
         values = _fields([row for row in result.rows if row.variant == variant])
-        # what is the same in all blocks is no value of a cell
+        # texts are the same in all blocks, so they are fields of the mesh
         fields = {name: values.pop(name)[:1] for name in TEXT_FIELDS if name in values}
         yield f"map-{variant}", meshes.block_mesh(result.blocks[variant in "cd"], values), fields
 
@@ -132,7 +132,7 @@ def _name(kind: str, rv: float | None) -> str:
 
 
 def _fields(rows: list[Row]) -> dict[str, Any]:
-    """The rows' values by column, one for each row; NaN where there is none."""
+    """The values of rows by column; NaN if a row has none."""
     columns: dict[str, Any] = {}
     for name in rows[0]:
         values = [getattr(row, name) for row in rows]
@@ -170,9 +170,9 @@ class VtkFolder:
             raise SettingsError(f"vtk: {folder} cannot be made: {error.strerror}") from None
         check_folder(folder / "grains.pvd")
         self.folder, self.go_on, self.meshes_of = folder, go_on, meshes_of
-        # of each kind the time of each of its files
+        # the time of each file, by kind
         self._times: dict[str, dict[str, float]] = {}
-        # frames come from several threads, and VTK is not made for that
+        # VTK must not be used by several threads at once
         self._lock = Lock()
 
     def __call__(self, result: FrameResult) -> None:
@@ -187,7 +187,7 @@ class VtkFolder:
                 self._collect(kind, file, float(known[0]))
 
     def _collect(self, kind: str, file: str, time: float) -> None:
-        """Add a file to the collection of its kind, which is whole after each frame."""
+        """Add a file to the collection of its kind, which is complete after each frame."""
         path = self.folder / f"{kind}.pvd"
         if kind not in self._times:
             before = path.read_text("utf-8") if self.go_on and path.exists() else ""

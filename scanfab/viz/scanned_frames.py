@@ -33,32 +33,31 @@ def scan_frames(
     """
     Scan the first and the last frame of a series, for figures of single frames.
 
-    They are drawn by ``.plot``: ``rose``, ``projection``, ``histogram``, ``cutoffs``, on Axes or,
-    with all panels, on a matplotlib Figure. Frames are scanned when the first figure needs them,
-    and once for all that follow.
+    Its ``.plot`` draws ``rose``, ``projection``, ``histogram`` and ``cutoffs``, on Axes or, with
+    all panels, on a matplotlib Figure. Frames are scanned once, when the first figure needs them.
 
     Parameters
     ----------
     source : Packing or Series
         One frame, or what :func:`scanfab.read_series` returns.
     table : Table or iterable of mapping, optional
-        Their fabric table: then its first and its last frame that have a void fabric are drawn,
-        and titles have its strains. By default the first and the last of the chosen ``frames``.
+        Their fabric table. Its first and last frame with a void fabric are drawn, and titles have
+        its strains. Without it, the first and the last of the chosen ``frames`` are drawn.
     **options
-        Those of :func:`scanfab.compute`, as they were for the table. Frames are drawn of variant c
-        if it is among the ``variants``, else of the first of them.
+        The options of :func:`scanfab.compute` for the table. The figures show variant c if it is
+        among the ``variants``, else the first variant.
 
     Returns
     -------
     ScannedFrames
-        With the figures of these frames: ``.plot``.
+        Its ``.plot`` draws the figures.
 
     Raises
     ------
     ScanfabError
         If the settings do not fit, or there is nothing to draw.
     TypeError
-        If there is no such option; names the nearest that there is.
+        If there is no such option; the message suggests the nearest name.
 
     Examples
     --------
@@ -83,32 +82,32 @@ def scan_frames(
 
 
 class ScannedFrame:
-    """One frame and variant, scanned: what figures draw of it."""
+    """The scan of one frame and variant, with the data that figures draw."""
 
     def __init__(self, result: FrameResult, variant: str, rv: float | None, title: str) -> None:
         self.result, self.variant, self.title = result, variant, title
         self.number = result.number
-        """Of the frame, as in the table."""
+        """Number of the frame, as in the table."""
         self.measurement: Measurement = result.measured(variant, rv)
-        """What the scan says."""
+        """Result of the scan."""
         self.space: Space = self.measurement.plan.space
         """The plane of the frame, if its grains are discs."""
         self.row: Row = next(
             row for row in result.rows if (row["variant"], row.get("rv")) == (variant, rv)
         )
-        """Of the variant, at the first cut-off."""
+        """The row of the variant at the first cut-off."""
         sample = result.sample
         self.smallest = float(sample.packing.radius[sample.grains].min())
         """The radius of the smallest grain, dump's unit."""
 
     @property
     def spheres(self) -> tuple[FloatArray, FloatArray, Convex | None]:
-        """What a few lines of the variant meet, and the window that clips them."""
+        """Centres and radii of the variant's solids, and the window that clips lines."""
         return self.measurement.spheres_of(VARIANTS[self.variant])
 
     @property
     def normals(self) -> FloatArray:
-        """Of the contacts that the contact fabric counts, shape (M, 3)."""
+        """Normals of the contacts in the contact fabric, shape (M, 3)."""
         sample, window = self.result.sample, self.measurement.plan.window
         return sample.contacts.normal[sample.fabric_contacts(VARIANTS[self.variant], window)]
 
@@ -117,20 +116,20 @@ class ScannedFrames:
     """
     The first and the last frame of a table that have a void fabric, for one variant.
 
-    They are scanned, again if they were for the table, when a figure needs them, and once for all.
+    They are scanned once, when a figure needs them, also if the table comes from a scan.
 
     Parameters
     ----------
     source : Packing or Series
-        Where the frames are.
+        The frames.
     settings : Settings
-        Those of the table. The variant is c, if it is among the settings', else the first; of
-        several RVs the largest is drawn.
+        The settings of the table. The figures show variant c if the settings have it, else the
+        first variant, and the largest of several RVs.
     rows : sequence of mapping, optional
         The rows of this source in the table; by default the first and the last frame of the
         settings are scanned.
     note : str, optional
-        A sentence on how the scan differs from that of the table, for captions.
+        A sentence for captions on how this scan differs from that of the table.
 
     Raises
     ------
@@ -152,13 +151,13 @@ class ScannedFrames:
         self.variant = "c" if "c" in settings.variants else settings.variants[0]
         in_window = VARIANTS[self.variant].in_window
         self.rv = settings.rvs[-1] if len(settings.rvs) > 1 and in_window else None
-        # the size of the RV, where there are several, tells rows of one variant apart
+        # rows of one variant differ by the size of the RV if there are several RVs
         self._kind = variant_of({"variant": self.variant, "rv": self.rv})
         self.rows: Rows | None = None if rows is None else self._own(rows)
 
     @property
     def name(self) -> str:
-        """Of the variant, and of the source if it has a name."""
+        """Name of the variant, and of the source if it has a name."""
         source = self.rows[0]["source"] if self.rows else Frames(self.source, self.settings).name
         return f"variant {self._kind}{f' of {source}' if source else ''}"
 
@@ -169,12 +168,12 @@ class ScannedFrames:
 
     @cached_property
     def frames(self) -> list[ScannedFrame]:
-        """The frames, of which the variant alone is scanned."""
+        """The frames, scanned for the variant alone."""
         return self._scan(self.variant)
 
     @cached_property
     def with_lines_of_table(self) -> list[ScannedFrame]:
-        """The same along the lines of the table, which all its variants share."""
+        """The frames, scanned along the lines of the table, which all its variants share."""
         variants = self.settings.variants
         return self.frames if variants == self.variant else self._scan(variants)
 
@@ -183,10 +182,10 @@ class ScannedFrames:
         chosen = slice(first, last + 1, max(last - first, 1))
         settings = replace(self.settings, variants=variants, frames=chosen, cutoffs=())
         results: list[FrameResult] = []
-        # frames are numbered in the whole series, also those of a part
+        # frames of a part have their numbers in the whole series
         whole = self.source.whole if isinstance(self.source, Series) else self.source
         rows = self._own(list(compute_rows(whole, settings, observe=results.append)))
-        # titles have the strains of the table: a strain file may have changed since
+        # titles have the strains of the table, as a strain file may have changed since
         told = self.rows or rows
         column, told_of = strain_column(told), {row["frame"]: row for row in told}
         found = []

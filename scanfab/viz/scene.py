@@ -1,4 +1,4 @@
-"""A frame to be looked at, as plain arrays for every viewer: its grains, its RV, lines in a cut."""
+"""What viewers show of a frame, as plain arrays: its grains, its RV, scan lines in a section."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from scanfab.pipeline.values import Vector
 from scanfab.scan.segments import Segments, cut_lines
 from scanfab.table.curves import SAME, frame_strain_column
 
-# between the lines of a section and the plane across the axis, degrees
+# Angle between the lines of a section and the plane across the axis, degrees.
 LINE_ANGLE = 30.0
-# neighbouring clumps are told apart by shades of their colour: the colour times one of these
+# The colour of a clump is multiplied by one of these, so that neighbours can be told apart.
 SHADES = (1.0, 0.8, 0.62)
 
 
@@ -39,24 +39,24 @@ class Grains:
     radius: FloatArray
     id: IntArray
     contacts: IntArray
-    """Number of contacts of each, those with boundary particles and walls included."""
+    """Number of contacts of each particle, including contacts with boundary and walls."""
     rattler: BoolArray
     boundary: BoolArray
     in_window: BoolArray
-    """Whether the grain's centre lies in the RV; false for all without an RV."""
+    """Whether the grain's centre lies in the RV; false if there is no RV."""
     to_place: FloatArray | None = None
-    """From each sphere to the place of its body, shape (N, 3); None if each is one of its own."""
+    """Vectors from each sphere to the place of its body, shape (N, 3); None without bodies."""
     body: IntArray | None = None
-    """Number of each sphere's body, negative for one of its own; None if all are."""
+    """Number of each sphere's body, negative for a grain of its own; None without bodies."""
 
     @property
     def places(self) -> FloatArray:
-        """Where the grains are: for each sphere, the place of the body that it is a part of."""
+        """For each sphere the place of its grain, shape (N, 3)."""
         return self.position if self.to_place is None else self.position + self.to_place
 
     @property
     def shade(self) -> IntArray:
-        """Which of the shades each sphere has: one for all spheres of a body, shape (N,)."""
+        """Number of each sphere's shade, shape (N,); all spheres of a body have the same."""
         if self.body is None:
             return np.zeros(len(self.radius), np.int64)
         return np.asarray(np.maximum(self.body, 0) % len(SHADES))
@@ -68,17 +68,17 @@ class Scene:
 
     grains: Grains
     center: FloatArray
-    """Of the RV, or of the grains without an RV, shape (3,)."""
+    """Centre of the RV, or of the grains if there is no RV, shape (3,)."""
     windows: tuple[Convex, ...] = ()
     """The RVs about their centre, in ascending order."""
     lines: Segments | None = None
     """A few scan lines, in the dump's coordinates."""
     cutoff: float = 0.0
-    """Void segments that are shorter are dropped, dump's unit."""
+    """Shorter void segments are dropped, dump's unit."""
     cell: Cell | None = None
-    """Of a periodic frame."""
+    """The cell of a periodic frame."""
     space: Space = SPACE
-    """The plane in which all lies, if the grains are discs."""
+    """The plane of the grains if they are discs."""
 
     @property
     def window(self) -> Convex | None:
@@ -87,17 +87,17 @@ class Scene:
 
     @property
     def is_section(self) -> bool:
-        """Whether it is seen as the plane through the centre cuts it."""
+        """Whether the picture shows a section through the centre."""
         return self.lines is not None or self.space.is_plane
 
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """What there is to see and to say of one frame."""
+    """One frame with its scene, sample and plan, for views and reports."""
 
     scene: Scene
     number: int
-    """Of the frame, counted from 0."""
+    """Number of the frame, counted from 0."""
     sample: Sample
     strains: dict[str, float | None]
     """Axial and shear strain since the first frame that has grains, by the names of their columns
@@ -130,7 +130,7 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     ScanfabError
         If there is no such frame, or it cannot be read.
     """
-    # damaged frames are skipped, unless it is the frame that is asked for
+    # damaged frames are skipped; only a damaged frame that is asked for is an error
     frames = Frames(series, replace(settings, on_error="skip"))
     frame = series[number]
     sample = frames.read(frame)
@@ -138,7 +138,7 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     found = frames.reference()
     first, plan = None if found is None else found[2], None
     if first is not None:
-        with suppress(SettingsError):  # the plan tells what does not fit
+        with suppress(SettingsError):  # _plan warns if the settings do not fit
             settings = settings.in_space(first.packing.space)
         plan = _plan(first, settings)
     if plan is not None and sample.grains.any():
@@ -149,7 +149,7 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     strains = _strains(frame.number, sample, first, settings)
     column = frame_strain_column(strains)
     if all(value is not None and abs(value) < SAME for value in strains.values()):
-        # before any strain has begun, the last frame tells which of the strains will
+        # at zero strain, the last frame tells which of the strains changes
         for last_number, last in reversed(list(frames)):
             with suppress(PackingError, ReadError):
                 later = _strains(last_number, frames.read(last), first, settings)
@@ -174,7 +174,7 @@ def _plan(first: Sample, settings: Settings) -> Plan | None:
 def _strains(
     number: int, sample: Sample, first: Sample | None, settings: Settings
 ) -> dict[str, float | None]:
-    """Both strains as the fabric table has them; None also where one cannot be had."""
+    """Both strains as in the fabric table; None if one is not known."""
     axial, shear = None, None
     with suppress(SettingsError):
         axial = Strains.of(settings, first).at(number, sample)["strain"]
@@ -226,10 +226,10 @@ def inside(points: FloatArray, sample: Sample, window: Window | None) -> BoolArr
 
 def about_window(scene: Scene) -> Scene:
     """
-    A periodic frame with every grain at its image next to the RV's centre.
+    Move every grain of a periodic frame to its image next to the RV's centre.
 
-    Else an RV near a face, or in a cell that is sheared, would be seen in pieces, and so would be a
-    clump. Further images that reach into the RV are there too.
+    Otherwise faces of the cell would cut the RV, and clumps, into pieces. Further images that reach
+    into the RV are added.
     """
     cell, grains = scene.cell, scene.grains
     if cell is None or scene.window is None:
@@ -283,7 +283,7 @@ def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
 def towards_viewer(up: FloatArray, space: Space) -> FloatArray:
     """A unit vector across the axis that is upright, from a section to who looks at it."""
     if space.is_plane:
-        # what is upright has the plane's first axis on its right, if it is the second one
+        # x is on the right of y in the plane x-y, and likewise in the others
         return space.normal if space.across != 1 else -space.normal
     toward: FloatArray = np.cross(np.eye(3)[np.argmin(np.abs(up))], up)
     return toward / np.linalg.norm(toward)

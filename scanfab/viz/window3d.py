@@ -26,14 +26,14 @@ ADVICE = (
     "install one of them: on Debian or Ubuntu apt-get install libegl1 libgl1 libosmesa6, or "
     "apt-get install xvfb and run the command under xvfb-run"
 )
-# of the picture, pixels
+# Size of the picture, pixels.
 SIZE = (1200, 900)
-# of the picture's height: above the sample words, below it the scale
+# Shares of the picture's height for the words above the sample, and for the scale below it.
 TOP, BOTTOM = 0.13, 0.07
 MARGIN = 0.02
-# size of letters that can still be read
+# Smallest size of legible letters.
 SMALLEST = 12
-# in shares of the picture: a disk of the legend, and the bar of the scale
+# A disk of the legend, and the bar of the scale, in shares of the picture.
 AROUND = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
 DISK = 0.0075 * np.column_stack([np.cos(AROUND), SIZE[0] / SIZE[1] * np.sin(AROUND)])
 BAR = np.array([[0.0, 0.03], [1.0, 0.03], [1.0, 0.036], [0.0, 0.036]])
@@ -59,13 +59,14 @@ def check_screen() -> None:
 
 def check_drawing() -> None:
     """
-    Make sure that VTK can draw without a screen, in a process of its own: where it cannot, it may
-    crash instead of saying so.
+    Make sure that VTK can draw without a screen.
+
+    This is tried in a process of its own, as VTK may crash instead of raising an error.
 
     Raises
     ------
     ScanfabError
-        If it cannot; says what to install.
+        If it cannot. The message says what to install.
     """
     code = (
         "from vtkmodules.vtkRenderingCore import vtkRenderWindow; "
@@ -87,11 +88,11 @@ def show_scene(
     Parameters
     ----------
     scene : Scene
-        With ``lines``, the grains in front of the RV's centre are left out, so that they are seen.
+        If it has ``lines``, the grains in front of them are left out.
     axis : array_like, shape (3,)
-        Is upright.
+        This axis is upright.
     title : str, optional
-        Of the window.
+        Title of the window.
     screenshot : Path, optional
         Write a PNG file instead of opening a window.
 
@@ -102,7 +103,7 @@ def show_scene(
     """
     if screenshot is not None:
         check_drawing()
-    # VTK would write to standard error; errors tell what is wrong
+    # VTK would write to standard error; exceptions report what is wrong
     with pyvista.vtk_verbosity("off"):
         plotter: Any = pyvista.Plotter(
             off_screen=screenshot is not None, window_size=list(SIZE), title=title or "scanfab"
@@ -119,13 +120,13 @@ def show_scene(
 
 
 def _draw(plotter: Any, scene: Scene, up: FloatArray, title: str) -> None:
-    """All that is seen, with the camera in its place."""
+    """Draw the scene, and place the camera."""
     grains, window, toward = scene.grains, scene.window, towards_viewer(up, scene.space)
     look = toward if scene.is_section else toward + 0.45 * np.cross(up, toward) + 0.35 * up
     if scene.is_section:
         shown = (grains.position - scene.center) @ toward < grains.radius
     elif window is not None:
-        # in front of the RV's centre the grains outside would hide it
+        # grains outside the RV and in front of its centre would hide it
         shown = grains.in_window | ((grains.places - scene.center) @ look <= 0.0)
     else:
         shown = np.ones(len(grains.radius), bool)
@@ -147,7 +148,7 @@ def _draw(plotter: Any, scene: Scene, up: FloatArray, title: str) -> None:
 
 def _add_grains(plotter: Any, scene: Scene, shown: BoolArray, toward: FloatArray) -> dict[str, str]:
     """
-    Balls, in a section cut by the plane through the centre; of discs only the plane.
+    Draw grains as balls, in a section cut by the plane through the centre; discs as disks.
 
     Gives back the names of the legend with their colours.
     """
@@ -187,21 +188,21 @@ def _add_grains(plotter: Any, scene: Scene, shown: BoolArray, toward: FloatArray
 
 
 def _mixed(colour: str, share: float, white: float = 0.0) -> str:
-    """A colour times a share, with so much white."""
+    """Multiply a colour by a share, and add white."""
     return str(
         pyvista.Color([share * part + white for part in pyvista.Color(colour).float_rgb]).hex_rgb
     )
 
 
 def _glyphs(places: FloatArray, radius: FloatArray, shape: Any) -> Any:
-    """A shape of diameter 1, as large as each radius says, at each place."""
+    """Copies of a shape of diameter 1 at places, scaled to radii."""
     cloud = pyvista.PolyData(places)
     cloud.point_data["diameter"] = 2.0 * radius
     return cloud.glyph(geom=shape, scale="diameter", orient=False)
 
 
 def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) -> None:
-    """An RV's surface; in a section its outline."""
+    """Draw the surface of an RV, or its outline in a section."""
     center = tuple(scene.center)
     if scene.lines is None and not window.is_flat:
         surface = window_mesh(scene.center, window, nsub=5)
@@ -221,7 +222,7 @@ def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) 
 
 
 def _add_lines(plotter: Any, scene: Scene) -> dict[str, str]:
-    """Void segments as tubes, kept and dropped; names of the legend with their colours."""
+    """Draw void segments as tubes; gives back names of the legend with their colours."""
     lines = scene.lines
     assert lines is not None
     kept = lines.void & (lines.length >= scene.cutoff)
@@ -238,16 +239,16 @@ def aim(
     plotter: Any, points: FloatArray, radius: FloatArray, up: FloatArray, look: FloatArray
 ) -> None:
     """
-    Place the camera of a parallel view that balls fill, below the words and above the scale.
+    Place the camera of a parallel view, so that balls fill the picture between words and scale.
 
     Parameters
     ----------
     plotter : pyvista.Plotter
-        Its camera looks at the balls.
+        Its camera is placed.
     points, radius : ndarray, shapes (N, 3) and (N,)
-        Their centres and radii, dump's unit; without any the picture is of the origin.
+        Centres and radii of the balls, dump's unit; without balls the picture shows the origin.
     up, look : ndarray, shape (3,)
-        Upwards, and towards the camera; need not be at right angles.
+        Vectors upwards and towards the camera, at any angle.
     """
     if len(points) == 0:
         points, radius = np.zeros((1, 3)), np.ones(1)
@@ -259,7 +260,7 @@ def aim(
     at = points @ frame.T
     low, high = (at - radius[:, None]).min(axis=0), (at + radius[:, None]).max(axis=0)
     width, height, _ = high - low
-    # half the picture's height: the sample, with the words above and the scale below it
+    # half the picture's height holds the sample, the words above and the scale below it
     half = 0.5 * max(height / (1.0 - TOP - BOTTOM), width * SIZE[1] / SIZE[0] / 0.96)
     middle = 0.5 * (low + high) + np.array([0.0, (TOP - BOTTOM) * half, 0.0])
     middle[2] = at[:, 2].mean()
@@ -271,7 +272,7 @@ def aim(
 
 
 def add_words(plotter: Any, title: str, names: Mapping[str, str]) -> None:
-    """Title and legend above the sample: dark words, each name beside a disk of its colour."""
+    """Write title and legend above the sample; each name stands beside a disk of its colour."""
     words = _write(plotter, title, MARGIN, 1.0 - 0.055, 12)
     font, box = words.GetTextProperty(), [0.0] * 4
     words.GetBoundingBox(plotter.renderer, box)
@@ -286,7 +287,7 @@ def add_words(plotter: Any, title: str, names: Mapping[str, str]) -> None:
 
 
 def _add_scale(plotter: Any) -> None:
-    """A bar with its length in the dump's unit; it follows the zoom of a window."""
+    """Draw a bar with its length in the dump's unit, which follows the zoom of a window."""
     words = _write(plotter, "", 0.0, 0.055, 10)
     bar = _fill(plotter, BAR, "black")
 
@@ -305,14 +306,14 @@ def _add_scale(plotter: Any) -> None:
 
 
 def _write(plotter: Any, text: str, x: float, y: float, size: int) -> Any:
-    """Words at a place in shares of the window, from the lower left."""
+    """Write words at a place in shares of the window, from the lower left."""
     return plotter.add_text(
         text, position=(x, y), viewport=True, font_size=size, color="black", font="arial"
     )
 
 
 def _fill(plotter: Any, corners: FloatArray, colour: str) -> Any:
-    """A polygon, in the same shares; returned, so that it can be moved."""
+    """Draw a polygon in shares of the window; gives it back, so that it can be moved."""
     shape = pyvista.PolyData(
         np.column_stack([corners, np.zeros(len(corners))]),
         faces=[len(corners), *range(len(corners))],

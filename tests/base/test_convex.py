@@ -1,4 +1,4 @@
-"""Regions as data: what lies in them, told by the numbers alone, and what follows from them."""
+"""Regions as data: what lies in them, what follows from them, and polyhedra from surfaces."""
 
 import math
 
@@ -6,10 +6,16 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from scanfab import SettingsError, box, cylinder, direction_rule, ellipsoid, sphere
-from scanfab.base.bodies import Hull
+from scanfab import SettingsError, box, cylinder, direction_rule, ellipsoid, polyhedron, sphere
 from tests.helpers.lattices import rotation
-from tests.helpers.windows import cut_ball, hull_of, leaning
+from tests.helpers.windows import (
+    OF_A_BOX,
+    box_by_corners,
+    corners_of_a_box,
+    cut_ball,
+    hull_of,
+    leaning,
+)
 
 RANDOM = np.random.default_rng(3)
 POINTS = RANDOM.uniform(-2, 2, (2000, 3))
@@ -120,14 +126,13 @@ def test_overlap_with_itself_is_what_points_say(name):
     shape = SHAPES[name]
     points = RANDOM.uniform(shape.low, shape.high, (400_000, 3))
     points = points[shape.contains(points)]
-    hull = isinstance(shape.body, Hull)
     for length in (0.3, 1.0):
         shared, slope = shape.overlap(AXES, length)
         for n, g in zip(AXES[:6], shared, strict=False):
             share = shape.contains(points + length * n).mean()
             assert g == pytest.approx(share * shape.volume, abs=0.01 * shape.volume)
         more, less = (shape.overlap(AXES, length + step)[0] for step in (1e-5, -1e-5))
-        assert slope == pytest.approx((less - more) / 2e-5, abs=5e-2 if hull else 1e-4)
+        assert slope == pytest.approx((less - more) / 2e-5, abs=1e-4)
     assert not np.any(shape.overlap(AXES, 2.1 * shape.reach))
 
 
@@ -143,9 +148,8 @@ def test_a_region_meets_itself_until_it_has_been_moved_off(name):
             low, high = (low, middle) if apart else (middle, high)
         points = shape.support(np.array([n, -n]))
         assert high <= (points[0] - points[1]) @ n + 1e-6
-        if not isinstance(shape.body, Hull):
-            assert shape.overlap(n[None], 0.99 * high)[0][0] > 0.0
-            assert shape.overlap(n[None], 1.01 * high)[0][0] == 0.0
+        assert shape.overlap(n[None], 0.99 * high)[0][0] > 0.0
+        assert shape.overlap(n[None], 1.01 * high)[0][0] == 0.0
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -174,3 +178,71 @@ def test_a_sphere_about_a_corner_rim_or_edge(shape, place, near, far):
     where = np.array([place])
     assert shape.may_meet(where, np.array([near])).all()
     assert not shape.may_meet(where if far else 1.1 * where, np.array([far or near])).any()
+
+
+CORNERS = corners_of_a_box(HALF, TURN)
+
+
+def test_a_box_by_its_corners_is_the_box():
+    found, expected = box_by_corners(HALF, TURN), box(2 * HALF, TURN)
+    assert found.planes.shape == (6, 4)
+    order, same = (np.lexsort(np.round(one.planes, 6).T) for one in (found, expected))
+    assert found.planes[order] == pytest.approx(expected.planes[same])
+    assert found.volume == pytest.approx(expected.volume)
+    assert found.reach == pytest.approx(expected.reach)
+    assert (found.low, found.high) == (pytest.approx(expected.low), pytest.approx(expected.high))
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e3])
+def test_the_sense_of_the_triangles_and_how_often_corners_are_listed_say_nothing(shift):
+    triangles = np.array([RANDOM.permutation(one) for one in OF_A_BOX])
+    soup = (CORNERS + shift)[triangles.ravel()]
+    # as STL has it: three corners of its own for each triangle, 4 bytes a number
+    shape, center = polyhedron(soup.astype(np.float32), np.arange(len(soup)).reshape(-1, 3))
+    assert shape.planes.shape == (6, 4)
+    assert shape.volume == pytest.approx(8 * HALF.prod(), rel=1e-6 + 2e-7 * shift)
+    assert center == pytest.approx(np.full(3, shift), abs=1e-6 + 1e-7 * shift)
+    # nor into how many triangles a face is cut: four about its middle
+    middle = CORNERS[[0, 1, 3, 2]].mean(axis=0)
+    fan = [[0, 1, 8], [1, 3, 8], [3, 2, 8], [2, 0, 8]]
+    shape, _ = polyhedron(np.vstack([CORNERS, middle]), np.concatenate([OF_A_BOX[2:], fan]))
+    assert shape.planes.shape == (6, 4)
+
+
+def test_the_centroid_is_that_of_the_body():
+    points = np.array([3.0, -4.0, 5.0]) + RANDOM.normal(size=(15, 3))
+    shape, center = hull_of(points)
+    hull = ConvexHull(points)
+    inside = RANDOM.uniform(points.min(axis=0), points.max(axis=0), (200_000, 3))
+    within = np.all(inside @ hull.equations[:, :3].T + hull.equations[:, 3] < 0, axis=1)
+    assert np.array_equal(shape.contains(inside - center), within)
+    assert center == pytest.approx(inside[within].mean(axis=0), abs=0.02)
+
+
+# a corner pushed in, by little; and a hole in the middle
+NOTCHED = np.vstack([CORNERS, 0.999 * CORNERS[0]]), np.where(OF_A_BOX == 0, 8, OF_A_BOX)
+HOLLOW = np.vstack([CORNERS, 0.2 * CORNERS]), np.vstack([OF_A_BOX, OF_A_BOX + 8])
+
+
+@pytest.mark.parametrize(
+    ("surface", "words"),
+    [
+        ((CORNERS, OF_A_BOX[1:]), "not closed, or not convex: .* 0.916667 times the volume"),
+        (NOTCHED, "not closed, or not convex"),
+        ((CORNERS * [1, 1, 0], OF_A_BOX), "encloses no volume"),
+        ((CORNERS[:0], OF_A_BOX[:0]), "encloses no volume"),
+        ((CORNERS, OF_A_BOX[:1]), "encloses no volume"),
+        (HOLLOW, "not closed, or not convex: .* 1.008 times the volume"),
+    ],
+    ids=["open", "notched", "flat", "empty", "one triangle", "hollow"],
+)
+def test_what_is_no_convex_surface_is_refused_in_words(surface, words):
+    with pytest.raises(SettingsError, match=words):
+        polyhedron(*surface)
+
+
+def test_a_surface_of_very_many_faces_is_refused():
+    points = RANDOM.normal(size=(600, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    with pytest.raises(SettingsError, match="has 1196 faces, expected at most 1000"):
+        hull_of(points)

@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 from unittest.mock import Mock
 
-import numba
 import pytest
 
 from scanfab.base import jit
@@ -68,15 +67,6 @@ def test_only_the_first_run_compiles_until_a_kernel_changes(dump, tmp_path):
 @pytest.mark.parametrize("given", [{}, {"NUMBA_CACHE_DIR": NOWHERE}])
 def test_without_a_home_it_compiles_for_itself(dump, given):
     assert "; it cannot be kept: /proc/none" in words_of(dump, NOWHERE, HOME=NOWHERE, **given)
-
-
-def test_numbas_own_variable_counts_for_kernels_alone(dump, tmp_path):
-    home = tmp_path / "cache"
-    words_of(dump, tmp_path / "unused", NUMBA_CACHE_DIR=str(home))
-    assert kept_in(home)
-    assert not (tmp_path / "unused").exists()
-    # functions of other packages are kept where they were
-    assert os.environ.get("NUMBA_CACHE_DIR", "") == numba.config.CACHE_DIR
 
 
 @pytest.fixture

@@ -1,12 +1,14 @@
-"""One declaration an option, from which the other places derive."""
+"""Options, columns and notes, each declared once."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import pytest
 
-from scanfab.base.errors import SettingsError
+from scanfab.base.column import LENGTH, Column, NoColumnError, columns_of_fields
+from scanfab.base.errors import SKIPPED, Note, SettingsError, SkippedFrameWarning, joined, tell
 from scanfab.base.option import number, one_of, option, optional, options_of, takes_options, whole
 
 
@@ -62,3 +64,39 @@ def test_an_unusable_value_is_named_with_what_was_expected(parse, expected, valu
 def test_usable_values_stay_as_they_are():
     assert (WORD("on_error", "skip"), WORD("on_error", None)) == ("skip", None)
     assert DAYS("seed", 2**60 + 1) == 2**60 + 1
+
+
+@dataclass
+class Disc:
+    name: Annotated[str, "what it is called"]
+    radius: Annotated[float | None, "of its rim", LENGTH]
+    corners: Annotated[list[list[float]] | None, "if it has any"]
+
+
+def test_fields_are_columns_with_kind_unit_and_meaning():
+    assert columns_of_fields(Disc) == (
+        Column("name", str, "", "what it is called"),
+        Column("radius", float, "length", "of its rim"),
+        Column("corners", list, "", "if it has any"),
+    )
+
+
+def test_a_column_that_does_not_exist_is_told_without_quotes_with_those_that_do():
+    error = NoColumnError(3, ["frame", "alpha_vs"])
+    assert isinstance(error, KeyError)
+    assert isinstance(error, AttributeError)
+    assert str(error) == "there is no column 3: the columns are frame, alpha_vs"
+
+
+def test_a_sentence_is_said_once_of_all_its_variants():
+    notes = [Note("a", "dense", ("b",)), Note("a", "loose", ("c",)), Note("a", "dense", ("d",))]
+    assert joined(notes) == (Note("a", "dense", ("b", "d")), Note("a", "loose", ("c",)))
+
+
+def test_without_a_place_it_says_the_sentence_alone():
+    assert Note("a", "dense", ("c",)).told("") == "dense"
+
+
+def test_a_frame_that_was_left_out_is_a_warning_of_its_kind():
+    with pytest.warns(SkippedFrameWarning, match="frame 1 skipped: dump: no grains"):
+        tell([Note(SKIPPED, "dump: no grains")], "frame 1")

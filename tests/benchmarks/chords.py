@@ -6,7 +6,6 @@ import shutil
 import subprocess
 import tempfile
 import time
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,8 +26,6 @@ from tests.benchmarks.packings import PAPER, copied, dense, solids_near, tenth
 from tests.benchmarks.timing import interleaved, table
 
 HERE = Path(__file__).parent
-# of a scan in threads: as many as an auto scan starts with
-DIRECTIONS = 16
 EMBREE = "Embree 3, 16 rays a packet, all hits"
 FLOOR = "floor: only the square roots (Numba)"
 
@@ -43,107 +40,59 @@ def sweep(solids: Solids, variants: str = "c", directions: int = 1, **options: A
     return scan_lines(solids, ONE_AXIS, variants=variants, replicates=range(directions), **options)
 
 
-def rv_solids() -> Solids:
-    """The grains of the paper's sample that reach into the RV of 0.7."""
-    position, radius = dense(PAPER)
-    extent = (position + radius[:, None]).max(axis=0) - (position - radius[:, None]).min(axis=0)
-    return solids_near(sphere(0.7 * 0.5 * float(extent.min())))
-
-
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
-def chord_rows(v, radius, first, spacing, lines):
-    """Rows that a sphere meets."""
-    low = int(np.ceil((v - radius - first) / spacing))
-    high = int(np.floor((v + radius - first) / spacing)) + 1
-    return max(low, 0), min(high, lines)
-
-
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
-def chord_span(u, v, radius, y, first, spacing, window):
-    """Lines of a row that a sphere meets inside the window, and the square of its half chord."""
-    reach2 = radius * radius - (y - v) * (y - v)
-    reach = np.sqrt(max(reach2, 0.0))
-    wide = np.sqrt(max(window * window - y * y, 0.0))
-    left, right = max(u - reach, -wide), min(u + reach, wide)
-    if left >= right:
-        return 0, 0, reach2
-    low = int(np.ceil((left - first) / spacing))
-    return low, int(np.floor((right - first) / spacing)) + 1, reach2
-
-
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
-def roots(u, reach2, first, spacing, low, high):
-    """The floor of a row."""
-    total = 0.0
-    for i in range(np.uint64(low), np.uint64(high)):
-        du = first - u + spacing * np.int64(i)
-        total += np.sqrt(max(reach2 - du * du, 0.0))
-    return total
-
-
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
 def floor(u, v, radius, first, spacing, lines, window):
-    """The square roots of all chords on the lines that meet the window, and how many there are."""
+    """Sum of the half chords on all lines that meet the window, and the number of these chords."""
     total, count = 0.0, 0
     for k in range(u.size):
-        low, high = chord_rows(v[k], radius[k], first, spacing, lines)
+        low = max(int(np.ceil((v[k] - radius[k] - first) / spacing)), 0)
+        high = min(int(np.floor((v[k] + radius[k] - first) / spacing)) + 1, lines)
         for row in range(low, high):
             y = first + row * spacing
-            start, stop, reach2 = chord_span(u[k], v[k], radius[k], y, first, spacing, window)
-            if start < stop:
-                total += roots(u[k], reach2, first, spacing, start, stop)
+            reach2 = radius[k] ** 2 - (y - v[k]) ** 2
+            reach, wide = np.sqrt(max(reach2, 0.0)), np.sqrt(max(window * window - y * y, 0.0))
+            left, right = max(u[k] - reach, -wide), min(u[k] + reach, wide)
+            if left < right:
+                start = int(np.ceil((left - first) / spacing))
+                stop = int(np.floor((right - first) / spacing)) + 1
+                for i in range(np.uint64(start), np.uint64(stop)):
+                    du = first - u[k] + spacing * np.int64(i)
+                    total += np.sqrt(max(reach2 - du * du, 0.0))
                 count += stop - start
     return total, count
 
 
-class Projected:
-    """The spheres along the axis, and the grid over the window."""
-
-    def __init__(self, solids: Solids) -> None:
-        u, v, depth = line_triads(ONE_AXIS.axes)[0] @ solids.position.T
-        order = np.argsort(depth)
-        self.u, self.v, self.depth = u[order], v[order], depth[order]
-        self.radius = solids.radius[order]
-        self.lines = int(2 * solids.reach / CLOSE)
-        self.grid = (-0.5 * self.lines * CLOSE, CLOSE, self.lines, solids.reach)
-
-    def floor(self):
-        return floor(self.u, self.v, self.radius, *self.grid)
-
-    def floor_in_threads(self, threads: int):
-        with ThreadPoolExecutor(threads) as pool:
-            return list(pool.map(lambda _: self.floor(), range(DIRECTIONS)))
-
-
-def embree(projected: Projected, folder: Path):
-    """A way that returns Embree's own seconds, without the time to load; None if there is none."""
+def embree(spheres: np.ndarray, grid: tuple[float, ...], folder: Path) -> Any:
+    """A function that returns the seconds that Embree measures; None without Embree."""
     program = folder / "embree"
     flags = ["-O3", "-march=native", str(HERE / "embree.cpp"), "-o", str(program), "-lembree3"]
-    if shutil.which("g++") is None:
+    if (
+        shutil.which("g++") is None
+        or subprocess.run(["g++", *flags], capture_output=True).returncode
+    ):
         return None
-    if subprocess.run(["g++", *flags], capture_output=True, check=False).returncode:
-        return None
-    spheres = np.column_stack([projected.u, projected.v, projected.depth, projected.radius])
     spheres.astype(np.float32).tofile(folder / "spheres")
-    command = [program, folder / "spheres", *(str(one) for one in (*projected.grid, CUTOFF))]
+    command = [program, folder / "spheres", *map(str, (*grid, CUTOFF))]
     return lambda: float(subprocess.check_output(command, text=True).split()[0])
 
 
 def chords(repeats: int) -> str:
-    """One direction in one thread: the scan, its floor, and Embree."""
-    solids = rv_solids()
-    projected = Projected(solids)
-    count = projected.floor()[1]
-    ways = {
-        "scanfab, variant c": partial(sweep, solids),
-        FLOOR: projected.floor,
-    }
-    note = f"\n\n{len(solids.radius):,} grains reach into the RV; {count:,} chords."
+    """Time of one direction in one thread: the scan, its floor, and Embree."""
+    position, radius = dense(PAPER)
+    extent = (position + radius[:, None]).max(axis=0) - (position - radius[:, None]).min(axis=0)
+    solids = solids_near(sphere(0.7 * 0.5 * float(extent.min())))
+    spheres = np.column_stack([solids.position @ line_triads(ONE_AXIS.axes)[0].T, solids.radius])
+    u, v, _, radii = spheres[np.argsort(spheres[:, 2])].T.copy()
+    lines = int(2 * solids.reach / CLOSE)
+    grid = (-0.5 * lines * CLOSE, CLOSE, lines, solids.reach)
+    ways = {"scanfab, variant c": partial(sweep, solids), FLOOR: partial(floor, u, v, radii, *grid)}
+    count = ways[FLOOR]()[1]
+    note = f"\n\n{len(radii):,} grains reach into the RV; {count:,} chords."
+    seconds = interleaved(ways, repeats, clock=time.process_time)
     with tempfile.TemporaryDirectory() as name:
-        seconds = interleaved(ways, repeats, clock=time.process_time)
-        rays = embree(projected, Path(name))
+        rays = embree(spheres, grid, Path(name))
         if rays is None:
-            note += " Without g++ or Embree 3 (Debian: libembree-dev) that was not measured."
+            note += " Embree was not measured: that needs g++ and Embree 3 (Debian: libembree-dev)."
         else:
             seconds |= interleaved({EMBREE: rays}, repeats, clock=None)
     rows = [
@@ -151,19 +100,6 @@ def chords(repeats: int) -> str:
         for name, value in sorted(seconds.items(), key=lambda item: item[1])
     ]
     return table(["way", "ns a chord", "of the floor"], rows) + note
-
-
-def threads(repeats: int) -> str:
-    """What a second thread gives, for many directions."""
-    solids = rv_solids()
-    projected = Projected(solids)
-    ways = {f"floor {n}": partial(projected.floor_in_threads, n) for n in (1, 2)}
-    for n in (1, 2):
-        ways[f"scanfab {n}"] = partial(sweep, solids, directions=DIRECTIONS, workers=n)
-    seconds = interleaved(ways, repeats)
-    gain = {name: seconds[f"{name} 1"] / seconds[f"{name} 2"] for name in ("scanfab", "floor")}
-    gain["scanfab / floor"] = gain["scanfab"] / gain["floor"]
-    return table(["two threads", "of one"], [(n, f"{one:.2f}") for n, one in gain.items()])
 
 
 def shapes() -> dict[str, Convex]:
@@ -211,4 +147,4 @@ def scans(repeats: int) -> str:
     return table(titles, list(zip(solids, *columns, strict=True)))
 
 
-SECTIONS = {"chords": chords, "threads": threads, "scans": scans}
+SECTIONS = {"chords": chords, "scans": scans}

@@ -22,6 +22,7 @@ The exit code is 0 if each coverage of void anisotropy lies within 68 ± 5 %.
 
 from __future__ import annotations
 
+import argparse
 import sys
 import warnings
 from typing import Any
@@ -32,7 +33,7 @@ import scanfab
 from scanfab import Cell, Packing, find_contacts
 from scanfab.scan.edges import EDGES
 from tests.benchmarks.packings import pushed_apart
-from tests.campaigns.frame import SAMPLE_DATA, asked
+from tests.helpers.truth import SAMPLE_DATA
 
 FRAMES: dict[str, dict[str, Any]] = {"yade_triaxial": {"boundary": "mask=3"}, "liggghts_box": {}}
 SCANS: dict[str, dict[str, Any]] = {
@@ -120,8 +121,13 @@ def of_maps(medium: str, kind: str, samples: int) -> int:
 
 def main() -> int:
     """How many coverages lie outside."""
-    kinds = ["scan", "map"]
-    given = asked(__doc__, only=kinds, seeds=1600, samples=100, edge=EDGES[:1], scans=SCANS)
+    parser = argparse.ArgumentParser(description="How often standard errors cover the truth.")
+    parser.add_argument("--only", nargs="+", default=["scan", "map"])
+    parser.add_argument("--seeds", type=int, default=1600)
+    parser.add_argument("--samples", type=int, default=100)
+    parser.add_argument("--edge", nargs="+", default=EDGES[:1])
+    parser.add_argument("--scans", nargs="+", default=[*SCANS])
+    given = parser.parse_args()
     warnings.simplefilter("ignore", scanfab.ScanfabWarning)
     outside = 0
     if "scan" in given.only:

@@ -30,17 +30,13 @@ REACHING = ("tests/cli/test_compute.py", "tests/identities", "tests/pipeline")
 QUIET = {"__repr__", "__str__", "_repr_html_"}
 SPOKEN = {"warn", "note", "isinstance", "TypeVar", "cast"}
 ARITHMETIC = {
-    "+": "-", "-": "+", "*": "/", "/": "*", "//": "*", "%": "//", "**": "*", "&": "|", "|": "&",
+    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult,
+    ast.FloorDiv: ast.Mult, ast.Mod: ast.FloorDiv, ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd,
 }  # fmt: skip
 COMPARED = {
-    "<": ("<=", ">"), "<=": ("<", ">="), ">": (">=", "<"), ">=": (">", "<="), "==": ("!=",),
-    "!=": ("==",), "is": ("is not",), "is not": ("is",), "in": ("not in",), "not in": ("in",),
-}  # fmt: skip
-SYMBOLS = {
-    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%",
-    ast.Pow: "**", ast.BitAnd: "&", ast.BitOr: "|", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">",
-    ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=", ast.Is: "is", ast.IsNot: "is not", ast.In: "in",
-    ast.NotIn: "not in",
+    ast.Lt: (ast.LtE, ast.Gt), ast.LtE: (ast.Lt, ast.GtE), ast.Gt: (ast.GtE, ast.Lt),
+    ast.GtE: (ast.Gt, ast.LtE), ast.Eq: (ast.NotEq,), ast.NotEq: (ast.Eq,), ast.Is: (ast.IsNot,),
+    ast.IsNot: (ast.Is,), ast.In: (ast.NotIn,), ast.NotIn: (ast.In,),
 }  # fmt: skip
 TYPES = re.compile(r"\bNone\b|\b[A-Z][a-z]|\b(str|int|float|bool)\b")
 
@@ -52,103 +48,81 @@ def spelt(node):
 
 def is_text(node):
     """Whether a node is a text: a constant, or with values filled in."""
-    return isinstance(node, ast.JoinedStr | ast.Constant) and not (
-        isinstance(node, ast.Constant) and not isinstance(node.value, str)
-    )
+    return isinstance(node, ast.JoinedStr) or isinstance(getattr(node, "value", None), str)
 
 
-def of_constant(node):
-    """Another truth value or number."""
-    value = node.value
-    if isinstance(value, bool):
-        yield "constant", node, str(not value)
-    elif isinstance(value, int):
-        yield "constant", node, str(value + 1)
-    elif isinstance(value, float):
-        yield "constant", node, repr(value * 1.1) if value else "1.0"
+def of_conditions(node):
+    """Other constants, and the opposite of a condition: kind, the replaced node, and the text."""
+    match node:
+        case ast.Constant(value=bool(value)):
+            yield "constant", node, str(not value)
+        case ast.Constant(value=int(value)):
+            yield "constant", node, str(value + 1)
+        case ast.Constant(value=float(value)):
+            yield "constant", node, repr(value * 1.1) if value else "1.0"
+        case ast.If() | ast.While() | ast.IfExp() | ast.comprehension():
+            for test in getattr(node, "ifs", None) or [getattr(node, "test", None)]:
+                if test is not None and "TYPE_CHECKING" not in ast.unparse(test):
+                    yield "negate", test, f"(not {spelt(test)})"
+        case ast.BoolOp(op=op, values=values):
+            other = ast.Or() if isinstance(op, ast.And) else ast.And()
+            yield "negate", node, spelt(ast.BoolOp(other, values))
 
 
-def of_condition(node):
-    """The opposite of what an if, a loop or a comprehension asks."""
-    for test in node.ifs if isinstance(node, ast.comprehension) else [node.test]:
-        if "TYPE_CHECKING" not in ast.unparse(test):
-            yield "negate", test, f"(not {spelt(test)})"
+def of_operations(node):
+    """Other signs and operations."""
+    match node:
+        case ast.Compare(left=left, ops=signs, comparators=terms):
+            for place, sign in enumerate(signs):
+                for other in COMPARED[type(sign)]:
+                    changed = [*signs[:place], other(), *signs[place + 1 :]]
+                    yield "comparison", node, spelt(ast.Compare(left, changed, terms))
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in ARITHMETIC:
+            # texts and lists know only some of the operations, and types only that one
+            lists = ast.List | ast.Tuple | ast.ListComp
+            is_type = isinstance(op, ast.BitOr) and TYPES.search(ast.unparse(node))
+            if not is_type and not any(is_text(x) or isinstance(x, lists) for x in (left, right)):
+                yield "arithmetic", node, spelt(ast.BinOp(left, ARITHMETIC[type(op)](), right))
 
 
-def of_connection(node):
-    """One of both for both, and the other way round."""
-    word = " or " if isinstance(node.op, ast.And) else " and "
-    yield "negate", node, f"({word.join(map(spelt, node.values))})"
+def of_statements(node):
+    """Steps and calls that are left out or done backwards, and other answers."""
+    match node:
+        case ast.AugAssign(target=target, op=op, value=value):
+            yield "drop", node, "pass"
+            if type(op) in ARITHMETIC and not is_text(value):
+                step = ast.AugAssign(target, ARITHMETIC[type(op)](), value)
+                yield "arithmetic", node, ast.unparse(step)
+        case ast.Expr(value=ast.Call()):
+            yield "drop", node, "pass"
+        case ast.Return(value=ast.Tuple(elts=[one, two, *more])) if not starred(ast.walk(node)):
+            swapped = ast.Tuple([two, one, *more], ast.Load())
+            yield "return", node, f"return {spelt(swapped)}"
+        case ast.Return(value=ast.Compare() | ast.BoolOp()):
+            yield "return", node, f"return not {spelt(node.value)}"
+        case ast.Return(value=None | ast.Constant() | ast.JoinedStr()):
+            pass
+        case ast.Return():
+            yield "return", node, "return None"
 
 
-def of_comparison(node):
-    """Another sign."""
-    terms = [spelt(one) for one in (node.left, *node.comparators)]
-    signs = [SYMBOLS[type(op)] for op in node.ops]
-    for place, sign in enumerate(signs):
-        for other in COMPARED[sign]:
-            changed = [*signs[:place], other, *signs[place + 1 :]]
-            words = (word for pair in zip(changed, terms[1:], strict=True) for word in pair)
-            yield "comparison", node, f"({' '.join([terms[0], *words])})"
-
-
-def of_operation(node):
-    """Another operation on numbers."""
-    sign = ARITHMETIC.get(SYMBOLS.get(type(node.op)))
-    # texts and lists know only some of the operations, and types only that one
-    lists = ast.List | ast.Tuple | ast.ListComp
-    other = any(is_text(one) or isinstance(one, lists) for one in (node.left, node.right))
-    type_or = isinstance(node.op, ast.BitOr) and TYPES.search(ast.unparse(node))
-    if sign and not other and not type_or:
-        yield "arithmetic", node, f"({spelt(node.left)} {sign} {spelt(node.right)})"
-
-
-def of_step(node):
-    """A step such as ``x += 1`` left out, or done backwards."""
-    yield "drop", node, "pass"
-    sign = ARITHMETIC.get(SYMBOLS.get(type(node.op)))
-    if sign and not is_text(node.value):
-        yield "arithmetic", node, f"{ast.unparse(node.target)} {sign}= {spelt(node.value)}"
-
-
-def of_statement(node):
-    """A call whose answer nobody uses, left out."""
-    if isinstance(node.value, ast.Call):
-        yield "drop", node, "pass"
-
-
-def of_return(node):
-    """The opposite, the other order, or nothing."""
-    value = node.value
-    starred = any(isinstance(one, ast.Starred) for one in ast.walk(node))
-    if isinstance(value, ast.Tuple) and len(value.elts) > 1 and not starred:
-        one, two, *more = value.elts
-        yield "return", node, f"return ({', '.join(map(spelt, (two, one, *more)))})"
-    elif isinstance(value, ast.Compare | ast.BoolOp):
-        yield "return", node, f"return not {spelt(value)}"
-    elif value is not None and not isinstance(value, ast.Constant | ast.JoinedStr):
-        yield "return", node, "return None"
-
-
-def of_call(node):
+def of_calls(node):
     """Two arguments in each other's place."""
-    words, name = [ast.unparse(one) for one in node.args], ast.unparse(node.func)
-    # of all values but NaN the larger one is the same in any order
-    if any(isinstance(x, ast.Starred) for x in node.args) or name in ("max", "min"):
-        return
-    for place in range(len(words) - 1):
-        if words[place] != words[place + 1]:
-            changed = [*words[:place], words[place + 1], words[place], *words[place + 2 :]]
-            changed += [ast.unparse(one) for one in node.keywords]
-            yield "arguments", node, f"{name}({', '.join(changed)})"
+    match node:
+        # of all values but NaN the larger one is the same in any order
+        case ast.Call(func=ast.Name(id="max" | "min")):
+            pass
+        case ast.Call(func=func, args=args, keywords=named) if not starred(args):
+            for k in range(len(args) - 1):
+                one, two = args[k : k + 2]
+                if ast.unparse(one) != ast.unparse(two):
+                    changed = [*args[:k], two, one, *args[k + 2 :]]
+                    yield "arguments", node, ast.unparse(ast.Call(func, changed, named))
 
 
-MUTANTS = {
-    ast.Constant: of_constant, ast.If: of_condition, ast.While: of_condition,
-    ast.IfExp: of_condition, ast.comprehension: of_condition, ast.BoolOp: of_connection,
-    ast.Compare: of_comparison, ast.BinOp: of_operation, ast.AugAssign: of_step,
-    ast.Expr: of_statement, ast.Return: of_return, ast.Call: of_call,
-}  # fmt: skip
+def starred(nodes):
+    """Whether a list is unpacked in one of them."""
+    return any(isinstance(one, ast.Starred) for one in nodes)
 
 
 def is_left_alone(node):
@@ -177,7 +151,8 @@ def sites(tree, bound=None):
         # without a value of its own before, the name would only be missing
         if all(bound.get(name, tree.lineno) < tree.lineno for name in names):
             yield "drop", tree, "pass"
-    yield from MUTANTS.get(type(tree), lambda node: ())(tree)
+    for mutants in (of_conditions, of_operations, of_statements, of_calls):
+        yield from mutants(tree)
     for name, value in ast.iter_fields(tree):
         for one in value if isinstance(value, list) else [value]:
             is_type = name in ("annotation", "returns", "decorator_list")

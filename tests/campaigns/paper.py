@@ -15,6 +15,7 @@ computed again; an unfinished one goes on. `python docs/make_validation.py` make
 
 from __future__ import annotations
 
+import argparse
 import shutil
 import subprocess
 from pathlib import Path
@@ -22,8 +23,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tests.campaigns.frame import SAMPLE_DATA, asked
 from tests.helpers.interruptions import PROGRAM
+from tests.helpers.truth import SAMPLE_DATA
 
 TABLES = SAMPLE_DATA / "paper"
 BLOCKS = range(1, 9)
@@ -143,7 +144,13 @@ def compute(runs: Path, table: Path, run: Run, name: str, workers: int) -> None:
 
 def main() -> None:
     """Compute what is missing."""
-    given = asked(__doc__, runs=Path, into=TABLES, only=RUNS, measures=MEASURES, workers=2)
+    parser = argparse.ArgumentParser(description="Make the tables of the paper's experiment.")
+    parser.add_argument("runs", type=Path)
+    parser.add_argument("--into", type=Path, default=TABLES)
+    parser.add_argument("--only", nargs="+", default=[*RUNS])
+    parser.add_argument("--measures", nargs="+", default=[*MEASURES])
+    parser.add_argument("--workers", type=int, default=2)
+    given = parser.parse_args()
     runs, into = given.runs.resolve(), given.into.resolve()
     for run_name in given.only:
         run = RUNS[run_name]

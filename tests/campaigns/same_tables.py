@@ -19,25 +19,24 @@ import csv
 import json
 import math
 import re
+import shlex
 import subprocess
 import sys
 import tempfile
-import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-# in the place of this folder, whose coverage.py is not the package of that name; the base's tree
-# where its helpers make the sound files
-sys.path[:1] = [str(Path.cwd()), str(ROOT)]
+# in the place of this folder, whose coverage.py is not the package of that name
+sys.path[0] = str(ROOT)
 
-from tests.helpers import versions  # noqa: E402
+import pyvista  # noqa: E402
 
-# each version is the one that its environment has installed, not the one of this tree
-del sys.path[:2]
+from scanfab.io.writer import installed_writers, writer_named  # noqa: E402
+from tests.helpers import fuzzing, sound_files, versions  # noqa: E402
+from tests.helpers.versions import Reading  # noqa: E402
 
 DATA = "sample_data"
 
@@ -45,8 +44,6 @@ WANTED: dict[str, str] = {
     r"\.multisphere( [a-z-]+)?: UnknownFormatError -> ReadError": "any text is tried as a table",
     r"pfc/(grains|pairs)\.\w+( [a-z-]+)?: UnknownFormatError": "PFC is known by its columns",
     r"new_empty\.bin lammps-data \[0\]: column type": "without rows a column has no kind",
-    r"wide\.csv": "no program writes tables in UTF-16",
-    r"new_swapped\.bin": "no machine that runs LAMMPS today swaps bytes",
     r"step: -?\d+ -> None": "a single file has no step by its name",
     r"clumps\.csv row \d step: 0 -> $": "a single file has no step by its name",
     r"engines/lammps/dump\.7[05]00\.\w+ \[0\]: contacts": "contacts of the same step are read",
@@ -55,101 +52,89 @@ WANTED: dict[str, str] = {
 }
 """Regular expression of what differs, and why it shall."""
 
-BOX, TRIAXIAL = [f"{DATA}/liggghts_box"], [f"{DATA}/yade_triaxial", "--boundary", "mask=3"]
-PERIODIC, SHEAR = [f"{DATA}/liggghts_periodic"], [f"{DATA}/lammps_shear"]
-FLOOR, DISCS = f"{DATA}/liggghts_formats/floor", [f"{DATA}/lammps_discs"]
-ROUGH, FIXED = ["--tolerance", "3e-3"], ["--spacing", "2rmin", "--directions", "lebedev:11"]
+BOX, TRIAXIAL = f"{DATA}/liggghts_box", f"{DATA}/yade_triaxial --boundary mask=3"
+PERIODIC, SHEAR = f"{DATA}/liggghts_periodic", f"{DATA}/lammps_shear"
+FLOOR, DISCS = f"{DATA}/liggghts_formats/floor", f"{DATA}/lammps_discs"
+ROUGH, FIXED = "--tolerance 3e-3", "--spacing 2rmin --directions lebedev:11"
 
 # every option of the commands that read a source, at least once; {out} is a folder for results
 COMPUTE = {
-    "auto": [*BOX, *ROUGH, "--quiet"],
-    "triaxial": [*TRIAXIAL, *ROUGH, "--strain", "boundary", "--workers", "1"],
-    "fixed": [*TRIAXIAL, *FIXED, "--rv", "0.6", "--on-error", "skip"],
-    "rvs": [*BOX, *FIXED, "--rv", "0.4,0.6", "--variants", "cd", "--edge", "start"],
-    "ends": [*BOX, *FIXED, "--edge", "ends", "--frames", "1::2", "--seed", "3"],
-    "cutoffs": [*SHEAR, *ROUGH, "--cutoffs", "0:2rmin:0.5rmin", "--moment", "2"],
-    "oblique": [*PERIODIC, *ROUGH, "--axis", "1,1,0", "--min-contacts", "3"],
-    "whole": [*BOX, *FIXED, "--variants", "ab", "--contacts", "geometric",
-              "--contact-tolerance", "1e-4"],
-    "recursive": [*TRIAXIAL, *FIXED, "--rattlers", "recursive", "--frames", "-1:"],
-    "force": [*PERIODIC, *FIXED, "--rattlers", "force", "--min-force", "0.1"],
-    "with": [*PERIODIC, *FIXED, "--with", "forces,state,invariants,harmonics"],
-    "boxed": [*BOX, *FIXED, "--rv-shape", "box", "--rv-size", "0.02,0.02,0.02"],
-    "cylinder": [*BOX, *FIXED, "--rv-shape", "cylinder", "--rv-axis", "x"],
-    "placed": [*BOX, *FIXED, "--rv-radius", "0.005", "--rv-center", "0", "0", "0"],
-    "surface": [*BOX, *FIXED, "--rv-shape", "{out}/ball.stl"],
-    "follows": [*SHEAR, *FIXED, "--rv-follows", "strain", "--strain", "cell"],
-    "chords": [*BOX, "--max-chords", "1e6", "--variants", "c"],
-    "discs": [*DISCS, *ROUGH, "--dim", "2"],
-    "spheres": [*DISCS, "--directions", "lebedev:3", "--spacing", "0.1rmin", "--dim", "3",
-                "--variants", "a"],
-    "clumps": [f"{DATA}/clumps/clumps_spheres.0.vtu", *FIXED, "--bodies", "clumpId"],
-    "saved": [f"{DATA}/yade_strained/saved_17500.xml.bz2", *FIXED],
-    "columns": [f"{DATA}/yade_formats/x_y_z_r.txt", *FIXED, "--format", "table",
-                "--columns", "x=1,y=2,z=3,radius=4", "--skip", "1", "--max-unpacked", "50"],
-    "celled": [f"{FLOOR}/noradius.txt", *FIXED, "--cell", "0.014", "0.013", "0.04",
-               "--periodic", "xy", "--radius", "0.00125"],
-    "positional": [f"{FLOOR}/shuffled.txt", *FIXED, "--contacts",
-                   f"{FLOOR}/pairs_pos_id_force.txt", "--contact-columns", "pos id force"],
-    "followed": [*BOX, *FIXED, "--follow-for", "0.5", "--variants", "c"],
-    "fields": [*BOX, *FIXED, "--fields", "frame,variant,alpha_vs_axial", "--digits", "6"],
-    "told": [*BOX, *FIXED, "--verbose", "--vtk", "{out}/paraview", "--plot", "{out}/told.png",
-             "--manifest", "{out}/told.json"],
-}  # fmt: skip
-MAPS = {
-    "grid": [*BOX, "--grid", "2,2,2", *ROUGH],
-    "slices": [*TRIAXIAL, "--slices", "3", "--frames", "-1:", *FIXED],
-    "shells": [*PERIODIC, "--shells", "2", "--variants", "ac", *FIXED, "--plot", "{out}/map.png"],
+    "auto": f"{BOX} {ROUGH} --quiet",
+    "triaxial": f"{TRIAXIAL} {ROUGH} --strain boundary --workers 1",
+    "fixed": f"{TRIAXIAL} {FIXED} --rv 0.6 --on-error skip",
+    "rvs": f"{BOX} {FIXED} --rv 0.4,0.6 --variants cd --edge start",
+    "ends": f"{BOX} {FIXED} --edge ends --frames 1::2 --seed 3",
+    "cutoffs": f"{SHEAR} {ROUGH} --cutoffs 0:2rmin:0.5rmin --moment 2",
+    "oblique": f"{PERIODIC} {ROUGH} --axis 1,1,0 --min-contacts 3",
+    "whole": f"{BOX} {FIXED} --variants ab --contacts geometric --contact-tolerance 1e-4",
+    "recursive": f"{TRIAXIAL} {FIXED} --rattlers recursive --frames -1:",
+    "force": f"{PERIODIC} {FIXED} --rattlers force --min-force 0.1",
+    "with": f"{PERIODIC} {FIXED} --with forces,state,invariants,harmonics",
+    "boxed": f"{BOX} {FIXED} --rv-shape box --rv-size 0.02,0.02,0.02",
+    "cylinder": f"{BOX} {FIXED} --rv-shape cylinder --rv-axis x",
+    "placed": f"{BOX} {FIXED} --rv-radius 0.005 --rv-center 0 0 0",
+    "surface": f"{BOX} {FIXED} --rv-shape {{out}}/ball.stl",
+    "follows": f"{SHEAR} {FIXED} --rv-follows strain --strain cell",
+    "chords": f"{BOX} --max-chords 1e6 --variants c",
+    "discs": f"{DISCS} {ROUGH} --dim 2",
+    "spheres": f"{DISCS} --directions lebedev:3 --spacing 0.1rmin --dim 3 --variants a",
+    "clumps": f"{DATA}/clumps/clumps_spheres.0.vtu {FIXED} --bodies clumpId",
+    "saved": f"{DATA}/yade_strained/saved_17500.xml.bz2 {FIXED}",
+    "columns": f"{DATA}/yade_formats/x_y_z_r.txt {FIXED} --format table --skip 1 "
+    "--columns x=1,y=2,z=3,radius=4 --max-unpacked 50",
+    "celled": f"{FLOOR}/noradius.txt {FIXED} --cell 0.014 0.013 0.04 --periodic xy "
+    "--radius 0.00125",
+    "positional": f"{FLOOR}/shuffled.txt {FIXED} --contacts {FLOOR}/pairs_pos_id_force.txt "
+    "--contact-columns 'pos id force'",
+    "followed": f"{BOX} {FIXED} --follow-for 0.5 --variants c",
+    "fields": f"{BOX} {FIXED} --fields frame,variant,alpha_vs_axial --digits 6",
+    "told": f"{BOX} {FIXED} --verbose --vtk {{out}}/paraview --plot {{out}}/told.png "
+    "--manifest {out}/told.json",
+    "part_0": f"{BOX} {FIXED} --frames 0:2",
+    "part_2": f"{BOX} {FIXED} --frames 2:",
 }
 CALIBRATED = (
     "ladder,value,variant,rule,directions,replicates,spacing,cutoff,rv_radius,segments,mean_length,"
     "alpha_vs_axial,alpha_vs_axial_se,alpha_vs_axial_sample_se,steady,note"
 )
-
-
-def commands() -> Iterator[tuple[str, list[str]]]:
-    """Name of the result, and the words of a command; tables come before those made of them."""
-    for name, words in COMPUTE.items():
-        yield f"{name}.csv", ["compute", *words, "-o", f"{{out}}/{name}.csv"]
-    for suffix in ("tsv", "json", "jsonl", "parquet"):
-        yield f"auto.{suffix}", ["compute", *BOX, *ROUGH, "-o", f"{{out}}/auto.{suffix}"]
-    yield "stdout", ["compute", *BOX, *FIXED, "--resume", "-o", "{out}/auto_fixed.csv"]
-    for name, words in MAPS.items():
-        yield f"map_{name}.csv", ["map", *words, "-o", f"{{out}}/map_{name}.csv"]
-    yield (
-        "calibrate.csv",
-        ["calibrate", *BOX, "--frame", "-1", *ROUGH, "--fields", CALIBRATED,
-         "-o", "{out}/calibrate.csv"],
-    )  # fmt: skip
-    for k, name in enumerate((BOX, TRIAXIAL, PERIODIC, SHEAR, DISCS)):
-        yield f"inspect_{k}", ["inspect", *name, "--json"]
-    tables = ["{out}/triaxial.csv", "{out}/auto.csv", "--label", "one", "--label", "two"]
-    for name, words in {
-        "frames": [],
-        "summary": ["--summary", "--strain-max", "0.1", "--digits", "17"],
-        "differences": ["--differences"],
-        "figure": ["--plot", "{out}/figure.svg", "--figure", "evolution"],
-    }.items():
-        yield f"compared_{name}.csv", ["compare", *tables, *words, "-o",
-                                       f"{{out}}/compared_{name}.csv"]  # fmt: skip
-    yield "one_cutoff.csv", ["compare", "{out}/cutoffs.csv", "--cutoff", "0.0", "-o",
-                             "{out}/one_cutoff.csv"]  # fmt: skip
-    for part in ("0:2", "2:"):
-        yield f"part_{part[0]}.csv", ["compute", *BOX, *FIXED, "--frames", part, "-o",
-                                      f"{{out}}/part_{part[0]}.csv"]  # fmt: skip
-    yield "merged.csv", ["merge", "{out}/part_0.csv", "{out}/part_2.csv", "-o", "{out}/merged.csv"]
-    yield "report", ["report", "{out}/auto.csv", "--title", "T", "--author", "A", "-o",
-                     "{out}/report.html"]  # fmt: skip
-    yield "view", ["view", *BOX, "--frame", "0", "--cut", "--screenshot", "{out}/view.png"]
-    yield "formats", ["formats"]
-    yield "converted", ["convert", *BOX, "{out}/converted", "--to", "vtp", "--frames", "0:2"]
+COMPARED = "compare {out}/triaxial.csv {out}/auto.csv --label one --label two"
+TABLES = {
+    **{name: f"compute {words}" for name, words in COMPUTE.items()},
+    "map_grid": f"map {BOX} --grid 2,2,2 {ROUGH}",
+    "map_slices": f"map {TRIAXIAL} --slices 3 --frames -1: {FIXED}",
+    "map_shells": f"map {PERIODIC} --shells 2 --variants ac {FIXED} --plot {{out}}/map.png",
+    "calibrate": f"calibrate {BOX} --frame -1 {ROUGH} --fields {CALIBRATED}",
+    "compared_frames": COMPARED,
+    "compared_summary": f"{COMPARED} --summary --strain-max 0.1 --digits 17",
+    "compared_differences": f"{COMPARED} --differences",
+    "compared_figure": f"{COMPARED} --plot {{out}}/figure.svg --figure evolution",
+    "one_cutoff": "compare {out}/cutoffs.csv --cutoff 0.0",
+    "merged": "merge {out}/part_0.csv {out}/part_2.csv",
+}
+OTHERS = {
+    **{f"auto.{x}": f"compute {BOX} {ROUGH} -o {{out}}/auto.{x}" for x in ("tsv", "json", "jsonl")},
+    "auto.parquet": f"compute {BOX} {ROUGH} -o {{out}}/auto.parquet",
+    "stdout": f"compute {BOX} {FIXED} --resume -o {{out}}/auto_fixed.csv",
+    **{
+        f"inspect_{k}": f"inspect {words} --json"
+        for k, words in enumerate((BOX, TRIAXIAL, PERIODIC, SHEAR, DISCS))
+    },
+    "report": "report {out}/auto.csv --title T --author A -o {out}/report.html",
+    "view": f"view {BOX} --frame 0 --cut --screenshot {{out}}/view.png",
+    "formats": "formats",
+    "converted": f"convert {BOX} {{out}}/converted --to vtp --frames 0:2",
+}
+COMMANDS = {
+    **{f"{name}.csv": [*shlex.split(x), "-o", f"{{out}}/{name}.csv"] for name, x in TABLES.items()},
+    **{name: shlex.split(words) for name, words in OTHERS.items()},
+}
+"""The words of a command by the name of its result."""
 
 
 def unnamed_options(base: Path) -> set[str]:
     """Options of the base's help that no command above has."""
     said = {"--help", "--version", "--debug", "--follow", "--scheduler", "--scheduler-file"}
-    for _, words in commands():
-        said |= {word for word in words if word.startswith("--")}
+    said |= {word for words in COMMANDS.values() for word in words if word.startswith("--")}
     found = set()
     for name in ("compute", "map", "calibrate", "inspect", "compare", "merge", "report", "view",
                  "convert"):  # fmt: skip
@@ -161,75 +146,6 @@ def unnamed_options(base: Path) -> set[str]:
 
 
 MAIN = "from scanfab.cli.main import main; main()"
-
-
-# --- the tasks, in the environment of either version
-
-
-def outcome(action: Callable[[], Any]) -> Any:
-    """What an action gives, without its warnings, or the kind of its error."""
-    import scanfab
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            return action()
-        except scanfab.ScanfabError as error:
-            return type(error).__name__
-        except Exception as error:
-            return f"TRACEBACK {error!r}"
-
-
-def read_all(source: str, **options: Any) -> Any:
-    """The packings of a source as digests, or the kind of its error."""
-    import scanfab
-
-    return outcome(
-        lambda: [versions.packed(one.read()) for one in scanfab.read_series(source, **options)]
-    )
-
-
-def task_read(*files: str) -> dict[str, Any]:
-    """Each source, as it is and with a format's name where there is one behind a tab."""
-    found = {}
-    for line in files:
-        source, _, format = line.partition("\t")
-        found[line] = read_all(source, **({"format": format} if format else {}))
-    return found
-
-
-def task_convert(folder: str, *sources: str) -> dict[str, Any]:
-    """Each source in every format; what is read back from each, or the error of writing it."""
-    import scanfab
-
-    found: dict[str, Any] = {}
-    special = {"on-dem": "vtkhdf", "lammps": "lammpstrj", "lammps-data": "data"}
-    for k, source in enumerate(sources):
-        for name in sorted(one.name for one in entry_points(group="scanfab.writers")):
-            out = Path(folder) / f"{k}_{name}" / f"frame.{special.get(name, name)}"
-            out.parent.mkdir(parents=True, exist_ok=True)
-
-            def convert(source: str = source, out: Path = out, name: str = name) -> None:
-                scanfab.convert(scanfab.read_series(source)[-1].read(), out, to=name)
-
-            found[f"{source} {name}"] = outcome(convert) or read_all(str(out))
-    return found
-
-
-def task_sound(folder: str) -> list[str]:
-    """The sound files of the tests, each format in a folder of its own; run in the base's tree."""
-    sys.path.insert(0, str(Path.cwd()))
-    from tests.helpers import fuzzing, sound_files
-
-    files = []
-    for name in fuzzing.READERS:
-        own = Path(folder) / name
-        own.mkdir(parents=True)
-        with tempfile.TemporaryDirectory() as made:
-            for file, content in sound_files.seeds(name, Path(made)):
-                (own / file).write_bytes(content)
-        files += [f"{path}\t{name}" for path in sorted(own.iterdir())]
-    return files
 
 
 # --- holding the answers against one another
@@ -281,11 +197,7 @@ def agree(row: dict[str, str], other: dict[str, str], column: str, fixed: bool) 
 def run_commands(python: Path, out: Path) -> dict[str, tuple[int, str]]:
     """Exit code and standard output of each command."""
     out.mkdir(parents=True)
-    import meshio
-    import pyvista
-
-    ball = pyvista.Sphere(radius=0.006, theta_resolution=12, phi_resolution=12)
-    meshio.write(out / "ball.stl", meshio.Mesh(ball.points, [("triangle", ball.regular_faces)]))
+    pyvista.Sphere(radius=0.006, theta_resolution=12, phi_resolution=12).save(out / "ball.stl")
 
     def one(words: list[str]) -> tuple[int, str]:
         words = [word.format(out=out) for word in words]
@@ -296,7 +208,9 @@ def run_commands(python: Path, out: Path) -> dict[str, tuple[int, str]]:
 
     found: dict[str, tuple[int, str]] = {}
     for of_tables in (False, True):
-        wave = {n: words for n, words in commands() if (words[0] in MADE_OF_TABLES) == of_tables}
+        wave = {
+            n: words for n, words in COMMANDS.items() if (words[0] in MADE_OF_TABLES) == of_tables
+        }
         with ThreadPoolExecutor(2) as pool:
             found |= dict(zip(wave, pool.map(one, wave.values()), strict=True))
     return found
@@ -311,7 +225,7 @@ def held_commands(python: Path, base: Path, folder: Path) -> Iterator[str]:
         yield f"no command tries the option {option}"
     outs = folder / "base", folder / "this"
     ones, twos = (run_commands(who, out) for who, out in zip((base, python), outs, strict=True))
-    for name, words in commands():
+    for name, words in COMMANDS.items():
         (code, text), (other_code, other_text) = ones[name], twos[name]
         if code and code == other_code:
             yield f"{name} ends with {code} by both, and compares nothing"
@@ -338,48 +252,60 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, default=ROOT / "build" / "same_tables")
     parser.add_argument("--also", type=Path, nargs="*", default=[])
     parser.add_argument("--only", nargs="+", default=["read", "converted", "commands"])
-    parser.add_argument("--task", help=argparse.SUPPRESS)
     given = parser.parse_args()
-    if given.task:
-        tasks = {"read": task_read, "convert": task_convert, "sound": task_sound}
-        print(json.dumps(tasks[given.task](*json.load(sys.stdin))))
-        return
-    checkout, base = versions.installed_base(given.base, given.keep.resolve())
-    this = Path(sys.executable)
+    base = versions.installed_base(given.base, given.keep.resolve())
+    pythons = base, Path(sys.executable)
     found: list[str] = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        if {"read", "converted"} & set(given.only):
-            sources = every_source(checkout, base, folder, given.also)
+        sources = every_source(folder / "sound", given.also) if {*given.only} - {"commands"} else []
         if "read" in given.only:
-            answers = [versions.ask(python, __file__, "read", *sources) for python in (base, this)]
-            found += differences("read", *answers)
+            answers = [versions.answers(python, sources) for python in pythons]
+            for source, *pair in zip(sources, *answers, strict=True):
+                name = f"{source.source} {source.options.get('format', '')}".strip()
+                found += differences(name, *(one.found for one in pair))
             print(f"read: {len(sources)} sources", flush=True)
         if "converted" in given.only:
-            plain = [one for one in sources if "\t" not in one and not one.endswith(PACKED)]
+            # files that are there unpacked as well, or are like others, are not converted
+            plain = {one.source: 0 for one in sources if not one.source.endswith(PACKED)}
+            listed = [(source, name) for source in plain for name in installed_writers()]
             answers = [
-                versions.ask(python, __file__, "convert", str(folder / f"converted_{k}"), *plain)
-                for k, python in enumerate((base, this))
+                versions.answers(python, conversions(listed, folder / f"converted_{k}"))
+                for k, python in enumerate(pythons)
             ]
-            found += differences("converted", *answers)
-            print(f"converted: {len(answers[0])} conversions", flush=True)
+            for (source, name), *pair in zip(listed, *answers, strict=True):
+                found += differences(f"converted: {source} {name}", *(one.found for one in pair))
+            print(f"converted: {len(listed)} conversions", flush=True)
         if "commands" in given.only:
-            found += held_commands(this, base, folder / "commands")
+            found += held_commands(pythons[1], base, folder / "commands")
     report(found)
 
 
 PACKED = (".gz", ".bz2", ".xz", ".lz4", ".zst")
-"""Of files that are there unpacked as well, or like others, only one is converted."""
 
 
-def every_source(checkout: Path, base: Path, folder: Path, also: list[Path]) -> list[str]:
-    """Folders and files to read, with the name of a format where it is known."""
-    sound = versions.ask(base, __file__, "sound", str(folder / "sound"), tree=checkout)
-    samples = sorted((ROOT / DATA).rglob("*"))
-    folders = [str(path) for path in sorted((ROOT / DATA).iterdir()) if path.is_dir()]
-    files = [str(path) for path in samples if path.is_file() and path.parent.name != "paper"]
-    others = [str(path) for top in also for path in sorted(top.rglob("*")) if path.is_file()]
-    return [*folders, *files, *sound, *(one.partition("\t")[0] for one in sound), *others]
+def every_source(folder: Path, also: list[Path]) -> list[Reading]:
+    """Samples, and sound files as any format and as their own."""
+    sources = [path for path in sorted((ROOT / DATA).iterdir()) if path.is_dir()]
+    for top in (ROOT / DATA, *also):
+        sources += [x for x in sorted(top.rglob("*")) if x.is_file() and x.parent.name != "paper"]
+    found = [Reading(str(path)) for path in sources]
+    for name in fuzzing.READERS:
+        own = folder / name
+        own.mkdir(parents=True)
+        for file, content in sound_files.seeds(name, own):
+            (own / file).write_bytes(content)
+        for path in sorted(own.iterdir()):
+            found += [Reading(str(path)), Reading(str(path), {"format": name})]
+    return found
+
+
+def conversions(listed: list[tuple[str, str]], folder: Path) -> list[Reading]:
+    """Each source in a format, in a folder of its own."""
+    return [
+        Reading(source, {}, (str(folder / f"{k}/a{writer_named(name).extensions[0]}"), name))
+        for k, (source, name) in enumerate(listed)
+    ]
 
 
 def report(found: list[str]) -> None:

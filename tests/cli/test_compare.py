@@ -106,7 +106,7 @@ def test_a_table_of_compare_is_called_so(tmp_path, compare, table):
     [
         ("source,frame\n", [], "the tables hold no frames"),
         ("a,b\n1,2\n", [], "there is no column source, frame"),
-        ("a,b\n1\n", [], "line 2: expected 2 cells, found 1"),
+        ("a,b\n1\n", [], "line 2: expected 2 cells as in line 1, found 1"),
         (json.dumps(curve()[0]), ["--differences"], "hold no two variants of one frame"),
     ],
 )

@@ -237,19 +237,6 @@ def test_it_ends_with_the_last_frame_that_is_asked_for(folder, finished):
     assert Path("t.csv").read_bytes() == finished_run("--frames", ":2")
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["dumps", "dumps/dump_0.txt", "--follow"],
-        ["-", "--format", "lammps", "--follow"],
-        ["dumps", "--follow-for", "-1"],
-    ],
-)
-def test_wrong_usage(folder, words):
-    (folder / "dump_0.txt").write_text(dump_text(cubic_rows()))
-    assert run(["compute", *words]) == 2
-
-
 def test_the_library_follows(folder, finished):
     thread = meanwhile(copied(folder, sorted(finished.iterdir())))
     series = scanfab.follow_series(folder, seconds=2)

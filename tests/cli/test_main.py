@@ -58,16 +58,6 @@ def test_results_go_to_standard_output_and_words_to_standard_error() -> None:
     assert "\x1b" not in answer.stdout + answer.stderr
 
 
-def test_output_file_is_complete_or_untouched(ask, tmp_path: Path) -> None:
-    output = tmp_path / "table.csv"
-    output.write_text("precious\n")
-    ask("compute", TRIAXIAL, "--rv", "-1", "-o", output, code=2)
-    assert output.read_text() == "precious\n"
-    ask("compute", TRIAXIAL, "--frames", "0", "-o", output, *FAST)
-    assert len(output.read_text().splitlines()) == 5
-    assert {path.name for path in tmp_path.iterdir()} == {"table.csv", "table.csv.manifest.json"}
-
-
 def test_cell_takes_three_or_six_numbers(ask, tmp_path: Path) -> None:
     dump = tmp_path / "spheres.csv"
     dump.write_text("x,y,z,radius\n1,1,1,1\n3,3,3,1\n")

@@ -1,16 +1,12 @@
-"""scanfab map: its table, manifest, resume, ParaView files and figure; wrong words are told."""
+"""scanfab map: its table, resume, ParaView files and figure."""
 
 from __future__ import annotations
-
-import json
-import shlex
 
 import pytest
 import pyvista
 
 import scanfab
 from scanfab.cli.main import run
-from scanfab.pipeline.record import repeat_command
 from tests.helpers.interruptions import interrupted_at_row, write_series
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--workers", "1")
@@ -53,15 +49,6 @@ def test_it_is_drawn_and_written_for_paraview(table):
     assert mesh.cell_data["alpha_vs_axial"].tolist() == pytest.approx(fabric)
     # blocks are where their rows say they are
     assert mesh.cell_centers().points[:, 0].tolist() == pytest.approx([row.x for row in rows])
-
-
-def test_the_manifest_repeats_it(table, ask):
-    asked = json.loads(table.with_name("map.csv.manifest.json").read_text())["settings"]
-    assert asked["grid"] == [2, 1, 1]
-    words = shlex.split(repeat_command(asked, str(table.with_name("again.csv"))))
-    assert words[:2] == ["scanfab", "map"]
-    ask(*words[1:])
-    assert table.with_name("again.csv").read_bytes() == table.read_bytes()
 
 
 def test_a_run_that_was_stopped_goes_on_but_not_with_other_blocks(

@@ -48,6 +48,8 @@ def folder(tmp_path, monkeypatch):
         ("compute cube --columns radius", 2, "--columns: expected NAME=COLUMN"),
         ("compute cube --columns x=1,x=2", 2, "--columns: expected one column for x"),
         ("compute cube --follow-for -1", 2, "--follow-for"),
+        ("compute cube cube/dump_0.txt --follow", 2, "--follow takes one folder, or one file"),
+        ("compute - --format lammps --follow", 2, "--follow takes one folder, or one file"),
         ("compute cube --rv -1 -o out.csv", 2, "--rv: expected a fraction above 0"),
         ("compute cube --rv-shape none.stl", 2, "surface that exists (.stl .vtp .ply .obj)"),
         ("compute cube --rv-follows sand", 2, "--rv-follows: expected none or strain"),

@@ -1,15 +1,11 @@
-"""Several RVs on the command line: table, manifest, resume, comparison, figures, ParaView, view."""
+"""Several RVs on the command line: table, comparison, figures, ParaView, view."""
 
 from __future__ import annotations
-
-import json
-import shlex
 
 import pytest
 
 import scanfab
 from scanfab.cli.main import run
-from scanfab.pipeline.record import repeat_command
 from tests.helpers.interruptions import write_series
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")
@@ -36,15 +32,6 @@ def test_the_table_is_that_of_the_library(series, table):
     assert [(row.frame, row.variant, row.rv) for row in computed[:3]] == [
         (0, "a", None), (0, "c", 0.5), (0, "c", 0.7),
     ]  # fmt: skip
-
-
-def test_the_manifest_repeats_it(table, ask):
-    asked = json.loads(table.with_name("table.csv.manifest.json").read_text())["settings"]
-    assert asked["rv"] == [0.5, 0.7]
-    words = shlex.split(repeat_command(asked, str(table.with_name("again.csv"))))
-    assert words[words.index("--rv") + 1] == "0.5,0.7"
-    ask(*words[1:])
-    assert table.with_name("again.csv").read_bytes() == table.read_bytes()
 
 
 def test_curves_are_told_apart_by_their_rv(table, series, ask, tmp_path):

@@ -14,18 +14,11 @@ import urllib.request
 from typing import Any
 
 FLAGS = (
-    "--headless=new",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-dev-shm-usage",
-    "--window-size=1200,1000",
-)
-LEFT = 0
+    "headless=new", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run", "disable-sync",
+    "disable-background-networking", "disable-component-update", "disable-dev-shm-usage",
+    "window-size=1200,1000",
+)  # fmt: skip
+PHONE = {"deviceMetrics": {"width": 390, "height": 844, "pixelRatio": 2, "touch": True}}
 
 
 def missing() -> str:
@@ -33,9 +26,6 @@ def missing() -> str:
     wanted = {"chromium": ("chromium", "chromium-browser"), "chromium-driver": ("chromedriver",)}
     lacking = [name for name, programs in wanted.items() if not any(map(shutil.which, programs))]
     return f"install {' and '.join(lacking)}" if lacking else ""
-
-
-PHONE = {"deviceMetrics": {"width": 390, "height": 844, "pixelRatio": 2, "touch": True}}
 
 
 class Browser:
@@ -54,11 +44,10 @@ class Browser:
         )
         self._url = f"http://127.0.0.1:{port}"
         self._wait_for_driver()
+        flags = [f"--{flag}" for flag in (*FLAGS, f"user-data-dir={self._profile.name}")]
         binary = shutil.which("chromium") or shutil.which("chromium-browser")
-        flags = [*FLAGS, f"--user-data-dir={self._profile.name}"]
-        options = {"binary": binary, "args": flags, **self._emulated}
         wanted = {
-            "goog:chromeOptions": options,
+            "goog:chromeOptions": {"binary": binary, "args": flags, **self._emulated},
             "goog:loggingPrefs": {"browser": "ALL", "performance": "ALL"},
         }
         answer = self._ask("POST", "/session", {"capabilities": {"alwaysMatch": wanted}})
@@ -98,18 +87,15 @@ class Browser:
         return self._ask("POST", "/execute/sync", {"script": script, "args": []})
 
     def log(self, kind: str) -> list[dict[str, Any]]:
-        """What ``browser`` (the console) or ``performance`` (the network) has told since."""
+        """New lines of the log of the ``browser`` (its console) or its ``performance``."""
         found: list[dict[str, Any]] = self._ask("POST", "/se/log", {"type": kind})
         return found
 
     def requests(self) -> list[str]:
-        """The addresses that the page has asked for since."""
+        """The addresses that the page has asked for since the last call."""
         messages = [json.loads(entry["message"])["message"] for entry in self.log("performance")]
-        return [
-            message["params"]["request"]["url"]
-            for message in messages
-            if message["method"] == "Network.requestWillBeSent"
-        ]
+        sent = [x for x in messages if x["method"] == "Network.requestWillBeSent"]
+        return [message["params"]["request"]["url"] for message in sent]
 
     def touch(self, *fingers: tuple[int, int, int, int]) -> None:
         """Fingers press at places of the window, move by so much, and let go."""
@@ -146,7 +132,7 @@ def _moves(x: int, y: int, dx: int, dy: int) -> list[dict[str, Any]]:
     """What a mouse or a finger does to drag something."""
     return [
         {"type": "pointerMove", "duration": 0, "x": x, "y": y},
-        {"type": "pointerDown", "button": LEFT},
+        {"type": "pointerDown", "button": 0},
         {"type": "pointerMove", "duration": 200, "x": x + dx, "y": y + dy},
-        {"type": "pointerUp", "button": LEFT},
+        {"type": "pointerUp", "button": 0},
     ]

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
-__all__ = ["DaskCluster"]
-
-# the usual process of a worker or a scheduler, without the one that would start it again
+# without the usual process that starts a worker again
 KINDS = {
-    "scheduler": ("dask_scheduler", "--port", "0", "--no-dashboard", "--host", "127.0.0.1"),
-    "worker": ("dask_worker", "--nthreads", "1", "--no-nanny", "--no-dashboard"),
+    "scheduler": ("dask_scheduler", "--port", "0", "--host", "127.0.0.1"),
+    "worker": ("dask_worker", "--nthreads", "1", "--no-nanny"),
 }
+ROOT = str(Path(__file__).parents[2])
 
 
 class DaskCluster:
@@ -40,9 +38,7 @@ class DaskCluster:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for one in (*self.workers, self.scheduler):
-            one.kill()
-            one.wait()
+        self._end([*self.workers, self.scheduler])
 
     @property
     def address(self) -> str:
@@ -50,14 +46,12 @@ class DaskCluster:
         return str(json.loads(self.file.read_text())["address"])
 
     def add(self, **variables: str) -> None:
-        """One more worker."""
+        """Start one more worker."""
         self.workers.append(self._start("worker", **variables))
 
     def kill(self, place: int = 0) -> None:
         """Kill a worker at once."""
-        worker = self.workers.pop(place)
-        worker.send_signal(signal.SIGKILL)
-        worker.wait()
+        self._end([self.workers.pop(place)])
 
     def forget_the_dead(self) -> None:
         """Keep two of the workers that are still there."""
@@ -66,26 +60,25 @@ class DaskCluster:
             self.kill()
 
     def kill_scheduler(self) -> None:
-        """Kill the scheduler at once; its workers end too."""
-        self.scheduler.send_signal(signal.SIGKILL)
-        self.scheduler.wait()
-        for one in self.workers:
-            one.kill()
-            one.wait()
+        """Kill the scheduler at once, and its workers."""
+        self._end([self.scheduler, *self.workers])
         self.workers.clear()
         self.file.unlink()
 
+    @staticmethod
+    def _end(processes: list[subprocess.Popen[bytes]]) -> None:
+        for one in processes:
+            one.kill()
+            one.wait()
+
     def _start(self, kind: str, **variables: str) -> subprocess.Popen[bytes]:
         module, *words = KINDS[kind]
-        root = str(Path(__file__).parents[2])
-        log = open(self.folder / f"{kind}.log", "ab")  # noqa: SIM115
-        return subprocess.Popen(
-            [
-                sys.executable, "-m", f"distributed.cli.{module}", *words,
-                "--scheduler-file", str(self.file),
-            ],
-            cwd=self.folder,
-            stdout=log,
-            stderr=log,
-            env={**os.environ, "PYTHONPATH": root, "OMP_NUM_THREADS": "1", **variables},
-        )  # fmt: skip
+        words += ["--no-dashboard", "--scheduler-file", str(self.file)]
+        with open(self.folder / f"{kind}.log", "ab") as log:
+            return subprocess.Popen(
+                [sys.executable, "-m", f"distributed.cli.{module}", *words],
+                cwd=self.folder,
+                stdout=log,
+                stderr=log,
+                env={**os.environ, "PYTHONPATH": ROOT, "OMP_NUM_THREADS": "1", **variables},
+            )

@@ -40,10 +40,13 @@ OPTIONS = (
     ReadOptions(contact_columns="id1=1,id2=2,fx=3,fy=4,fz=5"),
     ReadOptions(columns={"id": "1", "x": "3", "y": "4", "z": "5", "radius": "6"}),
 )
-Mutation = Callable[[bytes, Random], bytes]
+Damage = tuple[int, int, bytes]
+"""The bytes from one place to another, and what is put there."""
 
 NUMBER = re.compile(rb"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
 WORD = re.compile(rb"[^\s<>=\"]+")
+LINE = re.compile(rb"[^\n]*\n?")
+NOTHING = re.match(rb"", b"")
 VALUES = (
     b"nan", b"inf", b"-inf", b"1e400", b"1e308", b"-1e200", b"1e-320", b"-1", b"0", b"1", b"3",
     b"2.5", b"1e15", b"1000000000000000", b"100000000", b"4294967296", b"9223372036854775807",
@@ -59,71 +62,59 @@ PATTERNS = (
 def mutate(data: bytes, random: Random) -> bytes:
     """The data with one to three damages."""
     for _ in range(random.randint(1, 3)):
-        data = random.choice(MUTATIONS)(data, random)
+        data = damaged(data, random.choice([*DAMAGES]), random)
     return data
 
 
-def _cut(data: bytes, random: Random) -> bytes:
-    return data[: random.randint(0, len(data))]
+def damaged(data: bytes, kind: str, random: Random) -> bytes:
+    """The data with one damage of a kind of ``DAMAGES``."""
+    start, end, new = DAMAGES[kind](data, random)
+    return data[:start] + new + data[end:]
 
 
-def _flip(data: bytes, random: Random) -> bytes:
-    changed = bytearray(data)
-    for _ in range(random.randint(1, 4) if data else 0):
-        changed[random.randrange(len(data))] ^= 1 << random.randrange(8)
-    return bytes(changed)
+def _cut(data: bytes, random: Random) -> Damage:
+    return random.randint(0, len(data)), len(data), b""
 
 
-def _overwrite(data: bytes, random: Random) -> bytes:
-    place, pattern = random.randint(0, len(data)), random.choice(PATTERNS)
-    return data[:place] + pattern + data[place + len(pattern) :]
-
-
-def _insert(data: bytes, random: Random) -> bytes:
-    place = random.randint(0, len(data))
-    return data[:place] + random.choice(PATTERNS) + data[place:]
-
-
-def _remove_part(data: bytes, random: Random) -> bytes:
+def _bytes(data: bytes, random: Random) -> Damage:
+    """A part is left out, a pattern is inserted or written over, or a bit is flipped."""
     one, two = sorted(random.randint(0, len(data)) for _ in range(2))
-    return data[:one] + data[two:]
+    pattern = random.choice(PATTERNS)
+    flipped = bytes(byte ^ 1 << random.randrange(8) for byte in data[one : one + 1])
+    return random.choice(
+        (
+            (one, two, b""),
+            (one, one, pattern),
+            (one, one + len(pattern), pattern),
+            (one, one + 1, flipped),
+        )
+    )
 
 
-def _change_lines(data: bytes, random: Random) -> bytes:
-    """A line left out, written twice, or in the place of another one."""
-    lines = data.split(b"\n")
-    one, two = (random.randrange(len(lines)) for _ in range(2))
-    kind = random.randrange(3)
-    if kind == 0:
-        del lines[one]
-    elif kind == 1:
-        lines.insert(one, lines[two])
-    else:
-        lines[one], lines[two] = lines[two], lines[one]
-    return b"\n".join(lines)
+def _line(data: bytes, random: Random) -> Damage:
+    """A line is left out, written twice, or replaced by another one."""
+    lines = list(LINE.finditer(data))
+    one, two = random.choice(lines), random.choice(lines)
+    return *one.span(), random.choice((b"", 2 * one[0], two[0]))
 
 
-def _replace_number(data: bytes, random: Random) -> bytes:
-    # headers decide more than rows do: half of the numbers are taken from the first ones
-    found = list(NUMBER.finditer(data))
-    if not found:
-        return data
-    match = random.choice(found[:20] if random.random() < 0.5 else found)
-    return data[: match.start()] + random.choice(VALUES) + data[match.end() :]
+def _found(kind: re.Pattern[bytes], data: bytes, random: Random) -> re.Match[bytes]:
+    """A match; half of the time one of the first: headers decide more than rows do."""
+    found = list(kind.finditer(data)) or [NOTHING]
+    return random.choice(found[:30] if random.random() < 0.5 else found)
 
 
-def _replace_word(data: bytes, random: Random) -> bytes:
-    found = list(WORD.finditer(data))
-    if not found:
-        return data
-    match = random.choice(found[:40] if random.random() < 0.5 else found)
-    return data[: match.start()] + random.choice(found)[0] + data[match.end() :]
+def _number(data: bytes, random: Random) -> Damage:
+    return *_found(NUMBER, data, random).span(), random.choice(VALUES)
 
 
-MUTATIONS: tuple[Mutation, ...] = (
-    *(_cut, _flip, _overwrite, _insert, _remove_part, _replace_word),
-    *3 * (_change_lines, _replace_number),
-)
+def _word(data: bytes, random: Random) -> Damage:
+    return *_found(WORD, data, random).span(), _found(WORD, data, random)[0]
+
+
+DAMAGES: dict[str, Callable[[bytes, Random], Damage]] = {
+    "cut": _cut, "bytes": _bytes, "words": _word, "numbers": _number, "lines": _line,
+}  # fmt: skip
 
 
 class ForbiddenError(Exception):

@@ -142,15 +142,15 @@ def within(window, feet, direction):
 
 def scan(position, radius, triad, offset, spacing, clip):
     """All gaps on the square grid of lines along the third row of a triad (rows u, v, n)."""
-    whole, whole_lines, window, window_lines, line_length = [], 0, [], 0, 0.0
-    for _, solids, low, high in grid_lines(position, radius, triad, offset, spacing, clip):
-        whole += lengths(gaps_between(solids))
-        whole_lines += bool(solids)
-        if low < high:
-            window += lengths(gaps_within(solids, low, high))
-            window_lines += 1
-            line_length += high - low
-    return Gaps(whole, whole_lines, window, window_lines, line_length)
+    lines = [*grid_lines(position, radius, triad, offset, spacing, clip)]
+    clipped = [(solids, low, high) for _, solids, low, high in lines if low < high]
+    return Gaps(
+        [length for _, solids, *_ in lines for length in lengths(gaps_between(solids))],
+        sum(bool(solids) for _, solids, *_ in lines),
+        [length for line in clipped for length in lengths(gaps_within(*line))],
+        len(clipped),
+        sum(high - low for _, low, high in clipped),
+    )
 
 
 def edge_sums(solids, enters, leaves, cutoff, rule):
@@ -250,18 +250,9 @@ def gap_sums(segments, cutoff, center):
 
 def tally(gaps, cutoff):
     """Sums and numbers of the gaps that are not shorter than the cut-off."""
-    whole = [length for length in gaps.whole if length >= cutoff]
-    window = [length for length in gaps.window if length >= cutoff]
-    return Tally(
-        sum(whole),
-        len(whole),
-        gaps.whole_lines,
-        sum(window),
-        len(window),
-        gaps.window_lines,
-        sum(gaps.window),
-        gaps.window_line_length,
-    )
+    whole, window = ([x for x in every if x >= cutoff] for every in (gaps.whole, gaps.window))
+    sums = sum(whole), len(whole), gaps.whole_lines, sum(window), len(window), gaps.window_lines
+    return Tally(*sums, sum(gaps.window), gaps.window_line_length)
 
 
 def shifts_within(reach, branch, vectors, periodic):
@@ -312,21 +303,14 @@ def contacts(position, radius, tolerance=0.0, vectors=None, periodic=(True, True
 
 def void_tensor(axes, weights, mean_lengths):
     """G_vs of one replicate: Σ w ℓ n⊗n / Σ w ℓ, written out."""
-    tensor, total = np.zeros((3, 3)), 0.0
-    for axis, weight, length in zip(axes, weights, mean_lengths, strict=True):
-        total += weight * length
-        for i, j in product(range(3), repeat=2):
-            tensor[i, j] += weight * length * axis[i] * axis[j]
-    return tensor / total
+    terms = list(zip(axes, weights, mean_lengths, strict=True))
+    total = sum(weight * length for _, weight, length in terms)
+    return sum(weight * length / total * np.outer(n, n) for n, weight, length in terms)
 
 
 def contact_tensor(normals):
     """G_c: the mean of n⊗n, written out."""
-    tensor = np.zeros((3, 3))
-    for normal in normals:
-        for i, j in product(range(3), repeat=2):
-            tensor[i, j] += normal[i] * normal[j] / len(normals)
-    return tensor
+    return sum(np.outer(normal, normal) for normal in normals) / len(normals)
 
 
 def axial(tensor, axis):
@@ -365,18 +349,17 @@ def periodic_solids(position, radius, vectors, periods, foot, direction, low, hi
     return union(chords(images[inside], radii[inside], foot, direction))
 
 
-def periodic_gaps(position, radius, vectors, periods, foot, direction, measured, longest=150.0):
+def periodic_gaps(*words):
+    """Lengths of the gaps that :func:`periodic_segments` lists."""
+    return [one.length for one in periodic_segments(*words)]
+
+
+def periodic_segments(position, radius, vectors, periods, foot, direction, measured, longest=150.0):
     """
     Gaps of one line through a periodic medium, from a list of images as far as the longest gap.
 
     With a measured length, those that start in it; else all between the first and last solid.
     """
-    words = position, radius, vectors, periods, foot, direction, measured, longest
-    return [one.length for one in periodic_segments(*words)]
-
-
-def periodic_segments(position, radius, vectors, periods, foot, direction, measured, longest=150.0):
-    """These gaps with the places of their middles."""
     if len(radius) == 0:
         return []
     low, high = (-3.0, max(measured, 1.0) + longest) if measured else (-60.0, 60.0)

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from scanfab.base.bodies import Hull
-from scanfab.base.convex import Convex, Quadric
+from scanfab.base.convex import Body, Convex, Quadric
 from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron
 from scanfab.scan.directions import direction_rule
 from tests.helpers.lattices import rotation
@@ -23,7 +22,7 @@ def cut_ball(radius, normal, distance):
     points = radius * np.concatenate([axes, -axes])
     over = np.maximum(points @ normal - distance, 0.0)
     planes = np.append(normal, distance)[None]
-    body = Hull(points - np.outer(over, normal), planes, np.zeros(1), np.nan)
+    body = Body(points - np.outer(over, normal), planes, np.nan)
     quadric, half = Quadric(1.0, np.zeros((3, 3)), radius**2), np.full(3, float(radius))
     return Convex(planes, quadric, -half, half, float(radius), "cut ball", body, np.eye(3))
 

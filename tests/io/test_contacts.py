@@ -10,6 +10,7 @@ import pytest
 from scanfab import ReadError
 from scanfab.io import GrainTable, join_ids, join_positions
 from scanfab.packing.cell import Cell
+from tests.helpers.fuzzing import only_scanfabs_warnings
 
 PATH = Path("contacts.txt")
 POSITION = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0], [5.7, 0, 0]])
@@ -67,3 +68,19 @@ def test_ends_outside_a_periodic_cell_are_wrapped_and_rounding_does_no_harm(erro
 def test_without_a_cell_the_image_of_a_grain_is_no_wall():
     with pytest.raises(ReadError, match=r"1 contacts end at periodic images.*`cell="):
         by_places([[POSITION[3], [7.6, 0, 0]]])
+
+
+@pytest.mark.parametrize(
+    ("end", "place", "radius"),
+    [(np.nan, 0, 1), (np.inf, 0, 1), (1e300, 0, 1), (1, np.nan, 1), (1, 0, np.nan), (1, 0, np.inf)],
+)
+def test_ends_that_are_no_places_are_refused_without_a_warning(end, place, radius):
+    found = GrainTable(np.full((1, 3), place), np.full(1, radius), None, {}, Cell([4, 4, 4]))
+    with only_scanfabs_warnings(), pytest.raises(ReadError, match="finite"):
+        join_positions(PATH, found, np.array([[[0, 0, 0], [end, 0, 0]]]), None)
+
+
+def test_a_large_grain_in_a_small_cell_has_few_images():
+    found = GrainTable(np.zeros((1, 3)), np.array([1e50]), None, {}, Cell([4, 4, 4]))
+    joined = join_positions(PATH, found, np.array([[[0.0, 0, 0], [1, 0, 0]]]), None)
+    assert joined.contacts.pairs.tolist() == [[0, 0]]

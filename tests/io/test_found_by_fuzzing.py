@@ -8,16 +8,13 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.base.errors import ReadError, ScanfabError
-from scanfab.io.formats.vtk import VtkReader
-from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
+from scanfab.base.errors import ScanfabError
 from tests.helpers.dumps import (
     ROWS,
     dump_text,
     local_text,
     pairs_text,
     write,
-    yade_lines,
     yade_spheres,
 )
 from tests.helpers.fuzzing import only_scanfabs_warnings
@@ -98,34 +95,6 @@ def test_a_box_of_any_extent_fits_into_the_file(tmp_path):
     refuses(tmp_path / "g1.vtk", match="its Coordinates")
 
 
-UNIT = [[[0, 0, 0], [1, 0, 0]]]
-PLACE, ONE = np.zeros((1, 3)), np.ones(1)
-
-
-@pytest.mark.parametrize(
-    ("ends", "position", "radius", "ids", "match"),
-    [
-        *(([[[0, 0, 0], [x, 0, 0]]], PLACE, ONE, None, "finite ends") for x in (np.nan, np.inf)),
-        ([[[0, 0, 0], [1e300, 0, 0]]], PLACE, ONE, None, "finite ends"),
-        (UNIT, PLACE + np.nan, ONE, None, "finite"),
-        *((UNIT, PLACE, ONE * radius, None, "finite") for radius in (np.nan, 0, np.inf)),
-        (UNIT, PLACE, ONE, np.array([1]), "ids must be whole numbers"),
-        # a large grain in a small cell has few images
-        (UNIT, PLACE, ONE * 1e50, None, None),
-    ],
-)
-def test_contacts_between_places_join_finite_grains(tmp_path, ends, position, radius, ids, match):
-    named = {} if ids is None else {"id1": [np.nan], "id2": [1]}
-    snapshot = Snapshot(yade_lines(tmp_path / "a.vtk", ends, **named))
-    grains = GrainTable(position, radius, ids, {}, scanfab.Cell([4, 4, 4]))
-    with only_scanfabs_warnings():
-        if match is None:
-            VtkReader().read_contacts(snapshot, ReadOptions(), grains)
-        else:
-            with pytest.raises(ReadError, match=match):
-                VtkReader().read_contacts(snapshot, ReadOptions(), grains)
-
-
 def test_forces_of_any_size_draw_no_warning(tmp_path):
     write(tmp_path / "d1.txt", dump_text())
     write(tmp_path / "p1.txt", pairs_text().replace("-1.5", "-1e308"))
@@ -139,13 +108,6 @@ def test_a_column_without_name_and_numbers_that_the_user_names(tmp_path, rows):
     pairs = write(tmp_path / "p1.csv", f"id1,id2,fx,fy,\n{rows}")
     named = "id1=id1,id2=id2,fx2=fx,fy2=fy,fz2=5"
     refuses(grains, contacts=pairs, contact_columns=named, match="contacts")
-
-
-def test_tables_by_an_ending_that_says_doubles(tmp_path):
-    """Arrays of NumPy in an .xyzd file were read as such, and then held for x y z d."""
-    with open(tmp_path / "a.xyzd", "wb") as file:
-        np.savez(file, radius=np.ones(12), other=np.ones(12))
-    refuses(tmp_path / "a.xyzd", format="table")
 
 
 @pytest.mark.filterwarnings("ignore:.*packing.nfo")

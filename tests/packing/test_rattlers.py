@@ -80,6 +80,13 @@ def test_a_rule_that_gives_something_else_is_an_error():
         _ = sample.rattlers
 
 
+@pytest.mark.parametrize(("told", "expected"), [([1, 0, 0], [0, 1]), ([0, 1, 0], [])])
+def test_the_first_sphere_of_a_clump_speaks_for_it(told, expected):
+    packing = Packing(np.eye(3), 0.1, bodies=[1, 1, 2], contacts=np.zeros((0, 2), int))
+    sample = Sample(packing, np.zeros(3, bool), rattler_rule=lambda _: np.array(told, bool))
+    assert found(sample) == expected
+
+
 def pressed(forces, *, least=2, min_force=0.0, walls=None):
     """Five grains in a row, with these normal forces between them, compression positive."""
     position = np.zeros((5, 3))

@@ -24,15 +24,6 @@ def rows(mask):
     return np.flatnonzero(mask).tolist()
 
 
-def test_rattlers_are_found_in_one_pass():
-    """Without the ends the next grains would have one contact: they stay."""
-    sample = row_of_grains(4)
-    assert rows(sample.rattlers) == [0, 3]
-    assert rows(sample.removed(B)) == rows(sample.removed(D)) == [0, 3]
-    assert not sample.removed(A).any()
-    assert not sample.removed(C).any()
-
-
 def test_grain_held_by_its_own_images_is_no_rattler():
     packing = find_contacts(Packing([[1, 1, 1]], 0.6, cell=Cell([1.0, 4.0, 4.0])))
     sample = Sample(packing, np.zeros(1, bool))
@@ -40,26 +31,28 @@ def test_grain_held_by_its_own_images_is_no_rattler():
     assert rows(sample.rattlers) == []
 
 
-def test_coordination_counts_contacts_with_boundary_and_walls():
-    """Boundary particles are no grains, their contacts are contacts of the grains."""
-    sample = row_of_grains(boundary=[0], wall_contacts=[5, 0, 0, 0, 0, 3])
-    assert sample.coordination(A, None) == pytest.approx((2 + 2 + 2 + 2 + 4) / 5)
+FAR, NEAR = Window(np.array([50.0, 0, 0]), sphere(1.0)), Window(np.zeros(3), sphere(2.5))
 
 
-def test_coordination_in_the_window_is_of_the_grains_whose_centre_lies_in_it():
-    """The contacts of those grains count wherever they are."""
-    window = Window(np.array([0.0, 0, 0]), sphere(2.5))
-    sample = row_of_grains()
-    assert rows(sample.counted(C, window)) == [0, 1]
-    assert sample.coordination(C, window) == pytest.approx((1 + 2) / 2)
-    # 0 is removed, with the contact of 1 to it
-    assert sample.coordination(D, window) == pytest.approx(1.0)
-
-
-def test_coordination_of_no_grain_is_none():
-    window = Window(np.array([50.0, 0, 0]), sphere(1.0))
-    assert row_of_grains().coordination(C, window) is None
-    assert row_of_grains(2).coordination(B, None) is None
+@pytest.mark.parametrize(
+    ("sample", "variant", "window", "expected"),
+    [
+        (row_of_grains(), A, None, (1 + 2 + 2 + 2 + 2 + 1) / 6),
+        # without the ends, and their contacts
+        (row_of_grains(), B, None, (1 + 2 + 2 + 1) / 4),
+        (row_of_grains(2), B, None, None),
+        # boundary particles are no grains, but their contacts count, as those with walls do
+        (row_of_grains(boundary=[0], wall_contacts=[5, 0, 0, 0, 0, 3]), A, None, 12 / 5),
+        # of grains 0 and 1, whose contacts count wherever they are
+        (row_of_grains(), C, NEAR, (1 + 2) / 2),
+        (row_of_grains(), D, NEAR, 1.0),
+        (row_of_grains(), C, FAR, None),
+    ],
+)
+def test_coordination_is_the_mean_over_the_grains_that_are_counted(
+    sample, variant, window, expected
+):
+    assert sample.coordination(variant, window) == pytest.approx(expected)
 
 
 def test_counted_grains_are_no_boundary_but_may_be_rattlers():
@@ -107,10 +100,8 @@ def test_contacts_with_boundary_hold_grains_but_do_not_enter_the_contact_fabric(
     boundary, rattlers, contacts
 ):
     sample = row_of_grains(boundary=boundary)
+    for variant in (A, B, C, D):
+        expected = rattlers if variant in (B, D) else []
+        assert rows(sample.removed(variant)) == expected
     assert rows(sample.rattlers) == rattlers
     assert [sample.fabric_contacts(one, None).sum() for one in (A, B)] == contacts
-
-
-def test_coordination_is_of_the_grains_that_are_left():
-    assert row_of_grains().coordination(A, None) == pytest.approx((1 + 2 + 2 + 2 + 2 + 1) / 6)
-    assert row_of_grains().coordination(B, None) == pytest.approx((1 + 2 + 2 + 1) / 4)

@@ -89,9 +89,9 @@ def test_contacts_are_those_of_the_slow_twin(check, times):
 def test_contacts_are_those_of_the_slow_twin_uncompiled():
     run_uncompiled(
         "import numpy as np\n"
-        "from scanfab.packing import kernels\n"
+        "from scanfab.packing import search\n"
         "from tests.packing import test_search as here\n"
-        "assert not hasattr(kernels.find_pairs, 'py_func')\n"
+        "assert not hasattr(search.find_pairs, 'py_func')\n"
         "for seed in range(20):\n"
         "    here.check_random_open(np.random.default_rng(seed))\n"
         "    here.check_random_periodic(np.random.default_rng(seed))\n"
@@ -271,7 +271,7 @@ def every_pair(packing, chosen, gap):
 def test_pairs_of_a_tilted_cell(sample, variant):
     solid = ~sample.removed(VARIANTS[variant])
     expected = every_pair(sample.packing, solid, 0.25)
-    found = near_pairs(sample, VARIANTS[variant], None, 0.25)
+    found = near_pairs(sample.packing, solid, sample.grains, None, 0.25)
     assert len(expected) > 20
     order = np.argsort(found.overlap)
     np.testing.assert_allclose(found.overlap[order], expected[:, 0], atol=1e-12)
@@ -283,7 +283,8 @@ def test_pairs_of_a_tilted_cell(sample, variant):
 
 def test_pairs_of_an_rv_have_their_middles_in_it(sample):
     window = Window(np.array([3.0, 3.0, 2.5]), sphere(2.0))
-    found = near_pairs(sample, VARIANTS["c"], window, 0.25)
+    counted = sample.counted(VARIANTS["c"], window)
+    found = near_pairs(sample.packing, sample.grains, counted, window, 0.25)
     middles = every_pair(sample.packing, sample.grains, 0.25)[:, 4:]
     assert len(found.overlap) == window.contains(middles, sample.packing).sum()
     inside = window.contains(sample.packing.position, sample.packing)

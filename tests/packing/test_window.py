@@ -60,7 +60,7 @@ def test_window_must_not_meet_its_own_image(center, radius, fits):
     if fits:
         window.check_fits(packing)
     else:
-        with pytest.raises(SettingsError, match="wider than the cell's shortest period"):
+        with pytest.raises(SettingsError, match="overlaps its own image"):
             window.check_fits(packing)
 
 

@@ -60,7 +60,7 @@ def test_second_moment_is_that_of_full_lengths_or_refused(ball):
         for moment in (1, 2)
     )
     assert second.mean_length > first.mean_length
-    told = "moment: `edge=ends` counts only the parts inside the window"
+    told = "moment: `edge=ends` does not give the second moment"
     with pytest.raises(SettingsError, match=told):
         scanfab.Settings(edge="ends", moment=2)
 

@@ -1,26 +1,12 @@
 """Maps: what a row holds, what is refused, and that layers are told apart."""
 
 import warnings
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import scanfab
-from scanfab import (
-    Cell,
-    Packing,
-    ScanfabWarning,
-    SettingsError,
-    Window,
-    compute,
-    fabric_map,
-    sphere,
-)
-from scanfab.base.shapes import box, cylinder
-from scanfab.pipeline.maps.blocks import volumes_inside
-from scanfab.pipeline.maps.settings import MapSettings
-from scanfab.scan.blocks import Blocks
+from scanfab import Cell, Packing, ScanfabWarning, SettingsError, compute, fabric_map
 from tests.helpers.lattices import shaken_cubic, simple_cubic
 
 LINES = {"directions": "lebedev:11", "spacing": 0.1}
@@ -215,11 +201,12 @@ def test_frames_without_grains_have_empty_rows():
         ({"slices": 2, "cutoffs": "0,1"}, "cutoffs: a map has one cut-off"),
         ({"slices": 2, "rv": "0.4,0.6"}, "rv: expected one size, .* found 2"),
         ({"slices": 2, "with_": "state"}, "with_: a map has no further columns, found state"),
+        ({"slice": 3}, "no option 'slice': did you mean 'slices'"),
     ],
 )
 def test_what_is_no_map_is_refused(options, message):
-    with pytest.raises(SettingsError, match=message):
-        MapSettings(**options)
+    with pytest.raises(TypeError if "slice" in options else SettingsError, match=message):
+        fabric_map(Packing(np.zeros((1, 3)), 1.0), **options)
 
 
 def test_blocks_smaller_than_a_grain_are_refused_and_thin_ones_doubted(packing):
@@ -229,11 +216,6 @@ def test_blocks_smaller_than_a_grain_are_refused_and_thin_ones_doubted(packing):
     assert any("`slices` makes blocks 1.5 thick" in one for one in told)
     with pytest.raises(SettingsError, match="45 degrees off the axis"):
         fabric_map(packing, slices=2, axis=(1, 0, 1))
-
-
-def test_an_option_that_does_not_exist_is_named():
-    with pytest.raises(TypeError, match="no option 'slice': did you mean 'slices'"):
-        fabric_map(Packing(np.zeros((1, 3)), 1.0), slice=3)
 
 
 def test_blocks_without_segments_are_empty_and_said():
@@ -258,47 +240,32 @@ def test_threads_and_the_same_seed_give_the_same_bytes(packing):
     assert other["alpha_vs_axial"][0] != one["alpha_vs_axial"][0]
 
 
-CENTER = np.array([1.0, -2.0, 0.5])
-
-
-def tiling(half, parts):
-    """A box about the centre in equal parts."""
-    half = np.asarray(half)
-    return Blocks(CENTER - half, np.diag(2 * half), parts)
-
-
-@pytest.mark.parametrize("parts", [(1, 1, 1), (2, 2, 2), (3, 2, 1), (4, 5, 6)])
-def test_a_grid_fills_its_window(parts):
-    for half, shape, volume in [
-        ([2.0, 2.0, 2.0], sphere(2.0), 32 / 3 * np.pi),
-        ([1.0, 1.0, 1.5], cylinder(1.0, 3.0), 3 * np.pi),
-        ([1.0, 2.0, 3.0], box([2.0, 4.0, 6.0]), 48.0),
-    ]:
-        blocks = tiling(half, parts)
-        found = volumes_inside(blocks, Window(CENTER, shape))
-        assert found.sum() == pytest.approx(volume, rel=1e-3)
-        assert np.all(found <= blocks.volumes[:, None] / 8 * (1 + 1e-12))
-        # blocks on opposite sides of the centre
-        np.testing.assert_allclose(found.sum(axis=1), found.sum(axis=1)[::-1], rtol=1e-9)
-
-
-def test_shells_end_at_the_surface_of_a_box():
-    """The ball of radius 1 in a cube of edge 2 is whole; beyond its corners there is nothing."""
-    reach = np.sqrt(3.0)
-    blocks = replace(tiling([reach] * 3, (1, 1, 1)), radius=reach, shells=4)
-    found = volumes_inside(blocks, Window(CENTER, box([2.0, 2.0, 2.0])))
-    assert found.sum() == pytest.approx(8.0, rel=1e-3)
-    within = 4 / 3 * np.pi * (reach * np.array([1, 2]) / 4) ** 3
-    np.testing.assert_allclose(found[:2].sum(axis=1), np.diff(within, prepend=0.0), rtol=1e-9)
-    np.testing.assert_allclose(found, found[:, :1].repeat(8, axis=1), rtol=1e-9)
+# ends of slices of a sphere and, by the area of segments of a circle, of a cylinder across its axis
+Z, X = np.linspace(-1, 1, 6), np.linspace(-1, 1, 4)
+ARCS = np.diff(X * np.sqrt(1 - X**2) + np.arcsin(X))
+# of three shells out to the corners of a cube of edge 2 the second lacks six caps of a ball
+R = np.array([0.0, 1.0, 2.0]) / np.sqrt(3.0)
+CAPS = 6 * np.pi * (R[2] - 1) ** 2 * (R[2] - (R[2] - 1) / 3)
+IN_CUBE = np.diff([*(4 / 3 * np.pi * R**3 - [0, 0, CAPS]), 8.0])
 
 
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
-@pytest.mark.parametrize("kind", [{"slices": 5}, {"grid": (1, 1, 1)}, {"shells": 3}])
-def test_the_solid_in_all_blocks_of_an_rv_is_what_is_in_the_rv(packing, kind):
-    words = {"variants": "c", "rv": 0.8, "spacing": 0.1, "directions": "lebedev:11"}
+@pytest.mark.parametrize(
+    ("kind", "shape", "volumes"),
+    [
+        ({"slices": 5}, "sphere", np.diff(3 * Z - Z**3)),
+        ({"slices": 5}, "cylinder", np.ones(5)),
+        ({"grid": (1, 1, 1)}, "sphere", [1]),
+        ({"grid": (2, 2, 2)}, "ellipsoid", np.ones(8)),
+        ({"grid": (3, 1, 1)}, "cylinder", ARCS),
+        ({"grid": (2, 2, 2)}, "box", np.ones(8)),
+        ({"shells": 3}, "sphere", np.diff([0, 1, 8, 27])),
+        ({"shells": 3}, "box", IN_CUBE),
+    ],
+)
+def test_the_solid_in_all_blocks_of_an_rv_is_what_is_in_the_rv(packing, kind, shape, volumes):
+    words = {"variants": "c", "rv": 0.8, "rv_shape": shape, "spacing": 0.1}
+    words["directions"] = "lebedev:11"
     table = fabric_map(packing, **words, **kind)
-    z = np.linspace(-1, 1, 6)
-    volumes = {"slices": np.diff(3 * z - z**3), "grid": [1], "shells": np.diff([0, 1, 8, 27])}
-    mean = np.average(table["solid_fraction"], weights=volumes[next(iter(kind))])
+    mean = np.average(table["solid_fraction"], weights=volumes)
     assert mean == pytest.approx(compute(packing, **words)[0].solid_fraction, abs=2e-3)

@@ -8,7 +8,7 @@ import pytest
 
 from scanfab import Packing, ScanfabWarning, Settings, SettingsError, compute, find_contacts
 from scanfab.packing.sample import Sample
-from scanfab.pipeline.plan import FEWEST_LINES, REPLICATES, make_plan
+from scanfab.pipeline.plan import make_plan
 from tests.helpers.lattices import shaken_cubic
 
 
@@ -39,24 +39,17 @@ def test_lengths_relative_to_radii_are_those_of_the_grains_without_the_boundary(
     assert plan.window.center == pytest.approx([3.1, 1.6, 1.6])
 
 
-def test_fixed_scan_shares_its_lines_among_sixteen_replicates(packing):
-    plan = plan_of(packing, spacing=0.05, directions="lebedev:11")
-    assert plan.replicates == REPLICATES == 16
-    assert plan.spacing == pytest.approx(0.05 * 4)
-    assert plan.rule.name == "lebedev:11"
-    assert plan.auto == ""
-
-
-@pytest.mark.parametrize("spacing", [0.1, 0.3, 0.5, 0.8, 1.5, 4.0])
-def test_no_replicate_of_a_fixed_scan_gets_fewer_than_thirty_lines(packing, spacing):
+@pytest.mark.parametrize("spacing", [0.05, 0.1, 0.3, 0.5, 0.8, 1.5, 4.0])
+def test_a_fixed_scan_has_sixteen_replicates_or_thirty_lines_in_each(packing, spacing):
     plan = plan_of(packing, spacing=spacing, directions="lebedev:11")
+    assert (plan.rule.name, plan.auto) == ("lebedev:11", "")
     area = math.pi * plan.window.radius**2
     lines = area / plan.spacing**2
     assert plan.spacing == pytest.approx(spacing * math.sqrt(plan.replicates))
     assert 1 <= plan.replicates <= 16
-    assert lines >= FEWEST_LINES or plan.replicates == 1
+    assert lines >= 30 or plan.replicates == 1
     # and no fewer replicates than that takes
-    assert plan.replicates == 16 or area / spacing**2 / (plan.replicates + 1) < FEWEST_LINES
+    assert plan.replicates == 16 or area / spacing**2 / (plan.replicates + 1) < 30
 
 
 def test_spacing_column_is_that_of_all_replicates_together(packing):
@@ -64,7 +57,7 @@ def test_spacing_column_is_that_of_all_replicates_together(packing):
     lines = math.pi * 2.0**2 / 0.25**2
     for row in rows:
         assert row.spacing == pytest.approx(0.25)
-        assert row.replicates == int(lines / FEWEST_LINES) == 6
+        assert row.replicates == int(lines / 30) == 6
         assert row.directions == 7
     # lines of the RV: area over spacing squared, in each direction
     assert rows[1].lines == pytest.approx(lines * 7, rel=0.06)
@@ -73,7 +66,7 @@ def test_spacing_column_is_that_of_all_replicates_together(packing):
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-2])
 def test_auto_spacing_never_makes_too_few_lines(packing, tolerance):
     plan = plan_of(packing, tolerance=tolerance)
-    assert math.pi * plan.window.radius**2 / plan.spacing**2 >= 4 * FEWEST_LINES * (1 - 1e-9)
+    assert math.pi * plan.window.radius**2 / plan.spacing**2 >= 4 * 30 * (1 - 1e-9)
 
 
 @pytest.mark.parametrize(("tolerance", "warns"), [(0.08, False), (0.07, True)])

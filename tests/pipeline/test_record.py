@@ -47,10 +47,3 @@ def test_a_result_file_has_its_manifest_beside_it(series, tmp_path, capsys):
         data = Path(one["path"]).read_bytes()
         assert one["size"] == len(data)
         assert one["sha256"] == hashlib.sha256(data).hexdigest()
-
-
-def test_a_failure_leaves_no_manifest(series, tmp_path):
-    write(series / "dump_1.txt", "ITEM: TIMESTEP\n1\n")
-    output = tmp_path / "table.csv"
-    assert run(["compute", str(series), *FAST, "-o", str(output)]) == 1
-    assert not Path(f"{output}.manifest.json").exists()

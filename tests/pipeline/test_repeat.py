@@ -111,16 +111,26 @@ def test_what_is_no_manifest_is_an_error(tmp_path, text):
         read_manifest(tmp_path / "t.csv")
 
 
-def test_columns_and_digits_are_repeated(tmp_path, monkeypatch):
-    """The command of the manifest gives the same bytes."""
+ROWS = ("--directions", "9", "--spacing", "1rmin", "--cutoff", "0.2rmin", "--frames", "0")
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (("compute", "--fields", "frame,variant,alpha_vs_axial", "--digits", "4"), "--digits 4"),
+        (("compute", "--variants", "ac", "--rv", "0.7,0.5"), "--rv 0.5,0.7"),
+        (("map", "--grid", "2,1,1"), "--grid 2,1,1"),
+    ],
+)
+def test_the_command_of_a_manifest_gives_the_same_bytes(tmp_path, monkeypatch, words, named):
     monkeypatch.chdir(ROOT)
     table, again = tmp_path / "table.csv", tmp_path / "again.csv"
-    words = [SAMPLE, "--boundary", "mask=3", "--frames", "0", "--directions", "9"]
-    words += ["--spacing", "1rmin", "--fields", "frame,variant,alpha_vs_axial", "--digits", "4"]
-    assert run(["compute", *words, "-o", str(table)]) == 0
+    command, *more = words
+    assert run([command, SAMPLE, "--boundary", "mask=3", *ROWS, *more, "-o", str(table)]) == 0
     asked = read_manifest(table)["settings"]
-    command = shlex.split(repeat_command(asked, str(again)))
-    assert run(command[1:]) == 0
+    repeated = repeat_command(asked, str(again))
+    assert repeated.startswith(f"scanfab {command} {SAMPLE} ")
+    assert f" {named} " in repeated
+    assert run(shlex.split(repeated)[1:]) == 0
     assert again.read_bytes() == table.read_bytes()
-    assert table.read_text().startswith("frame,variant,alpha_vs_axial\n")
     assert restored_settings(asked).seed == 0

@@ -76,15 +76,6 @@ def test_cutoffs_are_a_range_of_lengths_with_both_ends_or_a_list(text, values, u
     assert {one.unit for one in cutoffs if one.value} == units
 
 
-def test_the_defaults_are_those_of_the_command_line():
-    settings = Settings()
-    assert (settings.variants, settings.rv, settings.cutoff) == ("abcd", 0.7, Length(1.0, "rmin"))
-    assert (settings.spacing, settings.directions, settings.tolerance) == (None, None, 1e-4)
-    assert (settings.min_contacts, settings.rattlers, settings.contact_tolerance) == (2, "count", 0)
-    assert (settings.axis, settings.strain) == ((0, 0, 1), "auto")
-    assert (settings.seed, settings.boundary) == (0, ())
-
-
 def test_values_are_kept_as_they_are_meant():
     assert [Settings(variants=text).variants for text in ("dca", "aab")] == ["acd", "ab"]
     assert [Settings(variants=text).needs_window for text in ("ab", "cd", "ad")] == [0, 1, 1]
@@ -200,36 +191,6 @@ def test_the_signature_and_the_help_of_compute_have_every_option():
     text = inspect.getdoc(scanfab.compute)
     for name, one in options.items():
         assert f"\n{name} : {one.annotation}, optional\n    {declared[name].help[:20]}" in text
-
-
-def test_compute_hands_every_option_to_the_settings(monkeypatch):
-    """Each in its own place."""
-    taken = {}
-
-    def rows(source, settings, executor):
-        taken.update(vars(settings))
-        return iter(())
-
-    monkeypatch.setattr("scanfab.pipeline.compute.compute_rows", rows)
-    given = {
-        "variants": "cd", "rv": 0.6, "rv_radius": 2.0, "rv_center": (1.0, 2.0, 3.0),
-        "edge": "start", "boundary": ("type=2",), "cutoff": "2rmin", "cutoffs": "1,2", "moment": 2,
-        "spacing": "1rmean", "directions": direction_rule("9"), "tolerance": 1e-3,
-        "max_chords": 1e5, "min_contacts": 3, "rattlers": "force", "min_force": 0.1,
-        "contact_tolerance": 1e-4, "axis": "x", "strain": "cell", "with_": "state",
-        "frames": "1:2", "seed": 5, "workers": 3, "on_error": "skip",
-    }  # fmt: skip
-    shaped = {
-        "rv_shape": "cylinder", "rv_size": (1.0, 2.0), "rv_axis": "y", "rv_follows": "strain"
-    }  # fmt: skip
-    usual, left = vars(Settings(workers=1)), None
-    # a radius is that of a sphere
-    for words in (given, {**given, **shaped, "rv_radius": None}):
-        scanfab.compute(None, **words)
-        assert taken == vars(Settings(**words))
-        same = {name for name in taken if taken[name] == usual[name]}
-        left = same if left is None else left & same
-    assert left == set()
 
 
 def test_settings_are_frozen_and_checked_again_where_they_are_replaced():

@@ -9,7 +9,6 @@ import pytest
 
 from scanfab.base.errors import ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.table.compare import compare_tables
-from scanfab.table.table import load
 from tests.helpers.tables import CONTACT, STRAIN, VOID, curve, sheared
 
 OCTANTS = range(1, 9)
@@ -243,13 +242,3 @@ def test_the_noise_of_the_scan_is_taken_off_the_error_of_the_slope():
     error = variances.std() / np.sqrt(len(variances))
     assert variances.mean() == pytest.approx(exact, abs=4 * error)
     assert np.mean(without) > exact + 8 * error
-
-
-def test_a_comparison_is_made_of_tables_like_any_other(tmp_path):
-    comparison = compare_tables(curve())
-    for table in (comparison.frames, comparison.summary):
-        table.save(tmp_path / "again.csv")
-        assert list(load(tmp_path / "again.csv")) == list(table)
-    assert comparison.frames.to_polars().columns == list(comparison.frames.names)
-    assert len(comparison.differences) == 0
-    assert comparison.differences.names[:2] == ("source", "frame")

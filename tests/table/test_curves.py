@@ -1,11 +1,18 @@
-"""Curves of tables: what they are called and drawn over, and whether they miss the fabric."""
+"""Rows and curves of tables that stand side by side."""
 
 from __future__ import annotations
 
+import math
 import re
+import warnings
 
 import pytest
 
+from scanfab.base.column import columns_of_fields
+from scanfab.base.errors import ScanfabWarning, SettingsError
+from scanfab.pipeline.calibration import StepRow
+from scanfab.pipeline.inspection import FrameReport
+from scanfab.table.compare import DIFFERENCES, FRAMES, SUMMARY
 from scanfab.table.curves import (
     curves_of,
     frame_strain_column,
@@ -15,6 +22,8 @@ from scanfab.table.curves import (
     strain_column,
     why_not_strain,
 )
+from scanfab.table.row import number_of
+from scanfab.table.selection import choose_rows
 from tests.helpers.tables import curve, sheared
 
 
@@ -102,3 +111,103 @@ def test_long_names_are_cut_in_the_middle_and_stay_different():
     assert short_names(names) == {name: f"{'a' * 14}...{'a' * 13}{name[-1]}" for name in names}
     alike = [f"{'a' * 30}{end}{'b' * 30}" for end in "xy"]
     assert len(set(short_names(alike).values())) == 2
+
+
+CUTOFFS = (0.0, 0.00080000001, 0.0016)
+OF_CUTOFFS = [
+    {**one, "cutoff": cutoff, "alpha_vs_axial": one["alpha_vs_axial"] * (1 + place)}
+    for one in curve()
+    for place, cutoff in enumerate(CUTOFFS)
+]
+
+
+@pytest.mark.parametrize(
+    ("asked", "expected"), [(0.0, 0.0), (0.0008, 0.00080000001), (0.00160001, 0.0016)]
+)
+def test_the_rows_of_one_cutoff_are_chosen_to_three_digits(asked, expected):
+    (rows,) = choose_rows([("t.csv", OF_CUTOFFS)], cutoff=asked)
+    assert [row["cutoff"] for row in rows] == [expected] * 5
+
+
+def test_a_frame_without_grains_has_no_cutoff_and_stays_once():
+    empty = {"cutoff": None, "alpha_vs_axial": None}
+    rows = [{**row, **empty} if row["frame"] == 0 else row for row in OF_CUTOFFS]
+    (chosen,) = choose_rows([("t.csv", rows)], cutoff=0.0016)
+    assert [row["frame"] for row in chosen] == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.parametrize(
+    ("tables", "labels", "sources"),
+    [
+        ([curve(), curve()], ["coarse", "fine"], [{"coarse"}, {"fine"}]),
+        # the label of a table of several sources stands before them
+        ([[*curve("one"), *curve("two")]], ["new"], [{"new, one", "new, two"}]),
+        # a packing without a name comes back from CSV
+        ([[{**row, "source": None} for row in curve()]], None, [{""}]),
+    ],
+)
+def test_labels_tell_two_runs_of_one_sample_apart(tables, labels, sources):
+    chosen = choose_rows([("t.csv", rows) for rows in tables], labels=labels)
+    assert [{row["source"] for row in rows} for rows in chosen] == sources
+
+
+@pytest.mark.parametrize("source", ["one", "./one", "two/../one/"])
+def test_rows_that_are_there_already_count_once_with_one_warning(source):
+    with pytest.warns(ScanfabWarning) as caught:
+        first, second = choose_rows([("1.csv", curve("one")), ("2.csv", curve(source))])
+    assert (len(first), second) == (5, [])
+    (text,) = {str(one.message) for one in caught}
+    assert text == f"2.csv: rows of {source} that 1.csv also holds are used once"
+
+
+def test_other_results_of_the_same_source_are_not_dropped():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        first, second = choose_rows([("1.csv", curve()), ("2.csv", curve(factor=2.0))])
+    assert len(first) == len(second) == 5
+
+
+VALUES = ["abc", True, [1], {"a": [1]}, float("nan"), float("inf"), 10**400, b"x"]
+NUMBERS = ("frame", "strain", "alpha_vs_axial", "alpha_c_axial_without_3", "coaxiality_deg")
+WRONG = [
+    *((name, value, "a number") for name in NUMBERS for value in VALUES),
+    *((name, value, "a name") for name in ("source", "variant") for value in (1, True, ["c"], {})),
+    *(("frame", value, "a whole number") for value in (None, 1.5)),
+]
+
+
+@pytest.mark.parametrize(("column", "value", "expected"), WRONG, ids=lambda one: repr(one)[:12])
+def test_a_value_of_another_kind_is_named_by_table_row_and_column(column, value, expected):
+    rows = [*curve()[:2], {**curve()[2], column: value}]
+    message = f"^t.csv: row 3: {column}: expected {expected}, found .{{,90}}$"
+    with pytest.raises(SettingsError, match=message):
+        choose_rows([("t.csv", rows)])
+    assert expected != "a number" or number_of({"a": value}, "a") is None
+
+
+OTHERS = [(FRAMES, "a table"), (SUMMARY, "the summary"), (DIFFERENCES, "the differences")]
+REFUSED = [
+    *(([dict.fromkeys(one.name for one in columns)], {}, name) for columns, name in OTHERS),
+    ([dict.fromkeys(one.name for one in columns_of_fields(StepRow))], {}, "no column strain"),
+    ([dict.fromkeys(one.name for one in columns_of_fields(FrameReport))], {}, "no column strain"),
+    ([{f"column_{k}": k for k in range(100)}], {}, "no column source"),
+    ([*curve(), {"source": "one"}], {}, "row 6: there is no column frame"),
+    (
+        [{k: v for k, v in curve()[0].items() if k != "alpha_c_axial"}],
+        {},
+        "there is no column alpha_c_axial",
+    ),
+    *((OF_CUTOFFS, {"cutoff": c}, "0, 0.0008, 0.0016") for c in (8.1e-4, 1.0, -1, math.nan)),
+    (curve(), {"cutoff": 1.0}, "none in this table"),
+    *(
+        (curve(), {"labels": names}, f"found {len(names)} for 1")
+        for names in (["a", "b"], [*"abc"])
+    ),
+]
+
+
+@pytest.mark.parametrize(("rows", "options", "words"), REFUSED)
+def test_rows_that_cannot_be_chosen_are_refused_in_words(rows, options, words):
+    with pytest.raises(SettingsError, match=re.escape(words)) as caught:
+        choose_rows([("t.csv", rows)], **options)
+    assert str(caught.value).startswith(("t.csv: ", "labels: "))

@@ -10,6 +10,7 @@ import scanfab
 from scanfab.io.reader import reader_named
 from scanfab.io.writer import installed_writers, writer_named
 from scanfab.testing import check_reader, check_writer, made_up_packings
+from tests.helpers.dumps import dump_text, pairs_text, write, yade_lines, yade_spheres
 from tests.helpers.sound_files import seeds
 from tests.helpers.truth import FLOOR
 
@@ -52,8 +53,13 @@ def test_readers_of_dumps_pass(tmp_path, name):
         for path in made
         if path.is_file() and reader.recognises(path) and reader.kind(path) == "grains"
     ]
+    pair = write(tmp_path / "p.local", pairs_text()), write(tmp_path / "g.dump", dump_text())
+    if name == "yade":
+        places = [[0, 0, 0], [1.9, 0, 0]]
+        spheres = yade_spheres(tmp_path / "g-spheres-0.vtk", places, [1, 1])
+        pair = yade_lines(tmp_path / "g-intrs-0.vtk", [places]), spheres
     # behind these, some need options
-    check_reader(reader, grains[:3], tmp_path / "damaged")
+    check_reader(reader, grains[:3], tmp_path / "damaged", contacts=[pair])
 
 
 def test_vtk_files_of_any_program_pass(tmp_path):

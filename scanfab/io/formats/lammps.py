@@ -14,9 +14,9 @@ from scanfab.io.files import first_bytes
 from scanfab.io.formats import dump_contacts
 from scanfab.io.formats.binary_dump import BinaryDump, NetcdfDump
 from scanfab.io.formats.lammps_data import DataFile
-from scanfab.io.formats.shared import GrainsOnly
+from scanfab.io.formats.shared import FormsReader, GrainsOnly
 from scanfab.io.formats.text_dump import TextDump
-from scanfab.io.formats.vtk import FormsReader, VtkReader
+from scanfab.io.formats.vtk import VtkReader
 from scanfab.io.reader import GrainTable, JoinedContacts, ReadOptions, Snapshot
 
 # only LAMMPS writes these items, and bounds with 16 digits (LIGGGHTS: six digits)
@@ -31,17 +31,32 @@ FORMS: tuple[GrainsOnly, ...] = (TextDump(), DataFile(), NetcdfDump(), BinaryDum
 class DumpReader(FormsReader):
     """Base class of the readers of LAMMPS' and LIGGGHTS' dumps."""
 
-    lists_contacts = False
     lists_walls = False
     """Whether the program lists contacts with walls, which are recognised by their values."""
-    forms = FORMS
+    forms = (*FORMS, VtkReader())
 
     def recognises(self, path: Path) -> bool:
         """By marks that only one of both programs writes."""
-        return _program(path) == self.name
+        head = first_bytes(path)
+        first, _, rest = head.partition(b"\n")
+        if head.startswith(b"# vtk DataFile"):
+            # only LIGGGHTS writes legacy VTK
+            return self.name == "liggghts" and b"LIGGGHTS" in rest.partition(b"\n")[0]
+        form = next((form for form in FORMS if form.recognises(path)), None)
+        if RESTART.match(head) or isinstance(form, DataFile):
+            # the first line is free text, or holds the version of the program
+            is_liggghts = b"LIGGGHTS" in first[:1000].upper()
+        elif isinstance(form, BinaryDump):
+            # the columns of LIGGGHTS' binary dumps have no names
+            is_liggghts = form.names(path)[:1] == ["1"]
+        elif form is None:
+            return False
+        else:
+            is_liggghts = head.startswith(b"ITEM: ") and LAMMPS_ITEMS.search(head) is None
+        return is_liggghts == (self.name == "liggghts")
 
-    def form(self, path: Path) -> GrainsOnly | VtkReader:
-        """The reader for the form of a file, VTK's if no other fits; ReadError for a restart."""
+    def form(self, path: Path) -> GrainsOnly:
+        """The reader for the form of a file; ReadError for a restart."""
         if RESTART.match(first_bytes(path)):
             advice = "let its program read it, and dump custom ... id type x y z radius"
             raise ReadError(f"{path}: only its own program can read a binary restart: {advice}")
@@ -83,26 +98,6 @@ class DumpReader(FormsReader):
         """The columns of ids, if the values leave no doubt; forces cannot be recognised."""
         place = dump_contacts.id_column(values, grains, is_flagged=False)
         return None if place is None else dump_contacts.Places([place, place + 1], touch=False)
-
-
-def _program(path: Path) -> str | None:
-    """``lammps`` or ``liggghts``, the program that wrote a file; None if neither did."""
-    head = first_bytes(path)
-    first, _, rest = head.partition(b"\n")
-    if head.startswith(b"# vtk DataFile"):
-        return "liggghts" if b"LIGGGHTS" in rest.partition(b"\n")[0] else None
-    form = next((form for form in FORMS if form.recognises(path)), None)
-    if RESTART.match(head) or isinstance(form, DataFile):
-        # the first line is free text, or holds the version of the program
-        is_liggghts = b"LIGGGHTS" in first[:1000].upper()
-    elif isinstance(form, BinaryDump):
-        # the columns of LIGGGHTS' binary dumps have no names
-        is_liggghts = form.names(path)[:1] == ["1"]
-    elif form is None:
-        return None
-    else:
-        is_liggghts = head.startswith(b"ITEM: ") and LAMMPS_ITEMS.search(head) is None
-    return "liggghts" if is_liggghts else "lammps"
 
 
 class LammpsReader(DumpReader):

@@ -15,12 +15,22 @@ from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.contacts import branches, count_walls, rows_of_ids
 from scanfab.io.formats.dump_contacts import MOST_ROWS, Places, are_ids, are_whole, id_column
-from scanfab.io.formats.lammps import DumpReader
+from scanfab.io.formats.lammps import FORMS, DumpReader
+from scanfab.io.formats.vtk import VtkReader
 from scanfab.io.reader import GrainTable, JoinedContacts
 from scanfab.packing.contacts import ListedWallForces
 
 # at least this share of contact forces is repulsive; damping makes a few attractive
 PUSHES = 0.9
+
+
+class LiggghtsVtk(VtkReader):
+    """Reads VTK files, in which contacts are between grains only."""
+
+    walls = False
+    # the force acts on the first grain
+    force_arrays = ("force", "force_normal", "force_tangential")
+    sign = -1.0
 
 
 class LiggghtsReader(DumpReader):
@@ -33,10 +43,7 @@ class LiggghtsReader(DumpReader):
     extensions = (".liggghts", ".dump", ".vtk", ".vtp", ".vtu", ".bin", ".data")
 
     lists_walls = True
-    # in VTK files contacts are between grains only, and the force acts on the first grain
-    walls = False
-    force_arrays = ("force", "force_normal", "force_tangential")
-    sign = -1.0
+    forms = (*FORMS, LiggghtsVtk())
 
     @np.errstate(over="ignore", invalid="ignore")
     def found(

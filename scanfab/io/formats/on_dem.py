@@ -8,7 +8,6 @@ in the sign of the normal force: compression is positive in 0.1 and negative in 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -50,7 +49,7 @@ class OnDemReader(GrainsOnly):
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """The only snapshot, with the step and time of the scene."""
-        scene = _scene(path)
+        scene = read_hdf_file(path, with_data=False).attributes.get(SCENE, {})
         step, time = scene.get("iteration", scene.get("step")), scene.get("time")
         step = step if isinstance(step, int) else None
         time = float(time) if isinstance(time, int | float) else None
@@ -58,7 +57,8 @@ class OnDemReader(GrainsOnly):
 
     def carries(self, path: Path) -> Carries:
         """The drafts have no cell; files of scanfab state whether there is one."""
-        return "cell" if "scanfab" in _scene(path) else "nothing"
+        scene = read_hdf_file(path, with_data=False).attributes.get(SCENE, {})
+        return "cell" if "scanfab" in scene else "nothing"
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """The bodies with a radius as grains, and their interactions as contacts."""
@@ -67,10 +67,6 @@ class OnDemReader(GrainsOnly):
         arrays = {name: scene[key] for name, key in SCENE_NAMES.items() if key in scene}
         grains = grain_table(path, _spheres(path, file), cell_of(path, arrays), options)
         return grains if INTERACTIONS not in file.attributes else _joined(path, file, grains)
-
-
-def _scene(path: Path) -> dict[str, Any]:
-    return read_hdf_file(path, with_data=False).attributes.get(SCENE, {})
 
 
 def _spheres(path: Path, file: HdfFile) -> Columns:

@@ -69,6 +69,10 @@ class GrainsOnly(Reader):
         """`has_cell`, the same for all files of the format."""
         return self.has_cell
 
+    def beside(self, path: Path) -> list[Path]:
+        """The files that are read together with a grain file: none."""
+        return []
+
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """The grains, from the columns of `table`."""
         return grains_of(snapshot, *self.table(snapshot), options)
@@ -78,6 +82,43 @@ class GrainsOnly(Reader):
     ) -> JoinedContacts:
         """ReadError: there are no contacts."""
         raise ReadError(f"{snapshot.path}: {self.name} files hold no contacts of grains")
+
+
+class FormsReader(GrainsOnly):
+    """Base class of readers for programs that write several forms of files, VTK among them."""
+
+    forms: tuple[GrainsOnly, ...]
+    """A reader for each form, the reader of VTK last; it also reads what no other recognises."""
+
+    def form(self, path: Path) -> GrainsOnly:
+        """The reader for the form of a file, by its first bytes."""
+        return next((form for form in self.forms if form.recognises(path)), self.forms[-1])
+
+    def kind(self, path: Path) -> FileKind:
+        """Passed on to the reader for the form of the file."""
+        return self.form(path).kind(path)
+
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """Passed on to the reader for the form of the file."""
+        return self.form(path).snapshots(path)
+
+    def carries(self, path: Path) -> Carries:
+        """Passed on to the reader for the form of the file."""
+        return self.form(path).carries(path)
+
+    def beside(self, path: Path) -> list[Path]:
+        """Those of VTK, found by their names; the other forms have none."""
+        return self.forms[-1].beside(path)
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """Passed on to the reader for the form of the file."""
+        return self.form(snapshot.path).read_grains(snapshot, options)
+
+    def read_contacts(
+        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
+    ) -> JoinedContacts:
+        """Passed on to the reader for the form of the file."""
+        return self.form(snapshot.path).read_contacts(snapshot, options, grains)
 
 
 def numbered(width: int) -> list[str]:
@@ -236,7 +277,9 @@ def marked_frames(
         for stop in [*starts[1:], size][: len(starts)]:
             stream.seek(start)
             head = stream.read(min(HEADER_BYTES, stop - start))
-            at = moment(path, head) if moment else (None, _time(path, mark.match(head)))
+            header = mark.match(head)
+            where, word = f"{path}: time of a frame", header[1] if header and not moment else b""
+            at = moment(path, head) if moment else (None, numbers(where, word, 1)[0])
             # the header of the last frame may be cut off: keep the frame without step and time
             if at or stop == size:
                 frames.append(Snapshot(path, *(at or (None, None)), start, stop))
@@ -273,8 +316,3 @@ def numbered_frames(
     if not found:
         raise ReadError(f"{path}: expected frames, found none")
     return found
-
-
-def _time(path: Path, header: re.Match[bytes] | None) -> float:
-    """The time of a frame, in the first group of its header."""
-    return numbers(f"{path}: time of a frame", header[1] if header else b"", 1)[0]

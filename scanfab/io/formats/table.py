@@ -101,7 +101,10 @@ class TableReader:
         if is_guessed:
             _refuse_wrong_guess(path, roles, columns)
         elif head.is_named:
-            table_names.refuse_frames(path, columns)
+            for name in filter(table_names.is_frame_name, columns):
+                if (count := len(np.unique(columns[name]))) > 1:
+                    expected = "expected one frame in a file"
+                    raise ReadError(f"{path}: the column {name} has {count} values: {expected}")
             table_names.check_units(path, roles)
         if "volume" in roles and not roles.keys() & {"radius", "diameter"}:
             own = roles["volume"]

@@ -7,10 +7,7 @@ import unicodedata
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
 from scanfab.base.errors import ReadError
-from scanfab.base.typing import Columns
 from scanfab.io.columns import DIAMETER_NAMES, ID_NAMES, RADIUS_NAMES, refuse_named_twice
 from scanfab.io.layout import TextTable
 
@@ -137,12 +134,3 @@ def check_units(path: Path, roles: Mapping[str, str], contacts: bool = False) ->
     if len({*units.values()}) > 1:
         kind = "forces" if contacts else "lengths (and volumes in its cube)"
         raise ReadError(f"{path}: expected {kind} of one unit, found {', '.join(units)}")
-
-
-def refuse_frames(path: Path, columns: Columns) -> None:
-    """ReadError if a table holds several frames."""
-    for name, values in columns.items():
-        count = len(np.unique(values)) if is_frame_name(name) else 1
-        if count > 1:
-            expected = "expected one frame in a file"
-            raise ReadError(f"{path}: the column {name} has {count} values: {expected}")

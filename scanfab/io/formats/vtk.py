@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -28,7 +28,7 @@ BOXES = ("RectilinearGrid", "RECTILINEAR_GRID")
 BLOCKS = ("vtkMultiBlockDataSet", "vtkPartitionedDataSetCollection")
 
 
-class VtkReader:
+class VtkReader(GrainsOnly):
     """Reader plugin for VTK files of any origin."""
 
     name = "vtk"
@@ -186,50 +186,17 @@ class VtkReader:
         if {"grains", "points"} <= names.keys():
             points = f"points without a radius ({names['points']}) beside {names['grains']}"
             raise ReadError(f"{index}: lists {points}: take them out, or name the files")
-        return [_frame(index, time, *parts.values()) for time, parts in frames.items()]
-
-
-class FormsReader(VtkReader):
-    """Base class of readers for programs that write other forms of files besides VTK."""
-
-    generic = False
-    forms: tuple[GrainsOnly, ...] = ()
-    """A reader for each of these forms."""
-
-    def form(self, path: Path) -> GrainsOnly | VtkReader:
-        """The reader for the form of a file, by its first bytes; VTK's if no other fits."""
-        vtk: Any = super()
-        return next((form for form in self.forms if form.recognises(path)), vtk)
-
-    def kind(self, path: Path) -> FileKind:
-        """Passed on to the reader for the form of the file."""
-        return self.form(path).kind(path)
-
-    def snapshots(self, path: Path) -> list[Snapshot]:
-        """Passed on to the reader for the form of the file."""
-        return self.form(path).snapshots(path)
-
-    def carries(self, path: Path) -> Carries:
-        """Passed on to the reader for the form of the file."""
-        return self.form(path).carries(path)
-
-    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """Passed on to the reader for the form of the file."""
-        return self.form(snapshot.path).read_grains(snapshot, options)
-
-    def read_contacts(
-        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
-    ) -> JoinedContacts:
-        """Passed on to the reader for the form of the file."""
-        return self.form(snapshot.path).read_contacts(snapshot, options, grains)
-
-
-def _frame(index: Path, word: str | None, first: Path, *others: Path) -> Snapshot:
-    """A frame; its step is the last number that is the same in the names of all parts."""
-    time = None if word is None else numbers(f"{index}: timestep", word.encode(), 1)[0]
-    names = (re.findall(r"\d+", Path(bare_name(file)).stem) for file in (first, *others))
-    same = [int(column[0]) for column in zip(*names, strict=False) if len(set(column)) == 1]
-    return Snapshot(first, same[-1] if same else None, time, parts=others)
+        found = []
+        for word, parts in frames.items():
+            time = None if word is None else numbers(f"{index}: timestep", word.encode(), 1)[0]
+            # the step is the last number that is the same in the names of all parts
+            listings = (re.findall(r"\d+", Path(bare_name(file)).stem) for file in parts.values())
+            columns = zip(*listings, strict=False)
+            steps = [int(column[0]) for column in columns if len(set(column)) == 1]
+            first, *others = parts.values()
+            step = steps[-1] if steps else None
+            found.append(Snapshot(first, step, time, parts=tuple(others)))
+        return found
 
 
 def _vectors(mesh: Mesh, name: str) -> FloatArray | None:

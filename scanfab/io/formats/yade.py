@@ -10,8 +10,8 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import Columns, FloatArray
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
-from scanfab.io.formats.vtk import FormsReader
+from scanfab.io.formats.shared import FormsReader, GrainsOnly, cell_of, numbers
+from scanfab.io.formats.vtk import VtkReader
 from scanfab.io.formats.yade_save import SavedScene
 from scanfab.io.mesh import Mesh
 from scanfab.io.reader import Carries, FileKind, Snapshot
@@ -61,23 +61,12 @@ class TextExport(GrainsOnly):
         return read_rows(snapshot, rows, Layout(tuple(names))), cell
 
 
-class YadeReader(FormsReader):
-    """Reader plugin for the files of YADE."""
+class YadeVtk(VtkReader):
+    """Reads files of VTKExporter and VTKRecorder."""
 
-    name = "yade"
-    description = "YADE export.VTKExporter, VTKRecorder, export.text, export.textExt, O.save (XML)"
-    extensions = (".vtk", ".vtu", ".vtp", ".txt", ".xml", ".yade")
-    forms = (TextExport(), SavedScene())
     walls = True
     force_arrays = ("force", "normalForce", "shearForce")
     sign = 1.0
-
-    def recognises(self, path: Path) -> bool:
-        """By YADE's own first lines, or by an array of VTKRecorder's interactions."""
-        head = first_bytes(path)
-        is_recorded = b"<VTKFile" in head and RECORDED in head
-        is_vtk = is_recorded or head.startswith(EXPORTER_HEAD)
-        return is_vtk or any(form.recognises(path) for form in self.forms)
 
     def kind(self, path: Path) -> FileKind:
         """Interactions of VTKRecorder by an array, because reading them may raise an error."""
@@ -89,3 +78,20 @@ class YadeReader(FormsReader):
         recorded = mesh.line_arrays.get("forceN")
         is_recorded = normal is None and recorded is not None and recorded.ndim == 1
         return force, recorded if is_recorded else normal
+
+
+class YadeReader(FormsReader):
+    """Reader plugin for the files of YADE."""
+
+    name = "yade"
+    description = "YADE export.VTKExporter, VTKRecorder, export.text, export.textExt, O.save (XML)"
+    extensions = (".vtk", ".vtu", ".vtp", ".txt", ".xml", ".yade")
+    lists_contacts = True
+    forms = (TextExport(), SavedScene(), YadeVtk())
+
+    def recognises(self, path: Path) -> bool:
+        """By YADE's own first lines, or by an array of VTKRecorder's interactions."""
+        head = first_bytes(path)
+        is_recorded = b"<VTKFile" in head and RECORDED in head
+        is_vtk = is_recorded or head.startswith(EXPORTER_HEAD)
+        return is_vtk or any(form.recognises(path) for form in self.forms[:-1])

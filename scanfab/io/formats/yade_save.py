@@ -92,7 +92,15 @@ def _read_save(path: Path, options: ReadOptions) -> GrainTable:
                 if element.tag != "px":
                     continue
                 if element.find("iterMadeReal") is not None:
-                    contacts.append(_contact(element))
+                    row = [_number(element, name) for name in CONTACT]
+                    for vector in (next(element.iter(name), None) for name in VECTORS):
+                        missing = [np.nan] * 3
+                        row += (
+                            [_number(vector, axis) for axis in "xyz"]
+                            if vector is not None
+                            else missing
+                        )
+                    contacts.append(row)
                 elif element.find("id") is not None and element.find("state") is not None:
                     ids.append(_number(element, "id"))
                     if _shape(element, shapes) == "Sphere":
@@ -125,15 +133,6 @@ def _shape(body: ElementTree.Element, shapes: dict[str, str]) -> str | None:
     if "class_name" in attributes:
         shapes[number] = attributes["class_name"].rpartition("::")[2]
     return shapes.get(number)
-
-
-def _contact(contact: ElementTree.Element) -> list[float]:
-    """The numbers of CONTACT and VECTORS; NaN for a missing vector."""
-    row = [_number(contact, name) for name in CONTACT]
-    for name in VECTORS:
-        vector = next(contact.iter(name), None)
-        row += [np.nan] * 3 if vector is None else [_number(vector, axis) for axis in "xyz"]
-    return row
 
 
 def _number(element: ElementTree.Element, name: str, default: str | None = None) -> float:

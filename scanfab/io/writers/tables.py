@@ -85,23 +85,20 @@ class XyzWriter:
             # names with a blank cannot clash with names of other columns
             parts = enumerate(words.reshape(len(values), width).T)
             rows |= {f"{name} {place}": part for place, part in parts}
-        line = f"{_line(packing)}Properties={':'.join(properties)}"
-        table = csv_bytes(rows, " ", with_names=False)
-        path.write_bytes(f"{len(packing)}\n{line}\n".encode() + table)
+        line = [f"Properties={':'.join(properties)}"]
+        if packing.time is not None:
+            line.insert(0, f"Time={packing.time!r}")
+        if packing.step is not None:
+            line.insert(0, f"Timestep={packing.step}")
+        if (cell := packing.cell) is not None:
+            vectors = " ".join(map(repr, cell.vectors.ravel().tolist()))
+            origin = " ".join(map(repr, cell.origin.tolist()))
+            along = " ".join("FT"[repeats] for repeats in cell.periodic)
+            line.insert(0, f'Lattice="{vectors}" Origin="{origin}" pbc="{along}"')
+        head = f"{len(packing)}\n{' '.join(line)}\n"
+        path.write_bytes(head.encode() + csv_bytes(rows, " ", with_names=False))
         left = flat({name: values for name, values in arrays.own.items() if name not in held})
         return Left(contacts=True, columns=tuple(left), notes=tuple(arrays.notes))
-
-
-def _line(packing: Packing) -> str:
-    """Cell, step and time for the line above the rows."""
-    cell, words = packing.cell, ""
-    if cell is not None:
-        vectors = " ".join(map(repr, cell.vectors.ravel().tolist()))
-        origin = " ".join(map(repr, cell.origin.tolist()))
-        along = " ".join("FT"[repeats] for repeats in cell.periodic)
-        words = f'Lattice="{vectors}" Origin="{origin}" pbc="{along}" '
-    words += "" if packing.step is None else f"Timestep={packing.step} "
-    return words + ("" if packing.time is None else f"Time={packing.time!r} ")
 
 
 def _is_xyz(name: str, values: AnyArray) -> bool:

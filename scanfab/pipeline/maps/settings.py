@@ -88,11 +88,6 @@ class MapSettings(Settings):
         return math.prod(self.grid) if self.grid is not None else self.slices or self.shells or 1
 
     @property
-    def rows_per_frame(self) -> int:
-        """Number of rows per frame: one for each variant and block."""
-        return len(self.variants) * self.blocks
-
-    @property
     def columns(self) -> tuple[Column, ...]:
         """All columns of the table."""
         from scanfab.table.columns import map_columns

@@ -19,9 +19,9 @@ from scanfab.viz.figures.curves import ROW, Drawn, Group, group_of, groups_of
 from scanfab.viz.figures.figure import Figure
 from scanfab.viz.figures.style import CONTACT, LABELS, VOID, WIDTH, widen
 
-# as the 2017 paper prints them, of spheres and of discs
+# Slopes of the 2017 paper, for spheres and for discs.
 PAPER_SLOPE, PAPER_SLOPE_2D = 0.096, 0.231
-# heights in inches: a legend without curves, and the two lines of each curve
+# Heights of the legend without curves, and of the two lines for each curve, inches.
 LEGEND, ENTRY = 1.0, 0.32
 
 
@@ -29,8 +29,8 @@ class Correlation(Figure):
     """
     Void against contact anisotropy, with the lines that the comparison fits.
 
-    Bars are total standard errors. Where the principal axes are not the loading axis, the
-    intensities are drawn, of which there is no line.
+    Bars are total standard errors. If the principal axes are not the loading axis, the intensities
+    are drawn, without a line.
 
     Parameters
     ----------
@@ -100,7 +100,12 @@ class Correlation(Figure):
         if self.turned:
             title, part = "intensities", ""
         else:
-            entries += [*self._draw_paper(axes, group), *_errors_entry(group)]
+            reach = self._reach(group.drawn)
+            if reach > 0:
+                slope, of = (PAPER_SLOPE_2D, ", 2D") if self.in_plane else (PAPER_SLOPE, "")
+                (line,) = axes.plot([0, 1e2 * reach], [0, 1e3 * slope * reach], "k:", lw=0.9)
+                entries.append((line, f"2017 paper{of}: {slope:.3f}"))
+            entries += _errors_entry(group)
         axes.set(xlabel=LABELS[f"alpha_c{part}"], ylabel=LABELS[f"alpha_vs{part}"])
         axes.axhline(0, color="0.6", lw=0.6, zorder=0)
         widen(axes, 1.0)
@@ -136,22 +141,13 @@ class Correlation(Figure):
         fits = [self.fits[one.place] for one in drawn]
         return max((frames[:, 0].max() for fit, frames in fits if fit.slope is not None), default=0)
 
-    def _draw_paper(self, axes: Axes, group: Group) -> list[tuple[Any, str]]:
-        """The slope that the paper prints, through the origin, as far as there are contacts."""
-        reach = self._reach(group.drawn)
-        if reach <= 0:
-            return []
-        slope, of = (PAPER_SLOPE_2D, ", 2D") if self.in_plane else (PAPER_SLOPE, "")
-        (line,) = axes.plot([0, 1e2 * reach], [0, 1e3 * slope * reach], "k:", lw=0.9)
-        return [(line, f"2017 paper{of}: {slope:.3f}")]
-
 
 def _bars(error: FloatArray) -> FloatArray | None:
     return np.nan_to_num(error) if np.isfinite(error).any() else None
 
 
 def _errors_entry(group: Group) -> list[tuple[Any, str]]:
-    """What the bars are: drawn as a cross, as a line alone would look like the axis."""
+    """The legend's entry for error bars: a cross, as a single line would look like the axis."""
     curves = [one.curve for one in group.drawn]
     void, contact = (
         any(np.isfinite(curve.total_errors(name)).any() for curve in curves)

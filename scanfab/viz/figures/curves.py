@@ -33,7 +33,7 @@ Look = dict[str, Any]
 
 COLOURS_OF_MANY = ("blue", "vermilion", "green", "purple", "orange", "sky", "black")
 LINES = ("-", "--", "-.", ":")
-# of curves that are told apart by their sources, or by the sizes of their RVs, and of as many more
+# Looks of curves that differ by their source or by the size of their RV; the second half is open.
 MANY_LOOKS: tuple[Look, ...] = tuple(
     {"color": COLOURS[colour], "marker": marker, "ls": LINES[(place + turn) % 4], **more}
     for turn, more in enumerate(({}, {"mfc": "white", "ms": 5.5}))
@@ -41,7 +41,7 @@ MANY_LOOKS: tuple[Look, ...] = tuple(
 )
 OTHER: Look = {"color": "0.3", "marker": "v", "ls": "-"}
 MEANINGS = {"a": "whole", "b": "whole, rattlers void", "c": "RV", "d": "RV, rattlers void"}
-# height of each further row of panels, inches
+# Height of each further row of panels, inches.
 ROW = 2.1
 MOST_MARKERS = 25
 
@@ -56,7 +56,7 @@ class Drawn(NamedTuple):
 
 
 class Group(NamedTuple):
-    """The curves of one panel; the title is empty if there is one group alone."""
+    """The curves of one panel; the title is empty if there is only one group."""
 
     title: str
     drawn: list[Drawn]
@@ -64,9 +64,9 @@ class Group(NamedTuple):
 
 def groups_of(rows: Sequence[Mapping[str, Any]]) -> list[Group]:
     """
-    The curves of a table by source, or by variant: whichever makes fewer panels.
+    Group the curves of a table by source or by variant, whichever makes fewer panels.
 
-    Several curves of several sources in one panel could not be told apart.
+    In one panel, several variants of several sources could not be told apart.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def groups_of(rows: Sequence[Mapping[str, Any]]) -> list[Group]:
     sources = list(dict.fromkeys(curve.source for curve in curves))
     variants = sorted({curve.variant for curve in curves})
     by_source = len(sources) == 1 or 1 < len(variants) >= len(sources)
-    # several RVs of a variant cannot all have the one look of the variant
+    # several RVs of a variant need different looks
     several_rvs = len({variant[0] for variant in variants}) < len(variants)
     panels: dict[str, list[Drawn]] = {one: [] for one in (sources if by_source else variants)}
     for place, curve in enumerate(curves):
@@ -112,15 +112,15 @@ def _spelt(variant: str) -> str:
 
 
 class Quantity(NamedTuple):
-    """What a panel shows: a column of the table, and how its axis is made."""
+    """The column of the table that a panel shows, and its axis."""
 
     column: str
     label: str
     factor: float = 1.0
     errors: Literal["total", "column", ""] = ""
-    """Of the band: scan and sample together, the column ``NAME_se``, or no band."""
+    """Errors of the band: scan and sample together, the column ``NAME_se``, or no band."""
     bars: bool = False
-    """Whether bars show the scan's part of the errors, the column ``NAME_se``."""
+    """Whether bars show the scan's part of the errors, from the column ``NAME_se``."""
     smallest: float = 1.0
     """The axis spans at least this, so that noise does not look like a signal."""
 
@@ -157,7 +157,7 @@ class Curves(Figure):
 
     @property
     def note(self) -> str:
-        """What stands above the legend."""
+        """The lines above the legend."""
         return ""
 
     @property
@@ -176,7 +176,7 @@ class Curves(Figure):
         self._draw_panel(ax, group.drawn, self.quantities[0])
         self._set_abscissa(ax)
         for name, look in self.looks.items():
-            # for the legend alone: the curve itself has errors beside it
+            # an entry of the legend without the error bars of the curve
             ax.plot([], [], label=name, **look)
         ax.legend()
 
@@ -223,13 +223,13 @@ class Curves(Figure):
         widen(axes, quantity.smallest)
 
     def _set_abscissa(self, axes: Axes) -> None:
-        """Label and scale of what the curves are drawn over."""
+        """Set label and scale of the x axis."""
         label = abscissa_label(self.data)
         axes.set_xlabel(label)
         places = np.concatenate([curve.x for curve in self.curves])
         known = np.unique(places[np.isfinite(places)])
         if len(known) == 1:
-            # one frame alone has no scale
+            # a single frame gives no scale
             axes.set_xlim(known[0] - 1, known[0] + 1)
         if label == "frame":
             axes.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -239,8 +239,8 @@ class Evolution(Curves):
     """
     Void and contact anisotropy over the strain, or over the frames.
 
-    Bands are total standard errors, bars the scan's part. Where the principal axes are not the
-    loading axis, as in simple shear, intensities are drawn, and the angle between both major axes.
+    Bands are total standard errors, bars the scan's part. If the principal axes are not the loading
+    axis, as in simple shear, intensities are drawn, and the angle between both major axes.
 
     Parameters
     ----------
@@ -281,7 +281,7 @@ class Evolution(Curves):
         super().__init__(data, [*chosen, ANGLE] if self.has_angle else chosen)
 
     def _quantity(self, name: str) -> Quantity:
-        """Along the loading axis; where the principal axes are turned, the intensity."""
+        """The anisotropy along the loading axis, or the intensity if principal axes are turned."""
         voids = name == "voids"
         column = ("alpha_vs" if voids else "alpha_c") + ("" if self.turned else "_axial")
         label, factor = LABELS[column], 1e3 if voids else 1e2
@@ -298,7 +298,7 @@ class Evolution(Curves):
 
     @property
     def caption(self) -> str:
-        """With the abscissa, and with what has errors."""
+        """With the x axis, and with the quantities that have errors."""
         what = f"{' and '.join(one.removesuffix('s') for one in self.of)} anisotropy"
         drawn = f"{what.capitalize()} along the loading axis"
         if self.turned:
@@ -318,7 +318,7 @@ class Evolution(Curves):
 
     @property
     def note(self) -> str:
-        """What bands and bars are."""
+        """The meaning of bands and bars."""
         if self.turned:
             return "without errors: the table has those of the axial values only"
         alone = any(curve.contact_alone for curve in self.curves)

@@ -1,4 +1,4 @@
-"""What a figure is: a class with its data, its size, its caption, and how it is drawn."""
+"""The base of all figures: a class with data, size, caption and a way to be drawn."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ class Figure:
     """
     A figure, made of its data.
 
-    The next one is a subclass in a file of its own, with a line under the entry point
-    ``scanfab.figures`` that gives it its name. It needs ``draw``; it is found then as
-    ``table.plot.NAME(ax=ax)`` and as ``--figure NAME``, on the page of all figures of a table, and
-    in the report. The first paragraph of its docstring is its caption, unless it has another.
+    A new figure is a subclass in a file of its own that defines ``draw``. A line under the entry
+    point ``scanfab.figures`` gives it a name. Then it is drawn by ``table.plot.NAME(ax=ax)`` and
+    ``--figure NAME``, on the page of all figures of a table, and in the report. The first paragraph
+    of its docstring is its caption, unless ``caption`` is overridden.
 
     Parameters
     ----------
     data : Table, ScannedFrames or sequence of StepRow
-        As ``kind`` says. A subclass may take options besides, by keyword.
+        The data, of the type that ``kind`` names. A subclass may take further options by keyword.
 
     Examples
     --------
@@ -49,29 +49,29 @@ class Figure:
     """
 
     kind: ClassVar[Literal["table", "frames", "calibration", "map"]] = "table"
-    """What it is drawn of: a fabric table, scanned frames, the steps of a calibration, a map."""
+    """Type of the data: a fabric table, scanned frames, the steps of a calibration, or a map."""
     order: ClassVar[int] = 100
-    """Where it stands among the others, on a page and in lists; of equals, by name."""
+    """Figures on a page and in lists are sorted by this number, then by name."""
     columns: ClassVar[tuple[str, ...]] = ()
-    """The columns of the table without which it cannot be drawn."""
+    """The columns that the table must have."""
     lettered: ClassVar[bool] = False
-    """Whether its panels have letters, (a), (b) ..., also where it stands alone."""
+    """Whether its panels have letters, (a), (b) ..., also if it is the only figure of a page."""
     slow: ClassVar[bool] = False
-    """Whether it scans along further lines, which is too long to wait for in a report."""
+    """Whether it scans along further lines, which takes too long for a report."""
     projection: ClassVar[str | None] = None
-    """Of the Axes that it draws on, as matplotlib names it."""
+    """Projection of its Axes, by matplotlib's name."""
 
     def __init__(self, data: Any) -> None:
         self.data = data
 
     @classmethod
     def parse(cls, argument: str) -> dict[str, Any] | None:
-        """The options behind the colon of ``--figure NAME:...``; None if it takes none."""
+        """Read the options behind the colon of ``--figure NAME:...``; None if it takes none."""
         return None
 
     @classmethod
     def suits(cls, data: Any) -> bool:
-        """Whether it is drawn, unasked, with the others of some data that have its columns."""
+        """Whether it belongs on the page of all figures of data that have its columns."""
         return True
 
     @property
@@ -81,24 +81,24 @@ class Figure:
 
     @property
     def caption(self) -> str:
-        """What is drawn, in whole sentences."""
+        """The caption, in whole sentences."""
         return " ".join((self.__doc__ or "").split("\n\n")[0].split())
 
     def draw(self, ax: Axes) -> None:
-        """Draw on one Axes; of several panels the one that says most, or that is chosen."""
+        """Draw on one Axes: the main panel, or the one that an option chooses."""
         raise NotImplementedError
 
     def panels(self, part: FigureBase) -> list[Axes]:
-        """Draw on an empty Figure or SubFigure; the panels, to be lettered before their titles."""
+        """Draw all panels on an empty Figure or SubFigure; gives back the panels."""
         axes = part.subplots(subplot_kw={"projection": self.projection})
         self.draw(axes)
         return [axes]
 
     def on(self, place: Any = None) -> Any:
         """
-        Draw on Axes, or all panels on a Figure or SubFigure; gives back what it has drawn on.
+        Draw on Axes, or all panels on a Figure or SubFigure, and give ``place`` back.
 
-        By default that is an Axes in a new figure of pyplot, in the style of the package.
+        By default it makes Axes in a new figure of pyplot, in the style of the package.
         """
         if place is None:
             from matplotlib import pyplot
@@ -133,7 +133,7 @@ class FrameFigure(Figure):
     data : ScannedFrames
         Of :func:`scanfab.scan_frames`.
     frame : int, optional
-        The number of one of them, to draw that one alone.
+        The number of one of them, to draw only this frame.
 
     Raises
     ------
@@ -144,7 +144,7 @@ class FrameFigure(Figure):
     kind = "frames"
     columns = ("variant", "alpha_vs_axial")
     drawn: ClassVar[str] = ""
-    """What is drawn: the caption goes on with the variant and the source, and ``more``."""
+    """Start of the caption, which goes on with the variant, the source, and ``more``."""
     more: ClassVar[str] = ""
 
     def __init__(self, data: ScannedFrames, frame: int | None = None) -> None:
@@ -153,11 +153,11 @@ class FrameFigure(Figure):
 
     @property
     def caption(self) -> str:
-        """With the variant and the source; without ``drawn`` as in other figures."""
+        """With the variant and the source, if ``drawn`` is set."""
         return f"{self.drawn}, {self.data.name}{self.more}." if self.drawn else super().caption
 
     def chosen(self, frames: list[ScannedFrame]) -> list[ScannedFrame]:
-        """All of the frames, or the one that is asked for."""
+        """All of the frames, or the one that the option ``frame`` names."""
         found = [one for one in frames if self.frame in (None, one.number)]
         if not found:
             numbers = " and ".join(str(one.number) for one in frames)
@@ -167,16 +167,16 @@ class FrameFigure(Figure):
 
 class DirectionalFigure(FrameFigure):
     """
-    Void lengths and contact normals of frames over all directions; needs ``draw_column``.
+    Void lengths and contact normals of frames over all directions; subclasses draw the columns.
 
     Parameters
     ----------
     data : ScannedFrames
         Of :func:`scanfab.scan_frames`.
     frame : int, optional
-        The number of a frame, to draw that one alone; on one Axes the last by default.
+        The number of a frame, to draw only this frame. On one Axes the default is the last frame.
     of : str, optional
-        ``"voids"`` or ``"contacts"``, to draw these alone; on one Axes voids by default.
+        ``"voids"`` or ``"contacts"``, to draw only these. On one Axes the default is voids.
     """
 
     lettered = True
@@ -193,18 +193,18 @@ class DirectionalFigure(FrameFigure):
         return self.chosen(self.data.frames)
 
     def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> Any:
-        """Draw voids or contacts of frames on panels with one scale; gives back that scale."""
+        """Draw voids or contacts of frames on panels with one scale; gives back the scale."""
         raise NotImplementedError
 
     def add_legend(self, place: Any, scales: dict[str, Any]) -> None:
-        """Add what all panels of the Axes or the Figure share; ``scales`` are those of columns."""
+        """Add the legend that all panels share; ``scales`` has the scale of each column."""
 
     def draw(self, ax: Axes) -> None:
-        """Of the last frame, unless another one is asked for."""
+        """Draw the last frame, or the one that the option ``frame`` names."""
         self.add_legend(ax, self._draw_grid(np.array([[ax]]), "center"))
 
     def panels(self, part: FigureBase) -> list[Axes]:
-        """A row for each frame, a column for each of both."""
+        """A row for each frame, a column each for voids and contacts."""
         polar = {"projection": self.projection}
         shape = len(self.frames), len(self.of)
         panels = part.subplots(*shape, squeeze=False, subplot_kw=polar)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from scanfab.viz.scanned_frames import ScannedFrame
 
 LINES = 6_000
-# in smallest radii
+# cut-offs that are drawn, in units of the smallest radius
 CUTOFFS = (0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0)
 
 
@@ -48,14 +48,6 @@ class OnePanel(FrameFigure):
         return [axes]
 
 
-class LengthSample(NamedTuple):
-    """One frame: void segments, in units of the smallest radius."""
-
-    title: str
-    length: FloatArray
-    cutoff: float
-
-
 class Histogram(OnePanel):
     """
     Lengths of the void segments, with the cut-off; an outline for each frame.
@@ -78,30 +70,29 @@ class Histogram(OnePanel):
     drawn, more = "Lengths of the void segments", "; those below the cut-off are dropped"
 
     @cached_property
-    def samples(self) -> list[LengthSample]:
-        """What is drawn of each frame."""
+    def lengths(self) -> list[FloatArray]:
+        """Lengths of void segments of each frame, in units of its smallest radius."""
         return [_lengths_of(one) for one in self.chosen(self.data.frames)]
 
     def paint(self, ax: Axes) -> None:
-        """Density of the lengths; those below the cut-off are on grey."""
-        longest = max(float(np.quantile(sample.length, 0.999)) for sample in self.samples)
-        edges = np.linspace(0, longest, 41)
-        for sample, look in zip(self.samples, FRAME_LOOKS, strict=False):
-            density, _ = np.histogram(sample.length, edges, density=True)
-            dropped = 100 * np.mean(sample.length < sample.cutoff)
+        """Density of the lengths; lengths below the cut-off are on grey."""
+        longest = max(float(np.quantile(length, 0.999)) for length in self.lengths)
+        edges, frames = np.linspace(0, longest, 41), self.chosen(self.data.frames)
+        for frame, length, look in zip(frames, self.lengths, FRAME_LOOKS, strict=False):
+            density, _ = np.histogram(length, edges, density=True)
+            cutoff = frame.measurement.plan.cutoff / frame.smallest
+            label = f"{frame.title}:\n{100 * np.mean(length < cutoff):.0f} % dropped"
             style: dict[str, Any] = {"color": look["color"], "ls": look["ls"], "lw": 1.1}
-            label = f"{sample.title}:\n{dropped:.0f} % dropped"
             ax.stairs(density, edges, baseline=None, label=label, **style)
-        cutoff = self.samples[-1].cutoff
         ax.axvspan(0, cutoff, color="0.92", zorder=0)
         ax.axvline(cutoff, color="k", lw=0.9, ls=":", label="cut-off")
         ax.set(yscale="log", xlim=(0, longest), ylabel="probability density")
         ax.set(xlabel=r"void segment length / $r_{min}$")
 
 
-def _lengths_of(frame: ScannedFrame) -> LengthSample:
-    """Segments of some tens of thousands on lines in even directions."""
-    # compiled kernels, which those who draw something else do without
+def _lengths_of(frame: ScannedFrame) -> FloatArray:
+    """Lengths of void segments on lines in even directions, tens of thousands of them."""
+    # loaded here, as other figures do without compiled kernels
     from scanfab.scan.lines import line_triads
     from scanfab.scan.segments import sample_segments
 
@@ -110,12 +101,12 @@ def _lengths_of(frame: ScannedFrame) -> LengthSample:
     triads = line_triads(some, frame.space)
     position, radius, window = frame.spheres
     found = sample_segments(position, radius, triads, LINES, window, frame.space)
-    length, cutoff = found.length[found.void], frame.measurement.plan.cutoff
-    return LengthSample(frame.title, length / frame.smallest, cutoff / frame.smallest)
+    lengths: FloatArray = found.length[found.void] / frame.smallest
+    return lengths
 
 
 class CutoffCurve(NamedTuple):
-    """One frame: anisotropy over the cut-off, which is in units of the smallest radius."""
+    """Anisotropy of one frame over the cut-off, which is in units of the smallest radius."""
 
     title: str
     cutoff: FloatArray
@@ -124,10 +115,10 @@ class CutoffCurve(NamedTuple):
     error: FloatArray
     """The scan's part of its standard error."""
     total: FloatArray
-    """Its standard error, of scan and sample together; NaN where either is not known."""
+    """Standard error of scan and sample together; NaN if one of them is not known."""
     chosen: float
     predicted: FloatArray
-    """alpha_vs_axial as the contacts predict it; NaN where they do not."""
+    """alpha_vs_axial as predicted from near contacts; NaN if there is no prediction."""
 
 
 class Cutoffs(OnePanel):
@@ -184,7 +175,7 @@ class Cutoffs(OnePanel):
 
 def _curve_of(frame: ScannedFrame) -> CutoffCurve:
     """The lines of the table at other cut-offs, and at its own."""
-    # compiled kernels, which those who draw something else do without
+    # loaded here, as other figures do without compiled kernels
     from scanfab.packing.sample import VARIANTS
     from scanfab.pipeline.variant_columns import VariantColumns
 

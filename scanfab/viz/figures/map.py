@@ -18,7 +18,7 @@ from scanfab.viz.figures.curves import Quantity
 from scanfab.viz.figures.figure import Figure
 from scanfab.viz.figures.style import FRAME_LOOKS, LABELS, WIDTH, band
 
-# anisotropies have total errors, and zero in the middle of their colours
+# Quantities with total errors are signed: zero is in the middle of their colours.
 QUANTITIES = (
     Quantity("alpha_vs_axial", LABELS["alpha_vs_axial"], 1e3, "total"),
     Quantity("alpha_c_axial", LABELS["alpha_c_axial"], 1e2, "total"),
@@ -27,7 +27,7 @@ QUANTITIES = (
     Quantity("coordination", "coordination"),
 )
 AXES = "xyz"
-# of coordinates, relative to their spread: these are the same
+# Coordinates that differ by less than this part of their spread are the same.
 SAME = 1e-6
 MISSING = "0.85"
 
@@ -116,7 +116,12 @@ class Map(Figure):
     def panels(self, part: FigureBase) -> list[Axes]:
         """A profile for each quantity, or a row of three planes."""
         if not self.is_profile:
-            return self._planes(part)
+            planes = part.subplots(len(self.quantities), 3, squeeze=False)
+            for one, row in zip(self.quantities, planes, strict=True):
+                drawn = [self._draw_plane(panel, one, axis) for axis, panel in enumerate(row)]
+                bar = part.colorbar(drawn[-1], ax=list(row), fraction=0.05, pad=0.02)
+                bar.set_label(one.label)
+            return [row[0] for row in planes]
         rows = (len(self.quantities) + 1) // 2
         axes = list(np.ravel(part.subplots(rows, 2, sharex=True)))
         used = axes[: len(self.quantities)]
@@ -128,7 +133,7 @@ class Map(Figure):
             panel.set_xlabel("")
         handles, labels = used[0].get_legend_handles_labels()
         if len(axes) > len(used):
-            # the panel above the empty place has nothing below it to say what its axis is
+            # no panel stands below this one, so it needs the labels of the shared axis
             used[-2].xaxis.set_tick_params(labelbottom=True)
             axes[-1].legend(handles, labels, loc="center", title=f"variant {self.variant}")
         else:
@@ -156,14 +161,6 @@ class Map(Figure):
             axes.set(xlabel=label, ylabel=one.label)
         if one.errors == "total":
             axes.axhline(0, color="0.6", lw=0.6, zorder=0)
-
-    def _planes(self, part: FigureBase) -> list[Axes]:
-        panels = part.subplots(len(self.quantities), 3, squeeze=False)
-        for one, row in zip(self.quantities, panels, strict=True):
-            drawn = [self._draw_plane(panel, one, axis) for axis, panel in enumerate(row)]
-            bar = part.colorbar(drawn[-1], ax=list(row), fraction=0.05, pad=0.02)
-            bar.set_label(one.label)
-        return [row[0] for row in panels]
 
     def _draw_plane(self, axes: Axes, one: Quantity, axis: int) -> Any:
         """The blocks next to the middle along an axis."""

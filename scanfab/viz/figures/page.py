@@ -26,14 +26,14 @@ def find_figure(text: str, *kinds: str) -> tuple[type[Figure], dict[str, Any]]:
     Parameters
     ----------
     text : str
-        As users name it, for instance ``rose:30,60,90``.
+        Name and options, for instance ``rose:30,60,90``.
     *kinds : str
-        Of which kinds of data it may be: ``table``, ``frames``, ``calibration``.
+        Kinds of data to search: ``table``, ``frames``, ``calibration``, ``map``.
 
     Raises
     ------
     SettingsError
-        If there is no such figure; names those that there are.
+        If there is no such figure. The message lists the figures.
 
     Examples
     --------
@@ -60,13 +60,13 @@ def make_figures(data: Any, kind: str, text: str | None = None, **offered: Any) 
     Parameters
     ----------
     data : Table, rows of one, ScannedFrames or sequence of StepRow
-        What they are drawn of.
+        The data to be drawn.
     kind : str
-        ``table``, ``frames`` or ``calibration``.
+        ``table``, ``frames``, ``calibration`` or ``map``.
     text : str, optional
-        See :func:`find_figure`. By default all whose columns the table has, in their order.
+        See :func:`find_figure`. By default all figures whose columns the table has.
     **offered
-        Options for those that take them.
+        Options, which are given to the figures that take them.
 
     Raises
     ------
@@ -110,10 +110,10 @@ def save_figures(path: Path, figures: Sequence[Figure], dpi: int = DPI) -> None:
     Raises
     ------
     SettingsError
-        If the file's name ends otherwise.
+        If the file has another suffix.
     """
     check_plot_file(path)
-    # in memory first: where the disk is full, the writer of PDF fails with an error of another kind
+    # drawn in memory first, as the PDF writer fails with an unclear error on a full disk
     with drawn_page(figures) as page:
         drawn = figure_bytes(page, path.suffix.lower().lstrip("."), dpi)
     with whole_file(path) as part:

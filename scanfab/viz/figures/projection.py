@@ -25,11 +25,11 @@ from scanfab.viz.figures.style import COLOURS, WIDTH
 if TYPE_CHECKING:
     from scanfab.viz.scanned_frames import ScannedFrame
 
-# rings and rays of the disk that a hemisphere is projected on
+# Rings and rays of the disk on which a hemisphere is projected.
 DISK = (41, 121)
-# of the kernel exp(k (n·m)²) that smooths contact normals: half its height at 19 degrees
+# k of the kernel exp(k (n·m)²) that smooths contact normals; it has half its height at 19 degrees.
 CONCENTRATION = 6.5
-# where nothing but noise is, the largest lobe of a picture is 2 to 3 times its standard error
+# The largest lobe of pure noise is 2 to 3 standard errors.
 CHANCE = 3.0
 
 
@@ -37,7 +37,7 @@ class Projection(DirectionalFigure):
     """
     Mean void length and contact normals over all directions, on an equal-area disk.
 
-    Of discs over the directions of their plane, as curves.
+    For discs, curves over the directions of their plane.
 
     Parameters
     ----------
@@ -69,12 +69,12 @@ class Projection(DirectionalFigure):
 
     @property
     def caption(self) -> str:
-        """With how large the lobes are by chance alone."""
+        """With the size of lobes that chance alone makes."""
         noise = map(noise_note, self.frames, self.deviations)
         return " ".join(filter(None, [super().caption, *noise, self.data.note]))
 
     def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> None:
-        """Disks with one scale of colours, which stands beside them; of discs curves."""
+        """Draw disks with one colour bar beside them; curves for discs."""
         values = [one[kind] for one in self.deviations[-len(frames) :]]
         known = [float(np.abs(value).max()) for value in values if value is not None]
         # the scale ends at the largest deviation, and at least at a tenth of a per cent
@@ -92,7 +92,7 @@ class Projection(DirectionalFigure):
 
 
 def _draw_curve(axes: Axes, value: FloatArray | None, plane: Space, largest: float) -> None:
-    """Over the directions of a plane."""
+    """Draw a curve over the directions of a plane."""
     first, second = ("xyz"[k] for k in sorted(plane.along))
     axes.set(
         xlim=(0, 180), ylim=(-1.1 * largest, 1.1 * largest), ylabel="deviation from the mean in %"
@@ -135,7 +135,7 @@ def _draw_disk(axes: Axes, value: FloatArray | None, largest: float) -> Any:
 
 def places_of(space: Space) -> tuple[FloatArray, FloatArray]:
     """
-    Where directions are drawn: the upper hemisphere by the equal-area (Lambert) projection.
+    Places of directions on the disk: the equal-area (Lambert) projection of the upper hemisphere.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def places_of(space: Space) -> tuple[FloatArray, FloatArray]:
         Places on the disk of radius 1: z in the middle, x to the right, y up. Of discs, shape
         (181,), angles from the first coordinate of their plane to the second, degrees.
     ndarray, shape (41, 121, 3) or (181, 3)
-        The unit vectors that belong there; all others are their opposites.
+        The unit vectors at these places; all other directions are their opposites.
     """
     if space.is_plane:
         angle = np.arange(181.0)
@@ -178,7 +178,7 @@ def deviations_of(frame: ScannedFrame) -> dict[str, FloatArray | None]:
 def smoothed_density(
     normals: FloatArray, directions: FloatArray, space: Space = SPACE
 ) -> FloatArray:
-    """Density of the normals (n or -n) about each direction, over that of isotropic ones."""
+    """Density of the normals (n or -n) about each direction, relative to isotropic normals."""
     points, weights = direction_points(space)
     isotropic = float(weights @ np.exp(CONCENTRATION * points[:, max(space.along)] ** 2))
     flat = directions.reshape(-1, 3)
@@ -190,9 +190,9 @@ def smoothed_density(
 
 def noise_note(frame: ScannedFrame, deviations: Mapping[str, FloatArray | None]) -> str:
     """
-    What chance alone makes of the lobes of a frame, in words.
+    Compare the lobes of a frame with those that chance alone makes, in words.
 
-    The error of a lobe is of scan and sample together, as if it were the same in all directions.
+    The error of a lobe combines scan and sample, as if it were the same in all directions.
     """
     known = []
     for what, error, deviation in (
@@ -211,8 +211,8 @@ def void_noise(row: Mapping[str, Any], space: Space = SPACE) -> float | None:
     Standard error of a lobe of the mean void length, per cent of the mean.
 
     A lobe is a sum of harmonics, each with √5 times the error of the axial anisotropy α, in a plane
-    √2 times: of the sample those of the second degree, five or two, as it hardly differs in finer
-    ones; of the scan all that are fitted, as lines of different directions are independent.
+    √2 times. The sample's error has only harmonics of the second degree, five or two. The scan's
+    error has all fitted harmonics, as lines of different directions are independent.
     """
     scan, sample = (number_of(row, f"alpha_vs_axial_{part}") for part in ("se", "sample_se"))
     if sample is None:
@@ -231,5 +231,5 @@ def contact_noise(row: Mapping[str, Any], space: Space = SPACE) -> float | None:
     points, weights = direction_points(space)
     kernel = np.exp(CONCENTRATION * points[:, max(space.along)] ** 2)
     spread = float(weights @ kernel**2) / float(weights @ kernel) ** 2 - 1.0
-    # neighbouring contacts are not independent: by how much is known of the anisotropy
+    # neighbouring contacts are not independent; the errors of the anisotropy tell by how much
     return 100.0 * math.sqrt(spread / row["contacts"]) * error / alone

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from scanfab.viz.scanned_frames import ScannedFrame, ScannedFrames
 
 REPLICATES = 16
-# segments for each direction: mean lengths to about half a per cent
+# So many segments for each direction give mean lengths to about half a per cent.
 SEGMENTS = 20_000
-# between azimuths of void lengths, and of the sectors that contacts are counted in, degrees
+# Steps between the azimuths of void lengths, and between the sectors of contacts, degrees.
 THETA_STEP = 15.0
 CONTACT_STEP = 30.0
 POLAR_ANGLES = (90.0, 60.0, 30.0)
@@ -36,11 +36,11 @@ LOOKS: tuple[dict[str, Any], ...] = (
     {"color": COLOURS["green"], "marker": "D", "ls": "-."},
     {"color": COLOURS["purple"], "marker": "s", "ls": ":"},
 )
-# columns of the legend
+# At most so many columns in the legend.
 MOST_COLUMNS = 3
-# azimuths of smooth curves, degrees
+# Azimuths of smooth curves, degrees.
 AROUND = np.linspace(0, 360, 181)
-# whose errors the bars of a panel are
+# Source of the errors that bars show.
 BARS = {"voids": "of the scan", "contacts": "of a count of contacts"}
 
 
@@ -56,11 +56,11 @@ class Ring:
     error: FloatArray
     """Standard error."""
     curve: Callable[[FloatArray], FloatArray] | None = None
-    """A smooth curve beside them: value at azimuths in degrees."""
+    """A smooth curve beside the values, as a function of the azimuth in degrees."""
 
     @property
     def reach(self) -> float:
-        """How far the values, with their errors, and the curve are from 1; at least 0.02."""
+        """Largest distance of values with errors, and of the curve, from 1; at least 0.02."""
         far = np.abs(self.value - 1.0) + np.nan_to_num(self.error)
         curve = np.ones(1) if self.curve is None else self.curve(AROUND)
         return max(0.02, float(np.nanmax(far, initial=0.0)), float(np.abs(curve - 1.0).max()))
@@ -70,7 +70,7 @@ class Rose(DirectionalFigure):
     """
     Mean void length and contact normals over the azimuth, at a few polar angles from z.
 
-    Of discs over the directions of their plane, which has no polar angles.
+    For discs, over the directions of their plane, without polar angles.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ class Rose(DirectionalFigure):
 
     @property
     def space(self) -> Space:
-        """The plane of the frames, if their grains are discs; it has no polar angles."""
+        """The space of the frames; the plane of discs has no polar angles."""
         space = self.frames[0].space
         if space.is_plane and self.angles not in (POLAR_ANGLES, EQUATOR):
             angles = ",".join(f"{one:g}" for one in self.angles)
@@ -139,7 +139,7 @@ class Rose(DirectionalFigure):
 
     @property
     def looks(self) -> dict[float, dict[str, Any]]:
-        """The look of each polar angle; a usual angle has the same look in all figures."""
+        """The look of each polar angle, the same for the usual angles in all figures."""
         angles = EQUATOR if self.space.is_plane else self.angles
         usual = {phi: LOOKS[k] for k, phi in enumerate(POLAR_ANGLES) if phi in angles}
         free = iter([look for look in reversed(LOOKS) if look not in usual.values()])
@@ -152,7 +152,7 @@ class Rose(DirectionalFigure):
         return WIDTH, 3.0 * len(self.frames) + 0.7 + 0.2 * entries
 
     def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> float:
-        """Rings about 1 at the polar angles; how far the scale reaches from 1."""
+        """Draw rings about 1 at the polar angles; gives back the reach of the scale from 1."""
         looks = self.looks
         rings_of = void_rings if kind == "voids" else contact_rings
         every = [rings_of(one, list(looks)) for one in frames]
@@ -162,7 +162,7 @@ class Rose(DirectionalFigure):
         return reach
 
     def add_legend(self, place: Any, scales: dict[str, Any]) -> None:
-        """The legend below, with what the angle of the panels is, and what circles and bars are."""
+        """Add the legend below, with the meaning of angle, circles and bars."""
         handles = [Line2D([], [], **look) for look in self.looks.values()]
         labels = [rf"polar angle $\varphi={phi:g}^\circ$" for phi in self.looks]
         over = "over the azimuth $\\theta$ from x"
@@ -203,7 +203,7 @@ def _draw_rings(
         look = looks[ring.phi]
         theta, value, error = ring.theta, ring.value, ring.error
         if ring.curve is None:
-            # closed: the last point is followed by the first
+            # the first point follows the last one, so that the line is closed
             theta, value, error = (np.append(a, a[:1]) for a in (theta, value, error))
         line = look["ls"] if ring.curve is None else "none"
         style = {**look, "ls": line, "elinewidth": 0.5, "capsize": 0}
@@ -213,7 +213,7 @@ def _draw_rings(
     axes.plot(np.radians(AROUND), np.ones_like(AROUND), color="0.4", lw=0.6)
     middle, circles = _scale(reach)
     axes.set_ylim(middle, 1.0 + 1.1 * reach)
-    # named in the legend: within the panel there is no place where words would not meet the data
+    # the legend names the circles, as words in the panel would cover data
     axes.set_yticks(circles, [])
     axes.set_xticks(np.radians(np.arange(0, 360, 45)))
     axes.grid(color="0.85", lw=0.5)
@@ -228,7 +228,7 @@ def _scale(reach: float) -> tuple[float, list[float]]:
 
 def void_rings(frame: ScannedFrame, angles: Sequence[float]) -> list[Ring]:
     """Mean void lengths of a frame, at some polar angles in degrees."""
-    # compiled kernels, which those who draw something else do without
+    # loaded here, as other figures do without compiled kernels
     from scanfab.scan.directions import DirectionRule
     from scanfab.scan.gaps import scan_gaps
 
@@ -237,7 +237,7 @@ def void_rings(frame: ScannedFrame, angles: Sequence[float]) -> list[Ring]:
     thetas = [np.arange(0.0, 180.0 if phi == 90 else 360.0, THETA_STEP) for phi in angles]
     each = zip(thetas, angles, strict=True)
     axes = np.concatenate([_vectors(theta, phi, frame.space) for theta, phi in each])
-    # as many lines as give the wanted number of segments
+    # choose the spacing that gives the wanted number of segments
     segments = measured.sums.kept(variant)[1].mean()
     spacing = plan.spacing * plan.space.apart(segments * REPLICATES / SEGMENTS)
     weights = np.full(len(axes), 1 / len(axes))
@@ -270,7 +270,7 @@ def void_rings(frame: ScannedFrame, angles: Sequence[float]) -> list[Ring]:
 
 
 def _vectors(theta: FloatArray, phi: float, space: Space) -> FloatArray:
-    """Unit vectors; in a plane angles are counted from the first of its coordinates."""
+    """Unit vectors at azimuths and a polar angle; in a plane from its first coordinate."""
     azimuth, polar = np.radians(theta), np.radians(phi)
     flat, basis = np.sin(polar), np.eye(3)[sorted(space.along)]
     parts = [flat * np.cos(azimuth), flat * np.sin(azimuth), np.full(len(theta), np.cos(polar))]
@@ -290,7 +290,7 @@ def contact_ring(normals: FloatArray, phi: float, space: Space = SPACE) -> Ring:
     The curve beside them is the second-order density of the contact fabric, after Kanatani (1984).
     """
     both = np.concatenate([normals, -normals])
-    # the share of all directions that is counted
+    # the share of all directions that this ring counts
     share = 1.0
     first, second = sorted(space.along)[:2]
     if not space.is_plane:

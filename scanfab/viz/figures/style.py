@@ -25,10 +25,10 @@ PLOT_FORMATS = {
     ".pdf": "vectors, for print",
 }
 
-# pixels an inch, also of coloured disks in files of vectors
+# Pixels an inch, also of the coloured disks in vector files.
 DPI = 300
 
-# of Okabe and Ito (2008); each variant also has a marker and a line of its own
+# Colours of Okabe and Ito (2008). Each variant also has its own marker and line.
 COLOURS = {
     "blue": "#0072B2",
     "orange": "#E69F00",
@@ -39,7 +39,7 @@ COLOURS = {
     "black": "#000000",
 }
 
-# variants without rattlers are open and larger, so that one that coincides with its twin is seen
+# Variants without rattlers have larger open markers, which are seen behind those of their twins.
 LOOKS: dict[str, dict[str, Any]] = {
     "a": {"color": COLOURS["blue"], "marker": "o", "ls": "-"},
     "b": {"color": COLOURS["orange"], "marker": "s", "ls": "--", "mfc": "white", "ms": 5.5},
@@ -47,16 +47,16 @@ LOOKS: dict[str, dict[str, Any]] = {
     "d": {"color": COLOURS["green"], "marker": "D", "ls": "--", "mfc": "white", "ms": 5.5},
 }
 
-# of the first and the last frame, where they share a panel
+# Looks of the first and the last frame in one panel.
 FRAME_LOOKS: tuple[dict[str, Any], ...] = (
     {"color": COLOURS["blue"], "marker": "o", "ls": "--", "markerfacecolor": "white"},
     {"color": COLOURS["vermilion"], "marker": "^", "ls": "-"},
 )
 
-# of panels of directional distributions
+# Titles of panels that show distributions over directions.
 DIRECTIONAL = {"voids": "mean void length", "contacts": "contact normals"}
 
-# the same words in every figure, by the columns of the table
+# Names of the table's columns, the same in every figure.
 VOID, CONTACT = r"$\alpha_{vs}$", r"$\alpha_{c}$"
 NAMES = {
     "alpha_vs_axial": f"{VOID}, axial",
@@ -69,8 +69,8 @@ LABELS = {
     for column, name in NAMES.items()
 }
 
-# figures of one panel are as wide as a column of a journal, others as one and a half, so that
-# their words are still read on the screen of a phone
+# A figure of one panel is as wide as a column of a journal, others one and a half columns, so that
+# they are legible on a phone.
 COLUMN, WIDTH = 3.4, 5.4
 STYLE: Any = {
     "font.size": 9,
@@ -110,7 +110,7 @@ def new_figure(width: float, height: float) -> Iterator[Figure]:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    # whatever matplotlibrc the user has
+    # do not depend on the user's matplotlibrc
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
@@ -119,7 +119,7 @@ def new_figure(width: float, height: float) -> Iterator[Figure]:
 
 def figure_bytes(figure: Figure, kind: str, dpi: int = DPI) -> bytes:
     """A figure as ``png``, ``svg`` or ``pdf``; no file is made."""
-    # the same input gives the same bytes: no file has a date
+    # without a date, the same input gives the same bytes
     dates = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
     drawn = BytesIO()
     figure.savefig(drawn, format=kind, dpi=dpi, metadata=dates[kind])
@@ -133,7 +133,7 @@ def rounded_down(value: float) -> float:
 
 
 def plain(text: str) -> str:
-    """A text from a file as a label: a dollar would start a formula."""
+    """Escape dollars in a label, which would start a formula."""
     return text.replace("$", r"\$")
 
 
@@ -153,7 +153,7 @@ def letter(panels: Iterable[Axes], first: int = 0) -> None:
 
 
 def band(axes: Axes, x: FloatArray, y: FloatArray, error: FloatArray, look: Any) -> None:
-    """Shade y ± error; about a point that has no neighbours a bar, as an area needs two."""
+    """Shade y ± error; a single point gets a bar, as an area needs two points."""
     colour = look["color"]
     known = np.isfinite(x + y + error)
     if not known.any():

@@ -13,20 +13,18 @@ import numpy.typing as npt
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder
-from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.viz.figures.figure import Figure
 from scanfab.viz.figures.page import drawn_page
 from scanfab.viz.figures.style import COLOURS, figure_bytes
 from scanfab.viz.scene import SHADES, Scene, towards_viewer
 
-# spheres that a browser turns without effort
+# A browser turns so many spheres without effort.
 MOST_GRAINS = 4_000
-# of balls in the RV, outside, and of rattlers, and paler where a plane cuts them
+# Colours of grains in the RV, grains outside and rattlers; the paler ones are for cut grains.
 KIND_COLOURS = ((COLOURS["sky"], "#B4DDF5"), ("#C9CED3", "#E8EAEC"), (COLOURS["orange"], "#F5DB9F"))
 
-
-# CSS pixels an inch, and those of pictures that are pixels
+# CSS pixels an inch, and pixels an inch of pictures that are no vectors.
 PIXELS, DPI = 96, 130
 KINDS = {"svg": "image/svg+xml", "png": "image/png"}
 
@@ -35,14 +33,14 @@ class Picture(NamedTuple):
     """A figure inside the page."""
 
     url: str
-    """With the scheme ``data:``."""
+    """URL with the scheme ``data:``."""
     caption: str
     width: int
-    """At which its letters are as large as those of the page, CSS pixels."""
+    """Width in CSS pixels, at which its letters are as large as those of the page."""
 
 
 def picture_of(figure: Figure, kind: Literal["svg", "png"]) -> Picture:
-    """A figure with its caption, as lines or as pixels."""
+    """A figure with its caption, as vectors or as pixels."""
     with drawn_page([figure]) as page:
         data = base64.b64encode(figure_bytes(page, kind, DPI)).decode("ascii")
     url = f"data:{KINDS[kind]};base64,{data}"
@@ -58,10 +56,10 @@ def check_page_file(path: Path) -> None:
 
 def render_page(**content: Any) -> str:
     """
-    The page, made of what the template ``page.html`` names.
+    Render the template ``page.html`` with its content.
 
-    ``sections`` are dictionaries, one for each table; of ``shown`` there is one for each table
-    whose source could be read again.
+    ``sections`` has a dictionary for each table. Its ``shown`` is None if the source could not be
+    read again.
     """
     import jinja2
 
@@ -77,7 +75,7 @@ def render_page(**content: Any) -> str:
 
 
 def _symbols(text: str) -> Any:
-    """A text, escaped, with the indices of α set low."""
+    """Escape a text, and make the indices of α subscripts."""
     from markupsafe import Markup, escape
 
     marked = str(escape(text)).replace("α_vs", "α<sub>vs</sub>")
@@ -86,7 +84,7 @@ def _symbols(text: str) -> Any:
 
 def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     """
-    A scene for the page's viewer: whole numbers, thousandths of the half size of the scene.
+    A scene for the page's viewer, in whole numbers of a thousandth of half its size.
 
     Parameters
     ----------
@@ -99,13 +97,15 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     shown = ~grains.boundary
     position = grains.position[shown] - scene.center
     radius = grains.radius[shown]
-    away = np.linalg.norm(grains.places[shown] - scene.center, axis=1)
-    nearest = np.argsort(away, kind="stable")[:MOST_GRAINS]
+    distance = np.linalg.norm(grains.places[shown] - scene.center, axis=1)
+    nearest = np.argsort(distance, kind="stable")[:MOST_GRAINS]
     reach = np.linalg.norm(position[nearest], axis=1) + radius[nearest]
     size = float(reach.max(initial=0.0)) or (scene.window.reach if scene.window else 1.0)
     scale = 1000.0 / size
     up = np.asarray(axis, dtype=np.float64)
-    turn = _upright(up, scene.space)
+    # the rotation (rows) after which the axis is z; y leads away from the viewer
+    away = -towards_viewer(up, scene.space)
+    turn = np.stack([np.cross(away, up), away, up])
     kinds = np.where(grains.rattler, 2, np.where(grains.in_window, 0, 1))[shown]
     names = ["grains in the RV", "grains outside" if scene.window else "grains", "rattlers"]
     shades = [] if grains.body is None else [grains.shade[shown]]
@@ -124,7 +124,7 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
         "cutoff": scene.cutoff * scale,
         "size": size,
         "left_out": int(shown.sum() - len(nearest)),
-        # how the view begins; discs are seen from in front
+        # the view of discs begins from in front
         **({"start": {"turn": 0, "tilt": 0}} if scene.space.is_plane else {}),
     }
 
@@ -140,13 +140,6 @@ def _window_data(window: Convex, turn: FloatArray, scale: float) -> dict[str, An
         "form": [round(part, 9) + 0.0 for part in parts.tolist()],
         "level": round(level * scale**2, 3),
     }
-
-
-def _upright(axis: FloatArray, space: Space) -> FloatArray:
-    """The rotation (rows) after which the axis is z; keeps x, y and z where it can."""
-    # y leads away from the viewer
-    away = -towards_viewer(axis, space)
-    return np.stack([np.cross(away, axis), away, axis])
 
 
 def _axes(up: FloatArray, turn: FloatArray) -> list[list[Any]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
 from pathlib import Path
@@ -22,7 +22,7 @@ from scanfab.pipeline.options import as_options
 from scanfab.pipeline.record import read_manifest, reopen, repeat_command, restored_settings
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import Length
-from scanfab.table.compare import Comparison, compare_tables
+from scanfab.table.compare import compare_tables
 from scanfab.table.curves import spelt_strain, strain_column
 from scanfab.table.formats import read_rows
 from scanfab.table.row import numbers_of
@@ -40,11 +40,11 @@ from scanfab.viz.report.tables import (
 from scanfab.viz.scanned_frames import ScannedFrames
 from scanfab.viz.scene import Look, look_at
 
-# segments of a scan that takes about half a minute: pictures that would need more are rougher
+# A scan of so many segments takes about half a minute. Pictures that need more are made rougher.
 MOST_SEGMENTS = 3e8
 
 Told = dict[type[Warning], list[str]]
-"""What was told, warnings and notes apart."""
+"""Messages by category, warnings and notes."""
 
 
 class Input(NamedTuple):
@@ -161,7 +161,11 @@ def make_report(
         inputs = read_inputs([Path(one) for one in named], cutoff, labels)
         rows = [row for one in inputs for row in one.rows]
         comparison = compare_tables(rows)
-        pictures = _table_pictures(rows, comparison)
+        pictures: list[Picture] = []
+        with suppress(SettingsError):  # there are no figures without a void fabric
+            pictures = [
+                picture_of(one, "svg") for one in make_figures(rows, "table", comparison=comparison)
+            ]
     for one in caught:
         warnings.warn(one.message, one.category, stacklevel=2)
     sections = [_section(one, told) for one in inputs]
@@ -186,7 +190,7 @@ def make_report(
 
 @contextmanager
 def _listening(told: Told) -> Iterator[list[Any]]:
-    """Collect what is told in the block; it gives back the warnings themselves."""
+    """Collect the messages of a block in ``told``; gives back the warnings themselves."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
@@ -209,7 +213,7 @@ def read_inputs(
     ScanfabError
         If one cannot be read or is no fabric table, or if no table has a row.
     """
-    # a report can do without the names of the source and the strain
+    # tables may lack the columns of source and strain
     read = [
         (path, [{"source": path.stem, "strain": None, **row} for row in read_rows(path)])
         for path in tables
@@ -232,17 +236,8 @@ def _usual_title(rows: Sequence[Mapping[str, Any]]) -> str:
     return f"Void fabric of {', '.join(names) if len(names) < 4 else f'{len(names)} samples'}"
 
 
-def _table_pictures(rows: Sequence[Mapping[str, Any]], comparison: Comparison) -> list[Picture]:
-    """The figures of the table; none if it has no void fabric."""
-    try:
-        figures = make_figures(rows, "table", comparison=comparison)
-    except SettingsError:
-        return []
-    return [picture_of(one, "svg") for one in figures]
-
-
 def _section(one: Input, told: Told) -> dict[str, Any]:
-    """What the manifest says, and what the source shows; ``told`` gets the warnings."""
+    """One table's part of the page, from its manifest and source; ``told`` gets the warnings."""
     section: dict[str, Any] = {"title": str(one.path), "missing": "", "shown": None, "no_view": ""}
     if one.manifest is None:
         missing = (
@@ -259,7 +254,7 @@ def _section(one: Input, told: Told) -> dict[str, Any]:
                 section["shown"] = show_frames(one)
         except (ScanfabError, OSError) as error:
             section["no_view"] = f"The view is left out: {as_options(error)}."
-    # options of the settings file beside the dumps that the command line has overridden
+    # options of the settings file beside the dumps, which the command line has overridden
     overridden = found.get("not_used", []) if isinstance(found, dict) else []
     return {
         **section,
@@ -287,7 +282,7 @@ def show_frames(one: Input) -> dict[str, Any]:
     asked = manifest["settings"]
     series, settings = reopen(asked), restored_settings(asked)
     if settings.cutoffs:
-        # the one whose rows are reported
+        # the cut-off whose rows are reported
         cutoff = settings.cutoff if one.cutoff is None else Length(one.cutoff)
         settings = replace(settings, cutoffs=(), cutoff=cutoff)
     source = str(one.rows[0]["source"])
@@ -331,7 +326,7 @@ def _facts(look: Look) -> list[tuple[str, str]]:
             facts.append(("shape of the RV", str(window.shape)))
             continue
         part, now = _fraction(first, radius), ""
-        # beside the sample that the RV was chosen for, and beside what became of that since
+        # relative to the first sample, and to the sample of this frame if that differs
         if look.sample.gathered.any() and _fraction(look.sample, radius) != part:
             now = f" in the first frame that has grains, {_fraction(look.sample, radius)} in frame "
             now += str(look.number)
@@ -357,13 +352,13 @@ def _numbers(vector: Any) -> str:
 
 
 def _pictures(rows: list[dict[str, Any]], series: Series, settings: Settings) -> list[Picture]:
-    """Of the first and the last frame, all from one scan."""
+    """Figures of the first and the last frame, from one scan."""
     # the least tolerance of a row, which may follow from the sample's error
     errors = numbers_of(rows, "alpha_vs_axial_sample_se")
     rougher, asked = "", settings.aim(min(errors, default=None))
     tolerance = asked
     if settings.spacing is None or settings.directions is None:
-        # as much rougher as makes the scan short enough to wait for
+        # rougher, so that the scan is short enough to wait for
         most = max(numbers_of(rows, "segments"), default=0.0)
         tolerance *= max(1.0, most / MOST_SEGMENTS) ** 0.5
     if tolerance > asked:
@@ -372,6 +367,6 @@ def _pictures(rows: list[dict[str, Any]], series: Series, settings: Settings) ->
             f"{asked:.2g}, which would take too long for a picture."
         )
     frames = ScannedFrames(series, replace(settings, tolerance=tolerance), rows, rougher)
-    # pixels, as the disks are pixels anyway, and few of them
+    # drawn as pixels, as the coloured disks are pixels anyway
     figures = [figure for figure in make_figures(frames, "frames") if not figure.slow]
     return [picture_of(figure, "png") for figure in figures]

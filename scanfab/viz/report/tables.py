@@ -1,4 +1,4 @@
-"""The tables of the report: results, frames and inputs, spelt for readers."""
+"""The tables of the report as text: results, frames, inputs and settings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from scanfab.table.row import groups_of, number_of, numbers_of, total_error, var
 
 Row = Mapping[str, Any]
 
-# frames of a source and variant that the table shows
+# The table shows at most about so many frames of a source and variant.
 MOST_FRAMES = 12
 MOST_INPUTS = 20
 VOID, CONTACT = "alpha_vs_axial", "alpha_c_axial"
@@ -27,7 +27,7 @@ TURNED = (
     "way the axes point: never negative, so noise raises them. The table has no errors of them."
 )
 
-# columns of the frame table behind the anisotropies, by the name that readers see
+# Further columns of the frame table, with the titles that readers see.
 MORE_COLUMNS = {
     "grains": "grains",
     "rattlers": "rattlers",
@@ -40,7 +40,7 @@ MORE_COLUMNS = {
 
 
 class Part(NamedTuple):
-    """A table to be shown."""
+    """A table of texts."""
 
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -49,7 +49,7 @@ class Part(NamedTuple):
 
 
 def overview(table: Path, rows: Sequence[Row]) -> str:
-    """What was measured, in a sentence."""
+    """Summarise in a sentence what was measured."""
     if not rows:
         return f"{table}: an empty table."
     sources = list(dict.fromkeys(str(row["source"]) for row in rows))
@@ -61,7 +61,7 @@ def overview(table: Path, rows: Sequence[Row]) -> str:
         f"variants {variants}",
     ]
     if numbers_of(rows, "grains"):
-        # all grains, those in the RV, or those that carry load
+        # variants count all grains, grains in the RV, or grains without rattlers
         grains = {
             variant: _span([row for row in rows if variant_of(row) == variant], "grains", ".0f")
             for variant in sorted(set(map(variant_of, rows)))
@@ -75,14 +75,14 @@ def overview(table: Path, rows: Sequence[Row]) -> str:
 
 
 def _span(rows: Sequence[Row], column: str, spelling: str, factor: float = 1.0) -> str:
-    """From the smallest to the largest number of a column, if they differ as they are spelt."""
+    """Spell the smallest and the largest number of a column; one of them if both look alike."""
     values = sorted(numbers_of(rows, column))
     ends = [f"{factor * value:{spelling}}" for value in (*values[:1], *values[-1:])]
     return " to ".join(dict.fromkeys(ends)) or "-"
 
 
 def results_tables(summary: Iterable[TableRow], rows: Sequence[Row]) -> list[Part]:
-    """A table for each source: a column for each variant, the key numbers first."""
+    """A table for each source, with a column for each variant."""
     sources: dict[str, list[TableRow]] = {}
     for one in summary:
         sources.setdefault(one.source, []).append(one)
@@ -102,7 +102,7 @@ def _results(source: str, summary: Sequence[TableRow], rows: Sequence[Row]) -> P
     here, there = _where("last", last, column), _where("first", first, column)
     lines: dict[str, list[str]] = {}
     if is_turned(rows):
-        # there is no line, as the axial values that it would be fitted to miss the fabric
+        # no line is fitted, as axial values miss a fabric with turned axes
         for ends, at in ((last, here), (first, there)):
             lines |= {
                 f"intensity α_vs{at}": [_intensity(row, VOID) for row in ends],
@@ -126,14 +126,14 @@ def _results(source: str, summary: Sequence[TableRow], rows: Sequence[Row]) -> P
             "largest α_vs": [_spell(one.peak) for one in summary],
             "frames in the line": [str(one.frames) for one in summary],
         }
-    # the lines that are known of some variant
+    # leave out lines that are empty for all variants
     shown = [[name, *cells] for name, cells in lines.items() if any(one != "-" for one in cells)]
     note = TURNED if is_turned(rows) else ""
     return Part(["variant", *map(variant_of, summary)], shown, note, source)
 
 
 def _where(which: str, rows: Sequence[Row], column: str | None) -> str:
-    """At which strain or in which frame, if it is the same for all variants."""
+    """Spell the strain or the frame, if it is the same for all variants."""
     row = next((row for row in rows if row), {})
     if not row or len({one["frame"] for one in rows if one}) > 1:
         return f", {which} frame that has one"
@@ -142,7 +142,7 @@ def _where(which: str, rows: Sequence[Row], column: str | None) -> str:
 
 
 def _value(row: Row, name: str) -> str:
-    """With the total error; without one, the digits that the scan's error leaves."""
+    """Spell a value with its total error, or with the digits that the scan's error allows."""
     error = total_error(row, name)
     if error is None:
         return _with_error(number_of(row, name), number_of(row, f"{name}_se")).partition(" ±")[0]
@@ -150,18 +150,18 @@ def _value(row: Row, name: str) -> str:
 
 
 def _intensity(row: Row, axial: str) -> str:
-    """The table has no error of it; it has the digits that the error of the axial value leaves."""
+    """Spell an intensity with the digits that the error of the axial value allows."""
     error = total_error(row, axial) or number_of(row, f"{axial}_se")
     return _with_error(number_of(row, axial.removesuffix("_axial")), error).partition(" ±")[0]
 
 
 def _with_error(value: float | None, error: float | None) -> str:
-    """A small number, with two digits of its error if that is known."""
+    """Spell a small number with two digits of its error, if the error is known."""
     if value is None:
         return "-"
     if error is None or error <= 0:
         return f"{value:.5f}"
-    # of the rounded error: 0.00099999 has the digits of 0.0010
+    # count the digits of the rounded error: 0.00099999 is 0.0010
     digits = max(0, 1 - math.floor(math.log10(float(f"{error:.1e}"))))
     return f"{value:.{digits}f} ± {error:.{digits}f}"
 
@@ -183,12 +183,12 @@ def _spell(value: Any) -> str:
 
 
 def frame_table(rows: Sequence[Row]) -> Part:
-    """Some frames, with the anisotropies and their errors in the first columns."""
+    """A table of some frames; the first columns have the anisotropies and their errors."""
     numbers = list(dict.fromkeys((row["source"], row["frame"]) for row in rows))
     step = -(-len(numbers) // MOST_FRAMES)
     shown = {*numbers[::step], numbers[-1]}
     sources = {row["source"] for row in rows}
-    # axial strain also where it does not tell the frames of its source apart
+    # axial strain is the default, also if it does not tell the frames of a source apart
     column = {
         source: strain_column([row for row in rows if row["source"] == source]) or "strain"
         for source in sources
@@ -205,7 +205,7 @@ def frame_table(rows: Sequence[Row]) -> Part:
 
 
 def _frame_line(row: Row, column: str, several: bool, turned: bool) -> dict[str, str]:
-    """The cells of a row, those first that tell most."""
+    """The cells of a row, the most important first."""
     strain, total = number_of(row, column), total_error(row, VOID)
     spelt = "-" if strain is None else f"{100 * strain:.3g} %"
     intensities = {
@@ -214,7 +214,7 @@ def _frame_line(row: Row, column: str, several: bool, turned: bool) -> dict[str,
         "angle": _degrees(row) if turned else "-",
     }
     more = {
-        # as it stands in the table, so that counts stay whole
+        # spell the value of the table, so that counts stay whole numbers
         title: "-" if number_of(row, name) is None else _spell(row[name])
         for name, title in MORE_COLUMNS.items()
     }
@@ -237,7 +237,7 @@ def _frame_line(row: Row, column: str, several: bool, turned: bool) -> dict[str,
 
 
 def input_table(manifest: Mapping[str, Any]) -> Part:
-    """The files with size and hash, not more than fit."""
+    """The first input files with size and hash."""
     files = list(manifest.get("inputs") or [])
     lines = [
         [str(one.get("path")), str(one.get("size")), str(one.get("sha256"))]

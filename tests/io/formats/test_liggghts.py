@@ -87,13 +87,6 @@ def test_every_form_gives_the_same_grains(folder, name, options):
         assert sorted(packing.columns) == ["c_ca", "mass", "type", "vx"]
 
 
-def test_a_file_with_several_snapshots_holds_them_all():
-    frames = [frame.read() for frame in scanfab.read_series(FLOOR / "multi.txt")]
-    assert len(frames[0]) == 0
-    assert [frame.step for frame in frames] == [0, 15000, 30000]
-    assert_true_grains(frames[-1], FLOOR)
-
-
 @pytest.mark.parametrize("name", KEYWORDS)
 @pytest.mark.parametrize("grains", ["tutorial.txt", "unwrapped.txt", "grains_30000.vtk"])
 def test_every_contact_form_gives_the_same_contacts(grains, name):

@@ -97,9 +97,12 @@ def test_the_kit(tmp_path, format):
     paths = SMALL[format](tmp_path)
     for path in paths if format == "esys" else []:
         shutil.copy(path, tmp_path / "damaged")
-    for path in paths:
-        if reader.kind(path) == "grains":
-            check_reader(reader, [path], tmp_path / "damaged", counts=path.name in COUNTED)
+    grains = [path for path in paths if reader.kind(path) == "grains"]
+    contacts = [(path, grains[0]) for path in paths if reader.kind(path) == "contacts"]
+    for path in grains:
+        is_counted = path.name in COUNTED
+        check_reader(reader, [path], tmp_path / "damaged", contacts=contacts, counts=is_counted)
+        contacts = []
 
 
 @pytest.mark.parametrize("behind", ["", esys.TURNS, " 1", " 1 0.1" + esys.TURNS + " 1"])

@@ -134,16 +134,6 @@ def test_usual_names(tmp_path, names):
     np.testing.assert_array_equal(packing.columns["kept"], ID)
 
 
-def test_a_size_that_users_name_counts(tmp_path):
-    path = rows(tmp_path / "g.csv", POSITION, RADIUS, names=["x", "y", "z", "d"])
-    with pytest.raises(ReadError, match=r"no grains|no radius"):
-        read(path, format="table")
-    assert_right(read(path, columns={"radius": "d"}))
-    assert_right(read(path, format="table", radius=0.5))
-    path = rows(tmp_path / "g.csv", POSITION, 9 * RADIUS, 2 * RADIUS, names=[*"xyzr", "d"])
-    assert_right(read(path, columns={"diameter": "d"}))
-
-
 def test_a_name_that_stands_twice_is_asked(tmp_path):
     path = rows(tmp_path / "g.csv", POSITION, RADIUS, ID, names=[*"xyzr", "X"])
     with pytest.raises(ReadError, match=r"several columns may be x: 'x' \(column 1\), .*column 5"):
@@ -184,11 +174,6 @@ def test_lengths_have_one_unit_and_volumes_its_cube(tmp_path, names, format, is_
 
 
 # rows
-
-
-def test_ids_above_what_decimals_hold_stay_exact(tmp_path):
-    path = rows(tmp_path / "h.txt", ID + 2**53, POSITION, RADIUS)
-    np.testing.assert_array_equal(read(path).id, ID + 2**53)
 
 
 def test_side_columns_may_have_gaps(tmp_path, capsys):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ import pytest
 import scanfab
 from scanfab import ReadError, ScanfabWarning
 from scanfab.io.formats import shared
-from scanfab.io.reader import reader_named
 from tests.helpers.dumps import NAMES, ROWS, dump_text, write
 from tests.helpers.made.lammps import yaml_text
 
@@ -91,12 +89,6 @@ def test_an_incomplete_last_snapshot_is_left_out_with_a_warning(tmp_path, make, 
         assert [frame.step for frame in scanfab.read_series(path)] == [0]
 
 
-@pytest.mark.parametrize("before", ["", dump_text(step=-1)])
-def test_a_last_line_without_its_end_is_read_with_a_warning(tmp_path, before):
-    with pytest.warns(ScanfabWarning, match="dump: the last line has no end"):
-        assert len(read(tmp_path, before + dump_text(end="\n")[:-1], frame=-1)) == 3
-
-
 @pytest.mark.parametrize(
     ("flags", "periodic"),
     [(" pp pp pp", (1, 1, 1)), (" pp ff mm", (1, 0, 0)), (" fm ms pp", (0, 0, 1)), ("", (0, 0, 0))],
@@ -170,18 +162,3 @@ def test_a_bad_line_of_a_later_snapshot_is_counted_from_the_first(tmp_path):
     text = dump_text(step=-1) + dump_text().replace("0.58", "oops")
     with pytest.raises(ReadError, match=r"dump, line 24: .* found 'oops'"):
         read(tmp_path, text, frame=-1)
-
-
-@pytest.mark.parametrize("left", [0, 100, 8192, 20000])
-def test_a_file_that_is_cut_while_it_is_indexed_is_an_error(tmp_path, monkeypatch, left):
-    """A program starts again and writes the dump anew: whoever has it mapped is killed."""
-    path = write(tmp_path / "dump", "".join(dump_text(step=step) for step in range(200)))
-    real = shared.text_of
-
-    def cut(snapshot):
-        os.truncate(path, left)
-        return real(snapshot)
-
-    monkeypatch.setattr(shared, "text_of", cut)
-    with pytest.raises(ReadError, match="expected a whole number as ITEM: TIMESTEP"):
-        reader_named("liggghts").snapshots(path)

@@ -1,4 +1,4 @@
-"""VTK files of any origin: clouds with a radius, lines between centres, and what is refused."""
+"""VTK files of any origin, and lists of them."""
 
 from __future__ import annotations
 
@@ -121,3 +121,139 @@ def test_forces_whose_grain_is_in_doubt_and_arrays_of_other_names_are_left_out(t
         ScanfabNote, match=r"contact arrays that are not read: \w+, \w+: only a vector"
     ):
         assert scanfab.read(spheres, contacts=contacts).contacts.force is None
+
+
+def cloud(path, rows, ghosts=None):
+    path.parent.mkdir(exist_ok=True)
+    mesh = pyvista.PolyData(POSITION[rows])
+    mesh["radius"], mesh["id"] = np.ones(len(rows)), np.array(rows)
+    if ghosts is not None:
+        mesh["vtkGhostType"] = np.array(ghosts, np.uint8)
+    (mesh if path.suffix == ".vtp" else mesh.cast_to_unstructured_grid()).save(path)
+    return path
+
+
+def listing(path, kind, tag, key, names, more=""):
+    entries = "".join(f'<{tag} {key}="{name}" {more}/>' for name in names)
+    return write(path, f'<VTKFile type="{kind}"><{kind}>{entries}</{kind}></VTKFile>')
+
+
+@pytest.mark.parametrize(("kind", "ending"), [("PPolyData", ".vtp"), ("PUnstructuredGrid", ".vtu")])
+def test_pieces_make_one_frame_and_their_ghosts_count_once(tmp_path, kind, ending):
+    cloud(tmp_path / f"parts/0{ending}", [0, 1, 2], [0, 0, 1])
+    cloud(tmp_path / f"parts/1{ending}", [1, 2, 3], [1, 0, 0])
+    names = [f"parts/{k}{ending}" for k in range(2)]
+    path = listing(tmp_path / f"all.p{ending[1:]}", kind, "Piece", "Source", names)
+    packing = scanfab.read(path)
+    np.testing.assert_array_equal(packing.id, range(4))
+    np.testing.assert_array_equal(packing.position, POSITION)
+
+
+def test_a_piece_that_is_missing_or_damaged_is_named(tmp_path):
+    cloud(tmp_path / "0.vtp", [0, 1])
+    path = listing(tmp_path / "a.pvtp", "PPolyData", "Piece", "Source", ["0.vtp", "1.vtp"])
+    with pytest.raises(ReadError, match=r"a\.pvtp: names '1\.vtp', but there is no such file"):
+        scanfab.read(path)
+    data = (tmp_path / "0.vtp").read_bytes()
+    (tmp_path / "1.vtp").write_bytes(data[: len(data) // 2])
+    with pytest.raises(ReadError, match=r"1\.vtp: .*damaged or incomplete"):
+        scanfab.read(path)
+
+
+def test_the_files_of_a_frame_are_its_grains_and_contacts(tmp_path):
+    cloud(tmp_path / "f/grains.vtu", [0, 1, 2, 3])
+    lines = pyvista.PolyData(POSITION, lines=[2, 0, 1, 2, 1, 2])
+    lines.save(tmp_path / "f/lines.vtp")
+    pyvista.Plane().save(tmp_path / "f/wall.vtp")
+    names = [f"f/{name}" for name in ("wall.vtp", "grains.vtu", "lines.vtp")]
+    path = listing(tmp_path / "f_7.vtm", "vtkMultiBlockDataSet", "DataSet", "file", names)
+    packing = scanfab.read(path)
+    np.testing.assert_array_equal(packing.contacts.pairs, [[0, 1], [1, 2]])
+    assert packing.step is None
+    listing(path, "vtkMultiBlockDataSet", "DataSet", "file", names[1:2] * 2)
+    with pytest.raises(ReadError, match=r"expected one file of grains.* 2 of grains and 0 of con"):
+        scanfab.read(path)
+
+
+@pytest.mark.parametrize(
+    "name", ["../secret.vtp", "/etc/passwd", "a/../../secret.vtp", "..\\\\secret.vtp", ".", "a\0b"]
+)
+@pytest.mark.parametrize("kind", ["PPolyData", "vtkMultiBlockDataSet", "Collection", "Xdmf"])
+def test_files_elsewhere_are_not_read(tmp_path, name, kind):
+    cloud(tmp_path / "secret.vtp", [0, 1])
+    folder = tmp_path / "given"
+    folder.mkdir()
+    if kind == "Xdmf":
+        text = f'<Xdmf><Domain><DataItem Format="HDF">{name}:/x</DataItem></Domain></Xdmf>'
+        path = write(folder / "a.xdmf", text)
+    else:
+        tag, key = ("Piece", "Source") if kind == "PPolyData" else ("DataSet", "file")
+        path = listing(folder / "a.pvd", kind, tag, key, [name], 'timestep="0"')
+    with pytest.raises(
+        ReadError, match=r"which is outside the folder of this file|not well-formed"
+    ):
+        next(iter(scanfab.read_series(path, radius=1.0))).read()
+
+
+def test_lists_of_lists_have_no_end_and_are_refused(tmp_path):
+    path = listing(tmp_path / "a.pvtp", "PPolyData", "Piece", "Source", ["a.pvtp"])
+    with pytest.raises(ReadError, match="lists pieces itself"):
+        scanfab.read(path)
+    path = listing(tmp_path / "a.vtm", "vtkMultiBlockDataSet", "DataSet", "file", ["a.vtm"])
+    with pytest.raises(ReadError, match="expected one file of grains"):
+        scanfab.read(path)
+
+
+def collection(path, *entries):
+    """A ``.pvd`` of files with their attributes."""
+    rows = "".join(f'<DataSet {more} file="{name}"/>' for name, more in entries)
+    return write(path, f'<VTKFile type="Collection"><Collection>{rows}</Collection></VTKFile>')
+
+
+@pytest.mark.parametrize("one", ['part="{}"', 'group="{}"', 'group="a{}" part="0"'])
+def test_the_parts_of_one_time_are_one_frame(tmp_path, one):
+    name = "f/out_{1}_{0}.vtp"
+    rows = {(5, 0): [0, 1], (5, 1): [2, 3], (6, 0): [3], (6, 1): [2, 1, 0]}
+    for (step, part), own in rows.items():
+        cloud(tmp_path / name.format(step, part), own)
+    entries = [
+        (name.format(step, part), f'timestep="{step / 2}" {one.format(part)}')
+        for step, part in rows
+    ]
+    path = collection(tmp_path / "run.pvd", *entries)
+    series = scanfab.read_series(path)
+    packings = [frame.read() for frame in series]
+    assert [(one.step, one.time) for one in packings] == [(5, 2.5), (6, 3.0)]
+    for packing, ids in zip(packings, [[0, 1, 2, 3], [3, 2, 1, 0]], strict=True):
+        np.testing.assert_array_equal(packing.id, ids)
+        np.testing.assert_array_equal(packing.position, POSITION[ids])
+    assert {file.name for file in series.files()} >= {name.split("/")[-1] for name, _ in entries}
+    alone = series[1].alone()
+    assert all(file.is_absolute() for file in (alone.snapshot.path, *alone.snapshot.parts))
+    np.testing.assert_array_equal(alone.read().id, packings[1].id)
+
+
+@pytest.mark.parametrize(
+    ("names", "more", "told"),
+    [
+        (("a", "b"), ('timestep="5"', 'timestep="5"'), r"a\.vtp and b\.vtp have the same timestep"),
+        (("a", "b"), ('group="g"', 'group="g"'), r"a\.vtp and b\.vtp have the same timestep"),
+        (("a", "b"), ('part="0"', 'part="1"'), r"ids|twice"),
+        (("a", "points"), ('part="0"', 'part="1"'), r"points without a radius \(points\.vtp"),
+    ],
+)
+def test_files_that_are_not_parts_of_one_frame_are_refused(tmp_path, names, more, told):
+    for name in "ab":
+        cloud(tmp_path / f"{name}.vtp", [0, 1])
+    pyvista.PolyData(POSITION).save(tmp_path / "points.vtp")
+    entries = zip((f"{name}.vtp" for name in names), more, strict=True)
+    with pytest.raises(scanfab.ScanfabError, match=told):
+        scanfab.read(collection(tmp_path / "run.pvd", *entries))
+
+
+@pytest.mark.parametrize("more", ["", 'group="" part="0" timestep="7"'])
+def test_a_list_of_one_file_is_a_frame(tmp_path, more):
+    cloud(tmp_path / "a_3.vtp", [0, 1, 2])
+    packing = scanfab.read(collection(tmp_path / "run.pvd", ("a_3.vtp", more)))
+    assert (len(packing), packing.step) == (3, 3)
+    assert packing.time == (7.0 if "timestep" in more else None)

@@ -124,16 +124,6 @@ def test_a_contact_through_a_face_without_a_cell_asks_for_it(tmp_path):
         scanfab.read(spheres, contacts=YADE / PERIODIC_INTRS)
 
 
-def test_lines_to_images_without_a_cell_are_not_taken_for_walls(tmp_path):
-    # three grains in a row that touch through a face; without ids only their places tell them
-    position = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0]])
-    ends = [position[[0, 1]], position[[1, 2]], [position[2], [5.7, 0, 0]]]
-    spheres = yade_spheres(tmp_path / "a-spheres-0.vtk", position, [1, 1, 1])
-    lines = yade_lines(tmp_path / "a-intrs-0.vtk", ends)
-    with pytest.raises((ReadError, scanfab.PackingError, scanfab.ScanfabWarning), match="cell"):
-        scanfab.read(spheres, contacts=lines)
-
-
 @pytest.mark.parametrize(
     ("name", "reader", "kind"),
     [

@@ -1,15 +1,19 @@
-"""YADE's O.save: spheres, real contacts with their images, walls, the cell; and bad input."""
+"""YADE's O.save, and the cells that YADE writes beside its VTK files."""
 
 from __future__ import annotations
+
+import shutil
+import warnings
 
 import numpy as np
 import pytest
 
 import scanfab
-from scanfab.base.errors import ReadError
+from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.io.reader import reader_for
 from tests.helpers.dumps import small_save, write
 from tests.helpers.truth import (
+    SAMPLE_DATA,
     YADE,
     assert_same_vectors,
     centres,
@@ -122,3 +126,133 @@ def test_contact_fabric_is_what_yade_computes_itself():
     assert scanfab.contact_fabric(packing.contacts.normal).matrix == pytest.approx(
         np.array(yades), abs=5e-7
     )
+
+
+STRAINED = SAMPLE_DATA / "yade_strained"
+TRUTH = csv_rows(STRAINED / "truth.csv")
+pytestmark = pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabNote")
+
+
+def vectors():
+    """The true cells, shape (frames, 3, 3)."""
+    cells = np.zeros((len(TRUTH["step"]), 3, 3))
+    numbers = np.column_stack([TRUTH[name] for name in ("lx", "ly", "lz", "xy", "xz", "yz")])
+    cells[:, [0, 1, 2, 1, 2, 2], [0, 1, 2, 0, 0, 1]] = numbers
+    return cells
+
+
+def frames(pattern, **options):
+    return [frame.read() for frame in scanfab.read_series(STRAINED / pattern, **options)]
+
+
+@pytest.mark.parametrize("pattern", ["before-spheres-*", "after-spheres-*", "rec_*", "saved_*"])
+def test_every_frame_has_its_own_cell_and_all_contacts(pattern):
+    packings = frames(pattern.replace("_*", "_spheres.*"))
+    for packing, cell, contacts in zip(packings, vectors(), TRUTH["contacts"], strict=True):
+        np.testing.assert_allclose(packing.cell.vectors, cell, rtol=0, atol=1e-7)
+        assert packing.cell.periodic == (True, True, True)
+        # positions have six or seven digits
+        geometric = scanfab.find_contacts(packing).contacts
+        assert abs(len(geometric) - contacts) <= 3
+
+
+def test_contacts_of_the_exporter_come_along_and_one_file_has_its_own_cell():
+    found = [len(packing.contacts) for packing in frames("after-spheres-*")]
+    assert found == TRUTH["contacts"].tolist() == [261, 260, 256]
+    packing = scanfab.read(STRAINED / "after-spheres-00000001.vtk.gz")
+    np.testing.assert_allclose(packing.cell.vectors, vectors()[1], rtol=0, atol=1e-7)
+
+
+def test_the_user_is_told_where_the_cell_comes_from():
+    with pytest.warns(ScanfabNote, match=r"the cell is read from .*rec_pericell.\*.vtu, beside"):
+        frames("rec_spheres.*")
+
+
+def test_cells_that_were_overwritten_are_not_taken():
+    """Without files of interactions all cells have the number 0: the last one is left."""
+    with pytest.warns(ScanfabWarning, match=r"lone-periCell.*not each file of spheres has one"):
+        packings = frames("lone-spheres-*")
+    assert [packing.cell for packing in packings] == [None] * 3
+
+
+def test_the_cell_of_another_frame_is_refused(tmp_path):
+    """One file of spheres and one cell, whose number fits, but it is that of the last frame."""
+    for name in ("lone-spheres-00000000.vtk.gz", "lone-periCell-00000000.vtk.gz"):
+        shutil.copy(STRAINED / name, tmp_path)
+    with pytest.raises(ReadError, match=r"grains lie outside the cell of .*`cell=.FILE.csv"):
+        scanfab.read(tmp_path / "lone-spheres-00000000.vtk.gz")
+
+
+@pytest.mark.parametrize(
+    ("spheres", "own", "saved"),
+    [
+        ("saved_spheres.27500.vtu", "saved_spheres.27500.vtu", "saved_27500.xml.bz2"),
+        # the exporter counts its files: their numbers are no steps
+        ("after-spheres-00000001.vtk.gz", "x-spheres-00017500.vtk.gz", "x_17500.xml.bz2"),
+    ],
+)
+def test_a_saved_state_of_another_step_is_not_taken(tmp_path, spheres, own, saved):
+    shutil.copy(STRAINED / spheres, tmp_path / own)
+    shutil.copy(STRAINED / "saved_17500.xml.bz2", tmp_path / saved)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", "the cell is read from")
+        assert scanfab.read(tmp_path / own).cell is None
+
+
+def test_the_user_s_own_cell_comes_first():
+    packing = scanfab.read(STRAINED / "rec_spheres.17500.vtu", cell=(1.0, 1.0, 1.0))
+    assert np.diag(packing.cell.vectors).tolist() == [1.0, 1.0, 1.0]
+    assert scanfab.read(STRAINED / "rec_spheres.17500.vtu", periodic="").is_periodic is False
+
+
+def test_the_file_of_a_cell_is_not_passed_over(tmp_path):
+    for name in ("rec_spheres.17500.vtu", "rec_pericell.17500.vtu"):
+        shutil.copy(STRAINED / name, tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        scanfab.read_series(tmp_path)
+
+
+@pytest.mark.parametrize("key", ["frame", "step"])
+def test_cells_of_the_frames_come_from_a_csv_file(tmp_path, key):
+    """By frame, or by the step in the names of the recorder's files."""
+    header, *rows = (STRAINED / "truth.csv").read_text().splitlines()
+    path = tmp_path / "cells.csv"
+    if key == "frame":
+        header = header.replace("step", "frame")
+        rows = [f"{number},{row.partition(',')[2]}" for number, row in enumerate(rows)]
+    path.write_text("\n".join([header, *rows]) + "\n")
+    packings = frames("lone-spheres-*" if key == "frame" else "rec_spheres.*", cell=path)
+    for packing, cell in zip(packings, vectors(), strict=True):
+        np.testing.assert_array_equal(packing.cell.vectors, cell)
+
+
+def test_a_frame_that_the_csv_file_does_not_name_is_an_error_that_names_it(tmp_path):
+    path = tmp_path / "cells.csv"
+    path.write_text("step,lx,ly,lz\n17500,1,1,1\n37500,1,1,1\n")
+    with pytest.raises(
+        ReadError, match=r"cells.csv: has no row with the cell of .* step 27500.*27500.vtu"
+    ):
+        frames("rec_spheres.*", cell=path)
+
+
+@pytest.mark.parametrize("file", ["after-periCell-00000002.vtk.gz", "rec_pericell.27500.vtu"])
+def test_a_cell_of_yade_is_no_file_of_the_cells_of_all_frames(file):
+    with pytest.raises(ReadError, match=f"{file}: expected the columns step or frame, and lx"):
+        frames("rec_spheres.27500*", cell=STRAINED / file)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("step,lx,ly\n0,1,1\n", "expected .*step or frame, and lx, ly, lz.*found step, lx"),
+        ("frame,lx,ly,lz,xy\n0,1,1,1,0\n", "lx, ly, lz, xy, xz, yz, found"),
+        ("frame,lx,ly,lz\n0,1,0,1\n", "line 2: expected .*above 0: lx, ly, lz"),
+        ("frame,lx,ly,lz\n0,1,1,1\n0,1,1,2\n", "line 3: frame 0 occurs twice"),
+    ],
+)
+def test_a_csv_file_of_cells_that_is_wrong_is_an_error_that_says_where(tmp_path, text, message):
+    path = tmp_path / "cells.csv"
+    path.write_text(text)
+    with pytest.raises(ReadError, match=f"cells.csv.*{message}"):
+        scanfab.read_series(STRAINED / "rec_spheres.*", cell=path)

@@ -297,12 +297,12 @@ def test_lobes_below_the_noise_are_called_so(largest, end):
 
 
 def test_lengths_have_the_mean_of_the_table(scanned, computed):
-    samples = figure_of(scanned, "histogram").samples
-    for sample, frame in zip(samples, (0, 6), strict=True):
+    """The cut-off is one smallest radius, the unit of the lengths."""
+    for length, frame in zip(figure_of(scanned, "histogram").lengths, (0, 6), strict=True):
         row = row_of(computed, frame)
-        kept = sample.length[sample.length >= sample.cutoff]
-        assert len(sample.length) > 10_000
-        assert kept.mean() == pytest.approx(row["mean_length"] / row["cutoff"], rel=0.03)
+        assert len(length) > 10_000
+        mean = length[length >= 1.0].mean()
+        assert mean == pytest.approx(row["mean_length"] / row["cutoff"], rel=0.03)
 
 
 def test_cut_offs_have_the_values_and_errors_of_the_table(scanned, computed):

@@ -178,7 +178,7 @@ def test_a_table_without_void_fabric_is_told(table, tmp_path, capsys):
 def test_text_is_escaped_everywhere(table, monkeypatch):
     """The page's structure does not depend on what the names are."""
 
-    monkeypatch.setattr("scanfab.viz.report.report._table_pictures", lambda *_: [])
+    monkeypatch.setattr("scanfab.viz.report.report.make_figures", lambda *_, **__: [])
 
     class Tags(HTMLParser):
         def __init__(self, page):
