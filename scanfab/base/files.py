@@ -10,7 +10,7 @@ import os
 import re
 import stat
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -51,13 +51,33 @@ def check_file(path: Path, expected: str = "a file", instead: str = "") -> None:
 
 
 def check_folder(path: Path) -> None:
-    """Raise SettingsError if the folder of a file does not exist or cannot be written to."""
+    """Raise SettingsError if a file cannot be written here; pipes and devices can."""
+    if kind_of(path) == "a socket" or path.is_dir():
+        what = "a folder" if path.is_dir() else "a socket"
+        raise SettingsError(f"{path}: is {what}: name a file to write")
     if kind_of(path) is not None:
         return
     if not path.parent.is_dir():
         raise SettingsError(f"{path}: there is no folder {path.parent} to write to")
     if not os.access(path.parent, os.W_OK):
         raise SettingsError(f"{path}: the folder {path.parent} cannot be written to")
+
+
+def refuse_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path]) -> None:
+    """Raise SettingsError if a file to write is one that is read, by whatever path or link."""
+    read = dict[tuple[int, int], Path]()
+    for path in inputs:
+        with suppress(OSError):
+            found = path.stat()
+            read[found.st_dev, found.st_ino] = path
+    for path in filter(None, outputs):
+        with suppress(OSError):
+            found = path.stat()
+            if (found.st_dev, found.st_ino) in read:
+                source = read[found.st_dev, found.st_ino]
+                raise SettingsError(
+                    f"{path}: would replace the input {source}: name another file to write"
+                )
 
 
 @contextmanager

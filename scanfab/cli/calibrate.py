@@ -10,7 +10,15 @@ import click
 
 import scanfab
 from scanfab.cli.console import announce, draw, is_readable, print_csv, print_rows, working
-from scanfab.cli.options import SourceCommand, checked, excerpt_of, open_one, options, take_output
+from scanfab.cli.options import (
+    SourceCommand,
+    checked,
+    excerpt_of,
+    open_one,
+    options,
+    take_output,
+    usage_errors,
+)
 from scanfab.pipeline.options import as_options
 
 if TYPE_CHECKING:
@@ -60,6 +68,7 @@ def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
     the findings go to standard error.
     """
     from scanfab.base.column import columns_of_fields
+    from scanfab.base.files import refuse_inputs
     from scanfab.pipeline.calibration import StepRow
     from scanfab.pipeline.record import asked_for, repeat_command
     from scanfab.table.writing import write_rows
@@ -69,6 +78,8 @@ def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
     reading, settings = checked(chosen, scanfab.Settings)
     excerpt = excerpt_of(outputs, columns)
     series = open_one(sources, reading, "calibrated")
+    with usage_errors():
+        refuse_inputs([outputs.output, outputs.plot], series.files())
     announce([series], settings.workers)
     with working():
         result = scanfab.calibrate(series, frame=frame, **vars(settings))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -16,6 +17,7 @@ from scanfab.cli.options import (
     options,
     tables_argument,
     take_output,
+    usage_errors,
 )
 
 if TYPE_CHECKING:
@@ -59,6 +61,7 @@ def compare(tables: tuple[str, ...], summary: bool, differences: bool, **chosen:
     largest absolute value. With --summary each source and variant has a row with the slope of void
     fabric on contact fabric. A terminal shows both tables.
     """
+    from scanfab.base.files import refuse_inputs
     from scanfab.table.selection import choose_rows
     from scanfab.table.writing import ALL, write_rows
 
@@ -66,6 +69,8 @@ def compare(tables: tuple[str, ...], summary: bool, differences: bool, **chosen:
     if summary and differences:
         raise click.UsageError("--summary and --differences print different tables: choose one")
     check_labels(chosen["labels"], tables)
+    with usage_errors():
+        refuse_inputs([outputs.output, outputs.plot], map(Path, tables))
     read = [(table, scanfab.read_rows(table)) for table in tables]
     rows = [row for table in choose_rows(read, chosen["cutoff"], chosen["labels"]) for row in table]
     comparison = scanfab.compare_tables(rows, strain_max=chosen["strain_max"])

@@ -29,11 +29,13 @@ def report(tables: tuple[Path, ...], output: Path, author: str | None, **chosen:
     TABLE is a table that scanfab compute -o wrote. Settings, versions and the source of the 3D view
     come from TABLE.manifest.json beside it; without this file the report says they are unknown.
     """
+    from scanfab.base.files import refuse_inputs
     from scanfab.viz.report.page import check_page_file
 
     check_labels(chosen["labels"], tables)
     with usage_errors():
         check_page_file(output)
+        refuse_inputs([output], tables)
     announce()
     author = _full_name() if author is None else author
     with working():

@@ -14,7 +14,7 @@ from scanfab.cli.options import checked, excerpt_of, open_series, take_output, u
 from scanfab.cli.settings_file import as_listed
 from scanfab.cli.signals import ending_in_order, telling
 from scanfab.pipeline.maps.settings import MapSettings
-from scanfab.pipeline.options import Output
+from scanfab.pipeline.options import Output, as_options
 from scanfab.pipeline.settings import Settings
 
 if TYPE_CHECKING:
@@ -73,6 +73,7 @@ def write_table(sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Set
                 excerpt,
                 resume=resume,
                 manifest_path=outputs.manifest,
+                drawn=[] if outputs.plot is None else [outputs.plot],
                 more={"settings_file": listed} if (listed := as_listed(ctx)) else {},
                 observers=vtk_folders(vtk, len(series), settings, resume) if vtk else (),
                 told=ctx.obj,
@@ -126,8 +127,17 @@ def _write(job: Job, excerpt: Excerpt) -> None:
     # decided here, because a signal handler calls `_standing` at any moment
     as_table = job.output is None and is_readable()
     standing = partial(_standing, job, as_table)
+
+    def words() -> str:
+        ranges = (
+            f"\nscanfab: {as_options(note.told(where))}"
+            for series in job.notes
+            for note, where in series.ranges()
+        )
+        return standing() + "".join(ranges)
+
     try:
-        with telling(standing):
+        with telling(words):
             with working(job.frames, job.done) as advance:
                 if job.output is not None:
                     job.write(advance)

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import SettingsError, note
-from scanfab.base.files import check_folder, whole_file
+from scanfab.base.files import check_folder, refuse_inputs, whole_file
 from scanfab.base.option import refuse_unknown
 from scanfab.io.companions import HEADS, companion_kind, companion_there, companions_of
 from scanfab.io.files import COMPRESSED_SUFFIXES, bare_name
-from scanfab.io.options import parse_frames
+from scanfab.io.options import READING_OPTIONS, parse_frames
 from scanfab.io.reader import installed_readers
 from scanfab.io.series import Series
 from scanfab.io.sources import READING, read_series
@@ -92,7 +92,13 @@ def convert(
     pattern = out / f"frame_{STEP}{writer.extensions[0]}" if is_folder else out
     check_folder(pattern if out.is_dir() else out)
     refuse_unknown("convert", reading, [*READING, "to", "frames"])
-    packings = _packings(source, parse_frames("frames", frames), reading)
+    if isinstance(source, str | os.PathLike):
+        source = read_series(source, **reading)
+    elif reading:
+        raise SettingsError(f"`{next(iter(reading))}` is for files that are not read yet")
+    chosen = parse_frames("frames", frames)
+    inputs = _inputs_to_keep(source, chosen, writer) if isinstance(source, Series) else []
+    packings = _packings(source, chosen)
     if STEP not in pattern.name:
         # look for a second frame before the file is written
         first = list(islice(packings, 2))
@@ -109,6 +115,7 @@ def convert(
         if path in written:
             both = f"{written[path]} and {number}"
             raise SettingsError(f"{path}: the frames {both} have the same step: choose by `frames`")
+        refuse_inputs([path], inputs)
         path.parent.mkdir(exist_ok=True)
         save_packing(packing, path, writer)
         written[path] = number
@@ -118,12 +125,19 @@ def convert(
     return list(written)
 
 
-def _packings(source: Any, chosen: slice, reading: dict[str, Any]) -> Iterator[tuple[int, Packing]]:
+def _inputs_to_keep(series: Series, chosen: slice, writer: Writer) -> list[Path]:
+    """The files that must not be replaced: all, unless the new files lose nothing of them."""
+    every, reader = range(len(series)), series.grains.reader
+    usual = {option.name: option.default for option in READING_OPTIONS}
+    is_plain = all(not value or value == usual[name] for name, value in series.reading.items())
+    is_whole = series.is_whole and every[chosen] == every
+    if is_whole and is_plain and reader is not None and reader.name == writer.name:
+        return []
+    return list(series.files())
+
+
+def _packings(source: Any, chosen: slice) -> Iterator[tuple[int, Packing]]:
     """The chosen packings with the numbers of their frames."""
-    if isinstance(source, str | os.PathLike):
-        source = read_series(source, **reading)
-    elif reading:
-        raise SettingsError(f"`{next(iter(reading))}` is for files that are not read yet")
     if isinstance(source, Series):
         for family in source.contacts:
             if companion_kind(family.largest) is None:

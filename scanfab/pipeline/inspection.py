@@ -70,6 +70,8 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
     """
     frames, any_chosen = Frames(series, settings), False
     window: Window | None = None
+    if settings.reference is not None and (reference := frames.reference()) is not None:
+        window = _rv(frames, reference[2])
     for number, frame in enumerate(series.whole):
         if number in frames.chosen:
             any_chosen = True

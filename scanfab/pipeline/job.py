@@ -13,12 +13,17 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ReadError, SettingsError, note
-from scanfab.base.files import check_folder
+from scanfab.base.files import check_folder, refuse_inputs
 from scanfab.io.follow import FollowedSeries
 from scanfab.io.options import take_reading
 from scanfab.io.series import Series
 from scanfab.pipeline.compute import Observer, compute_frames
-from scanfab.pipeline.frames import NoChosenFrameError, chosen_frames, of_whole
+from scanfab.pipeline.frames import (
+    NoChosenFrameError,
+    chosen_frames,
+    number_of_reference,
+    of_whole,
+)
 from scanfab.pipeline.record import (
     FREE,
     FrameRows,
@@ -30,6 +35,7 @@ from scanfab.pipeline.record import (
     read_table,
     write_manifest,
 )
+from scanfab.pipeline.series_notes import SeriesNotes
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.told import Told
 from scanfab.pipeline.values import as_written
@@ -74,6 +80,8 @@ class Job:
     """A further file for the manifest."""
     more: Mapping[str, Any] = field(default_factory=dict)
     """Further entries of the manifest."""
+    drawn: Sequence[Path] = ()
+    """Figures that are drawn of the table."""
     observers: Sequence[Observer] = ()
     """One function for each series, called with the result of each frame that is computed now."""
     told: Told = field(default_factory=Told)
@@ -81,6 +89,8 @@ class Job:
     executor: Executor | None = None
     """As for :func:`scanfab.compute`."""
 
+    notes: list[SeriesNotes] = field(init=False)
+    """What there is to say of each series."""
     asked: dict[str, Any] = field(init=False)
     """The settings that decide the bytes of the table, from :func:`asked_for`."""
     finished: FrameRows = field(default_factory=dict, init=False)
@@ -105,11 +115,21 @@ class Job:
         sources = [source for one in self.series for source in one.sources or (one.name,)]
         reading = take_reading(dict(self.series[0].reading))
         self.asked = asked_for(sources, reading, self.settings, self.excerpt)
+        references = {number_of_reference(one, self.settings) for one in self.series}
+        if len(references) == 1:
+            # counted from the start, so that a longer series has another reference
+            self.asked["reference"] = references.pop()
+        self.notes = [SeriesNotes(self.settings) for _ in self.series]
         if self.manifest_path is not None:
             check_folder(self.manifest_path)
+        outputs = [*self.drawn, self.manifest_path, self.output]
         if self.output is not None:
             check_output(self.output)
             self._part = PartFile(self.output)
+            outputs.append(manifest_of(self.output))
+        listed = self.more.get("settings_file", {})
+        more = [*named_files(self.asked), *[Path(listed["path"])] * bool(listed)]
+        refuse_inputs(outputs, [*more, *(path for one in self.series for path in one.files())])
 
     @property
     def found_void_fabric(self) -> bool:
@@ -233,7 +253,12 @@ class Job:
             done = {frame for source, frame in self.finished if source == one.name}
             observe = self.observers[place] if self.observers else None
             computed = compute_frames(
-                one, self.settings, done=done, observe=observe, executor=self.executor
+                one,
+                self.settings,
+                done=done,
+                observe=observe,
+                executor=self.executor,
+                notes=self.notes[place],
             )
             try:
                 for rows in computed:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ReadError, SettingsError, warn
+from scanfab.base.files import refuse_inputs
 from scanfab.io.families import PathLike
 from scanfab.io.options import parse_frames
 from scanfab.pipeline.record import FREE, Record, part_of, read_table, write_manifest
@@ -74,8 +75,7 @@ def merge_tables(
     chosen = parse_frames("frames", frames)
     if output is not None:
         check_output(Path(output))
-        if Path(output).resolve() in [path.resolve() for path in paths]:
-            raise SettingsError(f"{output}: is one of the parts: name another `output=FILE`")
+        refuse_inputs([Path(output)], paths)
     records = [_read(path) for path in paths]
     manifest = _joined_manifest(records, chosen)
     rows = [
