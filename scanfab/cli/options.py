@@ -15,6 +15,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from scanfab.base.errors import ReadError, SettingsError, UnknownFormatError
+from scanfab.base.files import kind_of
 from scanfab.base.option import GROUPS, Option
 from scanfab.cli.console import AS_CSV, Command
 from scanfab.cli.settings_file import take_settings_file, tell_used
@@ -169,7 +170,10 @@ def _completed(
 def _output(ctx: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
     """The output file; ``-`` means CSV on standard output, even on a terminal."""
     ctx.meta[AS_CSV] = path == Path("-")
-    return None if path == Path("-") else path
+    if path is not None and kind_of(path) == "a device":
+        # a terminal or /dev/null takes what standard output would
+        sys.stdout, ctx.meta[AS_CSV] = ctx.with_resource(open(path, "w")), True  # noqa: SIM115
+    return None if ctx.meta[AS_CSV] else path
 
 
 def take_output(chosen: dict[str, Any], *kinds: str) -> Output:

@@ -71,7 +71,7 @@ def _read(path: Path) -> dict[str, Any]:
 
     try:
         content = tomllib.loads(path.read_text("utf-8"))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         advice = 'text needs quotes, as in boundary = "type=2"'
         raise click.UsageError(f"{path}: {error}: {advice}") from None
     for name, value in content.items():

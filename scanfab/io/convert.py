@@ -127,11 +127,11 @@ def convert(
 
 def _inputs_to_keep(series: Series, chosen: slice, writer: Writer) -> list[Path]:
     """The files that must not be replaced: all, unless the new files lose nothing of them."""
-    every, reader = range(len(series)), series.grains.reader
+    every, files = range(len(series)), series.grains.files.values()
     usual = {option.name: option.default for option in READING_OPTIONS}
     is_plain = all(not value or value == usual[name] for name, value in series.reading.items())
     is_whole = series.is_whole and every[chosen] == every
-    if is_whole and is_plain and reader is not None and reader.name == writer.name:
+    if is_whole and is_plain and all(file.suffix in writer.extensions for file in files):
         return []
     return list(series.files())
 

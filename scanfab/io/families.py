@@ -201,6 +201,24 @@ def _family_of(
         return replace(family, problem=str(error))
 
 
+def in_one_series(families: Sequence[Family]) -> Family:
+    """Files that were named one by one, of one reader, as one series in natural order."""
+    files = [file for family in families for file in family.files.values()]
+
+    def natural(file: Path) -> list[tuple[bool, int, str]]:
+        words = re.split(r"(\d+)", str(file))
+        return [(w.isdigit(), int(w) if w.isdigit() else 0, w) for w in words if w]
+
+    ordered = dict[int | None, Path](enumerate(sorted(files, key=natural)))
+    return replace(
+        families[0],
+        pattern=some(list(map(str, ordered.values()))),
+        files=ordered,
+        has_steps=False,
+        clash=None,
+    )
+
+
 def _glob(members: list[Path], among: Iterable[Path]) -> str:
     """A glob with stars for the numbers that differ; a list of names if it matches other files."""
     numbers = [NUMBER.findall(file.name) for file in members]

@@ -195,7 +195,9 @@ def _series(given: Sequence[PathLike], contacts: PathLike, options: ReadOptions)
     if options.format is None:
         families = sorting.without_tables(families, paths)
     grains = _choose_grains(paths, families, options)
-    _tell_skipped([one for one in families if one is not grains and one.kind != "contacts"])
+    taken = set(grains.files.values())
+    others = [one for one in families if taken.isdisjoint(one.files.values())]
+    _tell_skipped([one for one in others if one.kind != "contacts"])
     chosen, origin = _choose_contacts(grains, families, groups if around else [], contacts, options)
     for family in (grains, *chosen):
         if family.clash is not None:
@@ -218,6 +220,9 @@ def _choose_grains(
         grains = [family for family in families if family.kind == kind]
         if len(grains) == 1:
             return grains[0]
+        is_named = not any(path.is_dir() for path in paths)
+        if grains and is_named and len({f.reader and f.reader.name for f in grains}) == 1:
+            return sorting.in_one_series(grains)
         if grains:
             ends = dict.fromkeys(GRAINS, "") | {"points": "; it has no radius: `radius=L`"}
             candidates = [family for kind in GRAINS for family in families if family.kind == kind]

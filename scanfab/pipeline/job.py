@@ -127,9 +127,10 @@ class Job:
             check_output(self.output)
             self._part = PartFile(self.output)
             outputs.append(manifest_of(self.output))
-        listed = self.more.get("settings_file", {})
-        more = [*named_files(self.asked), *[Path(listed["path"])] * bool(listed)]
-        refuse_inputs(outputs, [*more, *(path for one in self.series for path in one.files())])
+        inputs = [path for one in self.series for path in one.files()]
+        if listed := self.more.get("settings_file"):
+            inputs.append(Path(listed["path"]))
+        refuse_inputs(outputs, [*inputs, *named_files(self.asked)])
 
     @property
     def found_void_fabric(self) -> bool:

@@ -85,6 +85,9 @@ class Record(NamedTuple):
             raise SettingsError(f"{path}: {error}") from None
         found = FrameRows()
         for row in rows:
+            if wrong := [name for name, value in row.items() if value != value]:
+                expected = "expected a number or an empty cell, found nan"
+                raise SettingsError(f"{path}: {expected} in the column {wrong[0]}")
             complete = row_of(settings.columns, row)
             found.setdefault((row["source"], row["frame"]), []).append(complete)
         inputs = {str(entry.get("path")): entry for entry in manifest["inputs"]}
@@ -224,7 +227,11 @@ def input_entry(path: Path) -> dict[str, Any]:
     found = path.stat()
     # only the bytes up to this size count, since a simulation may write more meanwhile
     digest, _ = hash_of(path, found.st_size, found.st_mtime_ns)
-    return {"path": str(path), "size": found.st_size, "sha256": digest}
+    return {
+        "path": without_temporary(str(path)).replace("standard input", "-"),
+        "size": found.st_size,
+        "sha256": digest,
+    }
 
 
 @cache
