@@ -34,6 +34,7 @@ from scanfab.base.errors import ReadError, SettingsError, note
 from scanfab.base.files import locked, named_errors, whole_file
 from scanfab.base.option import flag_of, options_of
 from scanfab.base.spelling import counted, shortest
+from scanfab.io.files import without_temporary
 from scanfab.io.options import READING_OPTIONS
 from scanfab.io.series import Series
 from scanfab.io.sources import READING, open_sources
@@ -227,11 +228,9 @@ def input_entry(path: Path) -> dict[str, Any]:
     found = path.stat()
     # only the bytes up to this size count, since a simulation may write more meanwhile
     digest, _ = hash_of(path, found.st_size, found.st_mtime_ns)
-    return {
-        "path": without_temporary(str(path)).replace("standard input", "-"),
-        "size": found.st_size,
-        "sha256": digest,
-    }
+    name = without_temporary(str(path))
+    name = "-" if name == "standard input" else name
+    return {"path": name, "size": found.st_size, "sha256": digest}
 
 
 @cache
