@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
-from scanfab.base.errors import Note, PackingError, joined
+from scanfab.base.errors import Note, PackingError, ScanfabNote, joined
 from scanfab.base.spelling import spelt_apart
 from scanfab.io.frame import Frame
 from scanfab.io.series import other_space
@@ -18,7 +18,7 @@ from scanfab.pipeline.frames import packing_of, sample_rule
 from scanfab.pipeline.maps.rows import map_rows
 from scanfab.pipeline.measurement import Measurement, measure
 from scanfab.pipeline.plan import Plan
-from scanfab.pipeline.rv import RV, doubts_of_rv
+from scanfab.pipeline.rv import RV, empty_rvs
 from scanfab.pipeline.state import refuse_forces
 from scanfab.pipeline.variant_columns import VariantColumns
 from scanfab.scan.blocks import Blocks
@@ -114,7 +114,7 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
         return FrameResult(source, number, frame, (), list(_empty_rows(known, plan)))
     rvs, plan = plan.rvs, plan.in_frame(frame)
     notes = frame.doubts_of_escaped()
-    notes += [note for rv in plan.rvs for note in doubts_of_rv(rv, frame)]
+    notes += empty_rvs(plan.rvs)
     if plan.map_blocks is not None:
         rows, told, blocks = map_rows(frame, plan, known, f"frame {number}")
         return FrameResult(source, number, frame, (), rows, (*notes, *told), blocks)
@@ -135,7 +135,7 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
     few = tuple(dict.fromkeys(row.variant for row in result.rows if 0 < row.grains < FEW_GRAINS))
     if few:
         text = f"fewer than {FEW_GRAINS} grains: the numbers of these rows mean little"
-        doubts.append(Note("few_grains", text, few))
+        doubts.append(Note("few_grains", text, few, ScanfabNote))
     notes += [note for measurement in result.measurements for note in measurement.notes]
     notes += [*joined(doubts), *_large_errors(result.rows, plan)]
     return replace(result, notes=tuple(notes))

@@ -15,7 +15,7 @@ from scanfab.base.errors import Note
 from scanfab.base.shapes import sphere
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.measured import BlockedSums, void_scatter
-from scanfab.packing.sample import VARIANTS, Sample, Variant
+from scanfab.packing.sample import Sample, Variant
 from scanfab.packing.window import Window, inner_ellipsoid
 from scanfab.pipeline.plan import NOISE, Plan
 from scanfab.pipeline.tolerance import scan_to_tolerance
@@ -112,13 +112,6 @@ def measure(sample: Sample, plan: Plan, where: str = "the frame") -> list[Measur
 def _measure(sample: Sample, plan: Plan, where: str) -> Measurement:
     """Scan fewer lines for the sample's error, which may set the tolerance, then all lines."""
     solids = solids_of(sample, plan.window, variants=plan.variants, edge=plan.settings.edge)
-    if plan.rvs and plan.rvs[0].lack and all(VARIANTS[name].in_window for name in plan.variants):
-        # nothing is measured in this RV
-        none = np.zeros(len(solids.radius), bool)
-        solids = replace(
-            solids, position=solids.position[none], radius=solids.radius[none],
-            removed=solids.removed[none], around=None,
-        )  # fmt: skip
     blocks = _octants(sample, plan)
     blocked, rule = _scan_octants(solids, plan, blocks)
     aims: dict[str, float] = {}
@@ -130,8 +123,9 @@ def _measure(sample: Sample, plan: Plan, where: str) -> Measurement:
             scatter = void_scatter(blocked_sums(blocked, rule, plan, name, place), axis, plan.space)
             aims[name] = plan.settings.aim(None if scatter is None else scatter.error)
         held = [aims[name] for name in plan.variants if blocked.in_blocks(name, place)[1].any()]
-        # without any grain, wide lines show that there is none
-        plan = plan.aiming_at(min(held)) if held else replace(plan.aiming_at(1.0), auto="")
+        is_empty = not held or (plan.window is not None and plan.rvs[0].lack != "")
+        # wide lines tell the solid fraction where there is no fabric to be measured
+        plan = replace(plan.aiming_at(1.0), auto="") if is_empty else plan.aiming_at(min(held))
     sums, plan, notes = scan_to_tolerance(solids, plan, aims, where)
     gaps = _all_gaps(solids, plan, sums, blocks)
     return Measurement(sample, plan, solids, sums, gaps, blocked, rule, blocks, tuple(notes))

@@ -17,7 +17,7 @@ from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.maps.blocks import MapBlocks
 from scanfab.pipeline.maps.settings import MapSettings
-from scanfab.pipeline.rv import RV, Deformation, in_sample, rvs_of
+from scanfab.pipeline.rv import RV, Deformation, doubts_of_rv, in_sample, rvs_of
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import Strains
 from scanfab.scan.directions import DirectionRule, usual_rule
@@ -213,7 +213,8 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     window, windows = plan.window, plan.windows
     for one in windows:
         one.check_fits(packing)
-    notes, blocks, deformation = list[Note](), None, None
+    notes = [note for one in windows for note in doubts_of_rv(one, sample)]
+    blocks = deformation = None
     if isinstance(settings, MapSettings):
         blocks = MapBlocks.of(settings, sample)
         notes += blocks.doubts(sample, window)

@@ -11,7 +11,7 @@ import numpy as np
 
 from scanfab.base import shapes
 from scanfab.base.convex import Convex
-from scanfab.base.errors import Note, SettingsError
+from scanfab.base.errors import Note, ScanfabNote, SettingsError
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.io.surface import read_surface
@@ -140,27 +140,29 @@ def in_sample(rv: RV, sample: Sample) -> RV:
     return rv._replace(lack=lack)
 
 
-def doubts_of_rv(rv: RV, sample: Sample) -> Iterator[Note]:
-    """A note if an RV has no void fabric in a sample, or if it lies near the sample's surface."""
-    if rv.window is None:
-        return
-    size = "" if rv.fraction is None else f"_{rv.fraction:g}"
-    if rv.lack:
-        yield Note(
-            f"empty_rv{size}",
-            f"{rv.lack}, so c and d have no void fabric: choose another `rv_center` or `rv`, "
-            f"{RV_MEANING}, another frame for its place (such as `reference=-1`), or let it move "
-            f'with the sample (`rv_follows="strain"`, `strain="grains"`)',
-        )
-        return
+def empty_rvs(rvs: Iterable[RV]) -> Iterator[Note]:
+    """A note for each RV that has no void fabric in a frame: why, and what to do."""
+    for rv in rvs:
+        if rv.lack:
+            size = "" if rv.fraction is None else f"_{rv.fraction:g}"
+            yield Note(
+                f"empty_rv{size}",
+                f"{rv.lack}, so c and d have no void fabric: choose another `rv_center` or `rv`, "
+                f"{RV_MEANING}, another frame for its place (such as `reference=-1`), or let it "
+                f'move with the sample (`rv_follows="strain"`, `strain="grains"`)',
+                kind=ScanfabNote,
+            )
+
+
+def doubts_of_rv(window: Window, sample: Sample) -> list[Note]:
+    """A note if an RV lies near the surface of the sample."""
     largest = float(sample.packing.radius[sample.grains].max())
-    if SurfaceBox.of(sample.packing, sample.gathered).room_around(rv.window) < largest:
-        yield Note(
-            f"rv_at_surface{size}",
-            f"the {rv.window} comes closer to the sample's surface than the largest radius "
-            f"({largest:g}), so it cuts the outermost layer of grains, which the boundary "
-            f"arranges: choose a smaller `rv`, or use more grains",
-        )
+    room = SurfaceBox.of(sample.packing, sample.gathered).room_around(window)
+    text = (
+        f"the {window} comes closer to the sample's surface than the largest radius ({largest:g}), "
+        f"so it cuts the outermost grains, which the boundary arranges: choose a smaller `rv`"
+    )
+    return [Note("rv_at_surface", text)] if -2 * largest <= room < largest else []
 
 
 @dataclass(frozen=True, eq=False)

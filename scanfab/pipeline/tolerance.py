@@ -46,6 +46,8 @@ MARGIN, SIGMAS = 1.1, 2.5
 CLOSEST = 0.05
 # lines are set closer if a larger fraction of the directions of a replicate keeps no segment
 MOST_EMPTY = 0.005
+# without rattlers, what is left of a sample with a larger fraction of them is hardly a packing
+MOST_REMOVED = 0.9
 
 
 class Errors(NamedTuple):
@@ -233,16 +235,19 @@ class _AutoScan:
         """
         The variants whose errors decide when the scan ends.
 
-        A variant whose tolerance the budget cannot reach does not decide, so that the others need
-        not wait for it. If no variant remains, all decide.
+        A variant whose tolerance the budget cannot reach does not decide, nor does one that keeps
+        few grains, so that the others need not wait for it. If no variant remains, all decide.
         """
+        solids, variants = self.solids, self.plan.variants
+        removed = solids.removed if solids.medium is None else solids.medium.removed
+        if len(removed) and removed.mean() > MOST_REMOVED:
+            variants = "".join(name for name in variants if name in "ac") or variants
         # closer lines reduce the error more than further replicates do; and early estimates of the
         # error are uncertain, hence the factor GROWTH
         across = self.plan.space.dimension - 1
         growth = 1.0 + NOISE[across + 1].growth / across
         reach = GROWTH * (1.0 + self.left / self.sums.replicates) ** growth
-        within = [name for name in self.plan.variants if self._missing(name) <= reach]
-        return "".join(within) or self.plan.variants
+        return "".join(name for name in variants if self._missing(name) <= reach) or variants
 
     def _better_plan(self, missing: float, counted: str) -> Plan | None:
         """A better plan to start again with after the first round; None if it does not pay."""

@@ -118,8 +118,6 @@ class VariantColumns:
     def solid_fraction(self) -> float | None:
         """1 - void length / line length in the window, weighted over the directions."""
         cell, weights = self.sample.packing.cell, self.plan.rule.weights
-        if self.lack:
-            return None
         if self.window is None and not (cell is not None and cell.is_endless):
             return None
         length = float(weights @ self.sums.line_length[:, self.index].sum(axis=0))
@@ -166,6 +164,9 @@ class VariantColumns:
 
     def _doubts_of_void(self) -> dict[str, str]:
         sample, void = self.sample, self.measured.void
+        if self.lack:
+            # a note on the RV says why
+            return {}
         if not self.measured.meets_solids:
             with_rattlers = replace(self.variant, without_rattlers=False)
             rattlers = sample.number(sample.solids(with_rattlers, self.window))
