@@ -12,8 +12,7 @@ from scanfab.io.options import parse_frames
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.pipeline import values
 from scanfab.pipeline.values import AXES, SHAPES, STRAIN_MODES, Axis, Length, Vector, as_written
-from scanfab.scan.columns import EDGE_COLUMNS
-from scanfab.scan.edges import CLIP, EDGES, ENDS
+from scanfab.scan.edges import CLIP, EDGE_COLUMNS, EDGES, ENDS
 
 if TYPE_CHECKING:
     from scanfab.base.column import Column
