@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.jit import ONE, ZERO, Flag, inner
+from scanfab.base.jit import Flag, inner
 from scanfab.base.typing import FloatArray
 from scanfab.scan.kernels.strips import FAR, Counts, Line, Task
 from scanfab.scan.kernels.sweep import add, begins_in, counted, listed_to
@@ -270,19 +270,25 @@ def add_gaps(
 
 
 @inner(error_model="numpy")
-def count_gap(task: Task, which: int, line: Line, low: float, high: float, sign: float) -> None:
+def count_gaps(
+    task: Task, which: int, line: Line, ends: FloatArray, count: int, sign: float
+) -> None:
     """
-    Add one gap to the tallies or the bins, or take it off, with a sign of -1.
+    Add the first gaps of a list, all on one line, to the tallies or the bins, or take them off.
 
-    By the rule ``start`` nothing is added to the length of the void.
+    ``ends``: where they start and end, shape (2, M). With a sign of -1 they are taken off.
     """
     counts = task.counts
     if task.bins.cutoffs.size > 0:
-        one = room_for_gaps(ONE)
-        list_gap(one, ZERO, line, low, high, counts)
-        add_gaps(task.bins, counts, one, np.uint64(1), sign, which, line[1])
-    else:
+        gaps = room_for_gaps(count)
+        for k in range(count):
+            list_gap(gaps, k, line, ends[0, k], ends[1, k], counts)
+        add_gaps(task.bins, counts, gaps, np.uint64(count), sign, which, line[1])
+        return
+    for k in range(count):
+        low, high = ends[0, k], ends[1, k]
         a, b, c, d, e, f = counted(True, low, high, line[2], line[3], counts)
-        if counts.window is not None and counts.window.start is not None:
-            f = 0.0
+        if counts.window is not None and counts.window.start is not None and sign < 0.0:
+            # the sweep has added all its length to the void
+            f = max(high - low, 0.0)
         add(task.tally, which, (sign * a, sign * b, sign * c, sign * d, sign * e, sign * f))

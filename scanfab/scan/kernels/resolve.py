@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.jit import inner
+from scanfab.base.jit import ONE, inner
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.scan.kernels.bins import count_gap
+from scanfab.scan.kernels.bins import count_gaps
 from scanfab.scan.kernels.cells import Cells, Ray, next_solid, room_for_ray
 from scanfab.scan.kernels.grid import Spheres, sort_by, sphere_at
 from scanfab.scan.kernels.strips import (
@@ -127,30 +127,20 @@ def chords_of(
     return stop, chords
 
 
-@inner()
-def count_solved(task: Task, which: int, line: Line, low: float, high: float, sign: float) -> None:
-    """Count a gap, or take back what the sweep has counted of it, with a sign of -1."""
-    count_gap(task, which, line, low, high, sign)
-    window = task.counts.window
-    if window is not None and window.start is not None and task.bins.cutoffs.size == 0:
-        # the sweep has added all its length
-        inside = high - low if sign < 0.0 else min(high, line[3]) - max(low, line[2])
-        task.tally[which, WINDOW + VOID] += sign * max(inside, 0.0)
-
-
-@inner()
-def solve_line(
-    task: Task, which: int, line: Line, chords: FloatArray, order: IntArray, sign: float
-) -> float:
+@inner(error_model="numpy")
+def gaps_of(
+    line: Line, chords: FloatArray, order: IntArray, counts: Counts, gaps: FloatArray
+) -> tuple[int, float]:
     """
-    Count the gaps that the sweep settles on one line; returns where its last solid ends.
+    List the gaps that the sweep settles on one line, where they start and end, shape (2, M).
 
-    Chords ordered by their middles: as the sweep does it, and nothing more once the line is closed.
-    Chords ordered by their starts: exact, as none of them can reach back.
+    Returns their number and where the line's last solid ends. Chords ordered by their middles: as
+    the sweep does it, and nothing more once the line is closed. Chords ordered by their starts:
+    exact, as none of them can reach back.
     """
-    counts, enters, leaves = task.counts, line[2], line[3]
+    _, _, enters, leaves = line
     end, low, high = -FAR, -FAR, -FAR
-    before, behind = FAR, FAR
+    before, behind, count = FAR, FAR, 0
     if counts.window is not None and counts.window.start is not None:
         before, behind = counts.window.margin - enters, leaves + counts.window.margin
     elif counts.whole is None:
@@ -164,13 +154,14 @@ def solve_line(
             behind = min(behind, start) if start >= leaves else behind
             if not reaches_in(start, stop, enters, leaves):
                 continue
-        if start > end:
-            count_solved(task, which, line, begins_at(low, before), high, sign)
+        gaps[0, count], gaps[1, count] = begins_at(low, before), high
+        count += start > end
         end, low, high = moved(start, stop, end, low, high)
     if end < FAR:
-        count_solved(task, which, line, begins_at(low, before), high, sign)
-        count_solved(task, which, line, end, behind, sign)
-    return end
+        gaps[0, count], gaps[1, count] = begins_at(low, before), high
+        gaps[0, count + 1], gaps[1, count + 1] = end, behind
+        count += 2
+    return count, end
 
 
 @inner()
@@ -179,17 +170,21 @@ def solve_closed(task: Task, spheres: Spheres, chosen: IntArray, which: int, clo
     lines, strip = task.lines, task.strip
     first, place_of = closed_lines(task, which, closed)
     stop, chords = chords_of(task, spheres, chosen, which, first, place_of)
+    starts, gaps = chords[0], np.empty((2, chords.shape[1] + 2))
+    order = np.empty(starts.size, np.int64)
+    for k in range(order.size):
+        order[k] = k
     for number in range(closed):
         row, column = place_of[number] // strip.pitch, place_of[number] % strip.pitch
         u, v = strip.first_u + column * strip.spacing, strip.first_v + row * strip.spacing
         place = np.uint64(place_of[number])
         line = u, v, lines[place + ENTRY], lines[place + EXIT]
-        order, end = np.empty(stop[number + 1] - stop[number], np.int64), 0.0
-        for k in range(order.size):
-            order[k] = stop[number] + k
-        for sign in (-1.0, 1.0):
-            end = solve_line(task, which, line, chords, order, sign)
-            sort_by(chords[0], order)
+        its = order[stop[number] : stop[number + 1]]
+        count, _ = gaps_of(line, chords, its, task.counts, gaps)
+        count_gaps(task, which, line, gaps, count, -1.0)
+        sort_by(starts, its)
+        count, end = gaps_of(line, chords, its, task.counts, gaps)
+        count_gaps(task, which, line, gaps, count, 1.0)
         lines[place + SET * np.uint64(which) + END] = end
 
 
@@ -222,6 +217,19 @@ def followed(
 
 
 @inner(error_model="numpy")
+def add_followed(task: Task, which: int, line: Line, low: float, high: float, sign: float) -> None:
+    """Count a segment, or take it off; one without an end is among those that are left out."""
+    if high - low > 0.5 * FAR:
+        task.tally[which, LEFT] += 0.5
+        return
+    ends, void = np.empty((2, 1)), task.tally[which, WINDOW + VOID]
+    ends[0, 0], ends[1, 0] = low, high
+    count_gaps(task, which, line, ends, ONE, sign)
+    # the sweep has counted all void in the window
+    task.tally[which, WINDOW + VOID] = void
+
+
+@inner(error_model="numpy")
 def follow_measured(task: Task, which: int, measured: Measured, beyond: Beyond) -> None:
     """Tally the gaps that start in the measured length and end beyond what is listed of it."""
     lines, strip, tally, ray = task.lines, task.strip, task.tally, room_for_ray()
@@ -243,16 +251,7 @@ def follow_measured(task: Task, which: int, measured: Measured, beyond: Beyond) 
                 tally[which, CHANNELS] += 1.0
                 tally[which, WHOLE + VOID] += enters + measured.length - end
             elif far < FAR and not is_empty:
-                count_gap(task, which, line, end, end + far, 1.0)
-
-
-@inner(error_model="numpy")
-def add_followed(task: Task, which: int, line: Line, low: float, high: float, sign: float) -> None:
-    """Count a segment, or take it off; one without an end is among those that are left out."""
-    if high - low > 0.5 * FAR:
-        task.tally[which, LEFT] += 0.5
-    else:
-        count_gap(task, which, line, low, high, sign)
+                add_followed(task, which, line, end, end + far, 1.0)
 
 
 @inner(error_model="numpy")
