@@ -305,7 +305,7 @@ def cells_of(grains: CellGrains, width: float) -> Cells:
     farthest = [_farthest(grains, volume, solid) for solid in (slice(None), ~grains.removed)]
     return Cells(
         sphere, grains.removed[grain], vectors, inverse, corner, grains.periodic, parts, start,
-        np.array(farthest),
+        *farthest,
     )  # fmt: skip
 
 

@@ -162,7 +162,7 @@ def scan_axes(
         triad, offset, tally = axes.triads[axis], axes.offsets[axis], tallies[axis]
         whole = counts.whole is not None
         grid = open_grid(extent, triad, offset, axes.spacing, clip.reach, whole)
-        spheres = project(position, radius, removed, triad, grid)
+        spheres = project(position, radius, removed, triad, grid, clip.reach, counts.window)
         section = section_along(clip, triad)
         here = bins_along(bins, triad, axis)
         beyond = None

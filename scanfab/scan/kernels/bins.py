@@ -269,7 +269,7 @@ def add_gaps(
             sums[kind, of, place, SQUARE] += last_sum
 
 
-@inner(error_model="numpy")
+@inner(forceinline=True, error_model="numpy")
 def count_gaps(
     task: Task, which: int, line: Line, ends: FloatArray, count: int, sign: float
 ) -> None:

@@ -47,12 +47,10 @@ class Cells(NamedTuple):
     """Cells along each edge, shape (3,)."""
     start: IntArray
     """First entry of each cell, and behind the last one, first edge fastest."""
-    farthest: FloatArray
-    """
-    Rays that have met nothing so far stay in a channel; of periodic grains, a length.
-
-    Of rays that meet all grains, and of those that meet none that is removed, shape (2,).
-    """
+    farthest: float
+    """Rays that have met nothing so far stay in a channel; of periodic grains, a length."""
+    farthest_kept: float
+    """Likewise, of rays that meet no grain that is removed."""
 
 
 @inner(inline="always")
@@ -228,7 +226,8 @@ def next_solid(
     And the steps that this took: one for each cell and each grain in it.
     """
     found, steps = FAR, 0.0
-    parts, out, farthest = cells.parts, ray.out, cells.farthest[int(without_removed)]
+    parts, out = cells.parts, ray.out
+    farthest = cells.farthest_kept if without_removed else cells.farthest
     goes_on = begins_inside(cells, ray)
     while goes_on:
         number = cell_of(parts, ray.cell[0], ray.cell[1], ray.cell[2])

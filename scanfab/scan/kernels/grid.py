@@ -13,7 +13,7 @@ import numpy as np
 
 from scanfab.base.jit import LANES, ONE, inner
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
-from scanfab.scan.kernels.strips import FAR, Sphere, Strip, span
+from scanfab.scan.kernels.strips import FAR, Edge, Sphere, Strip, span
 
 # a bucket with more indices is sorted by itself, and not with all others
 FEW = 16
@@ -179,9 +179,20 @@ def sphere_at(spheres: Spheres, k: int | np.uint64) -> Sphere:
 
 @inner(error_model="numpy")
 def project(
-    position: FloatArray, radius: FloatArray, removed: BoolArray, triad: FloatArray, grid: Grid
+    position: FloatArray,
+    radius: FloatArray,
+    removed: BoolArray,
+    triad: FloatArray,
+    grid: Grid,
+    reach: float,
+    window: Edge | None,
 ) -> Spheres:
-    """The spheres that may meet a line, ordered by depth, in the triad with rows u, v, n."""
+    """
+    The spheres that may meet a line, ordered by depth, in the triad with rows u, v, n.
+
+    By the rule ``start`` without those that lie aside of the ball that holds the window, whose
+    radius is ``reach``, or more than the margin before or behind it.
+    """
     u_x, u_y, u_z = triad[0, 0], triad[0, 1], triad[0, 2]
     v_x, v_y, v_z = triad[1, 0], triad[1, 1], triad[1, 2]
     n_x, n_y, n_z = triad[2, 0], triad[2, 1], triad[2, 2]
@@ -191,12 +202,15 @@ def project(
         x, y, z = position[k, 0], position[k, 1], position[k, 2]
         found.u[count] = u = u_x * x + u_y * y + u_z * z
         found.v[count] = v = v_x * x + v_y * y + v_z * z
-        found.depth[count] = n_x * x + n_y * y + n_z * z
+        found.depth[count] = depth = n_x * x + n_y * y + n_z * z
         found.radius[count], found.removed[count] = radius[k], removed[k]
         # a row and a column within reach; whether they cross there, the visit will see
         column, row = (u - grid.first_u) * per_spacing, (v - grid.first_v) * per_spacing
         away = radius[k] * per_spacing
         meets = (np.floor(row + away) >= row - away) & (np.floor(column + away) >= column - away)
+        if window is not None and window.start is not None:
+            beyond, near = max(abs(depth) - window.margin, 0.0), reach + radius[k]
+            meets &= u * u + v * v + beyond * beyond <= near * near
         count += np.uint64(meets)
     return in_order(found, int(count))
 

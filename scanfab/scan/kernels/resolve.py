@@ -203,17 +203,15 @@ class Beyond(NamedTuple):
 
 @inner(forceinline=True, error_model="numpy")
 def followed(
-    task: Task, which: int, line: Line, beyond: Beyond, ray: Ray, depth: float, sign: float
-) -> float:
+    line: Line, beyond: Beyond, which: int, ray: Ray, depth: float, sign: float
+) -> tuple[float, float]:
     """How far from a place of a line the next solid is, along it or back; FAR if there is none."""
     triad = beyond.triad
     for i in range(3):
         ray.place[i] = line[0] * triad[0, i] + line[1] * triad[1, i] + depth * triad[2, i]
         ray.along[i] = sign * triad[2, i]
     without = beyond.without_removed or which == 1
-    far, steps = next_solid(beyond.cells, ray, without, beyond.most_steps)
-    task.tally[0, STEPS] += steps
-    return far
+    return next_solid(beyond.cells, ray, without, beyond.most_steps)
 
 
 @inner(error_model="numpy")
@@ -246,7 +244,8 @@ def follow_measured(task: Task, which: int, measured: Measured, beyond: Beyond) 
             if tally[0, STEPS] >= beyond.most_steps:
                 return
             line = u, v, enters, enters
-            far = followed(task, which, line, beyond, ray, end, 1.0)
+            far, steps = followed(line, beyond, which, ray, end, 1.0)
+            tally[0, STEPS] += steps
             if far == FAR and beyond.endless:
                 tally[which, CHANNELS] += 1.0
                 tally[which, WHOLE + VOID] += enters + measured.length - end
@@ -285,14 +284,17 @@ def follow_beyond(task: Task, which: int, edge: Edge, beyond: Beyond) -> None:
             u = strip.first_u + column * strip.spacing
             line = u, v, enters, leaves
             if begins_before:
-                far = followed(task, which, line, beyond, ray, enters - margin, -1.0)
+                far, steps = followed(line, beyond, which, ray, enters - margin, -1.0)
+                tally[0, STEPS] += steps
                 begins = enters - margin - far
                 if adds_on and far < FAR:
                     tally[which, WINDOW + LENGTH] += 0.5 * (-lines[state + BEFORE] - begins)
                 else:
-                    first = enters + followed(task, which, line, beyond, ray, enters, 1.0)
-                    add_followed(known, which, line, -lines[state + BEFORE], first, -1.0)
-                    add_followed(known, which, line, begins, first, 1.0)
+                    first, steps = followed(line, beyond, which, ray, enters, 1.0)
+                    tally[0, STEPS] += steps
+                    add_followed(known, which, line, -lines[state + BEFORE], enters + first, -1.0)
+                    add_followed(known, which, line, begins, enters + first, 1.0)
             if goes_on:
-                far = followed(task, which, line, beyond, ray, leaves + margin, 1.0)
+                far, steps = followed(line, beyond, which, ray, leaves + margin, 1.0)
+                tally[0, STEPS] += steps
                 add_followed(known, which, line, end, leaves + margin + far, 1.0)
