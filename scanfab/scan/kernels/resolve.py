@@ -214,7 +214,7 @@ def followed(
     return next_solid(beyond.cells, ray, without, beyond.most_steps)
 
 
-@inner(error_model="numpy")
+@inner(forceinline=True, error_model="numpy")
 def add_followed(task: Task, which: int, line: Line, low: float, high: float, sign: float) -> None:
     """Count a segment, or take it off; one without an end is among those that are left out."""
     if high - low > 0.5 * FAR:
