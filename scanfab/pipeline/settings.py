@@ -18,9 +18,8 @@ from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.rattlers import installed_rules
 from scanfab.pipeline import values
 from scanfab.pipeline.values import STRAIN_MODES, Axis, Length, Vector, as_written
-from scanfab.scan.columns import EDGE_COLUMNS
 from scanfab.scan.directions import RULES, DirectionRule, rule_of
-from scanfab.scan.edges import CLIP, EDGES, ENDS
+from scanfab.scan.edges import CLIP, EDGE_COLUMNS, EDGES, ENDS
 
 # This takes one processor one to two minutes, and is some hundred times what a frame of a dense
 # packing needs for the default tolerance.
