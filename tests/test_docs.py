@@ -108,7 +108,7 @@ def test_every_reader_rule_and_dependency_is_on_its_page() -> None:
     for name in installed_readers():
         assert f"(formats/{name}.md)" in overview
         assert (DOCS / "formats" / f"{name}.md").read_text("utf-8").startswith(f"# {name}\n")
-    for name, (_, argument) in RULES.items():
+    for name, (_, argument, *_) in RULES.items():
         assert f"`{name}:{argument}`" in method
     project = (ROOT / "pyproject.toml").read_text("utf-8")
     (listed,) = re.findall(r"\ndependencies = \[(.*?)\]", project, re.DOTALL)

@@ -22,11 +22,11 @@ from scanfab.pipeline.tolerance import scan_to_tolerance
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import DirectionRule, design_of, usual_rule
 from scanfab.scan.edges import CLIP, ENDS, START
-from scanfab.scan.following import FollowedTooFarError
 from scanfab.scan.gaps import GapSums, scan_gaps
 from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Inner, Solids, margin_of, most_lines
+from scanfab.scan.tallies import FollowedTooFarError
 
 # A separate scan measures the error due to the sample. Its replicates show its noise, which is
 # subtracted. A spacing in mean radii gives the same number of segments per grain in small and large

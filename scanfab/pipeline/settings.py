@@ -28,9 +28,8 @@ from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.rattlers import installed_rules
 from scanfab.pipeline import values
 from scanfab.pipeline.values import STRAIN_MODES, Axis, Length, StandardError, Vector, as_written
-from scanfab.scan.columns import EDGE_COLUMNS
 from scanfab.scan.directions import RULES, DirectionRule, rule_of
-from scanfab.scan.edges import CLIP, EDGES, ENDS
+from scanfab.scan.edges import CLIP, EDGE_COLUMNS, EDGES, ENDS
 
 # A scan of so many chords takes one processor one to two minutes. A frame of a dense packing needs
 # some hundred times less for a tolerance of 1e-4, and a tenth of it is the limit if the tolerance

@@ -18,9 +18,9 @@ from scanfab.fabric.void import void_fabric
 from scanfab.pipeline.plan import NOISE, Plan
 from scanfab.pipeline.settings import MAX_CHORDS
 from scanfab.scan.directions import design_of, rule_of
-from scanfab.scan.following import FollowedTooFarError
 from scanfab.scan.scan import ScanSums, scan_lines
 from scanfab.scan.solids import Solids, is_affordable, most_lines
+from scanfab.scan.tallies import FollowedTooFarError
 
 LOGGER = logging.getLogger("scanfab")
 

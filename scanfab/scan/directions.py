@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from importlib.resources import files
 
 import numpy as np
@@ -167,15 +167,18 @@ def direction_rule(text: str | int) -> DirectionRule:
     if name not in RULES:
         raise SettingsError(
             f"directions: no rule is called {text!r}; expected a number or one of "
-            + ", ".join(f"{rule}:{what}" for rule, (_, what) in RULES.items())
+            + ", ".join(f"{rule}:{what}" for rule, (_, what, *_) in RULES.items())
         )
-    make, what = RULES[name]
+    make, what, least, most = RULES[name]
     try:
         value = float(argument) if what == "STEP" else int(argument)
     except ValueError:
+        value = math.nan
+    if not least <= value <= most:
         raise SettingsError(
-            f"directions: expected {name}:{what} with a number, found {text!r}"
-        ) from None
+            f"directions: expected {name}:{what} with a number from {least:g} to {most:g}, "
+            f"found {text!r}"
+        )
     return make(value)
 
 
@@ -250,12 +253,10 @@ def lebedev(degree: float) -> DirectionRule:
     """Lebedev's rule of this degree or the next that SciPy has (of positive weights)."""
     from scipy.integrate import lebedev_rule
 
-    degrees = [d for d in LEBEDEV_DEGREES if d >= degree and d not in NEGATIVE_LEBEDEV]
-    if not degrees or degree < 1:
-        raise SettingsError(f"directions: lebedev has degrees 3 to 131, found {degree:g}")
-    points, weights = lebedev_rule(degrees[0])
+    found = next(d for d in LEBEDEV_DEGREES if d >= degree and d not in NEGATIVE_LEBEDEV)
+    points, weights = lebedev_rule(found)
     half = _upper_half(points.T)
-    return _normalised(f"lebedev:{degrees[0]}", points.T[half], weights[half], degrees[0])
+    return _normalised(f"lebedev:{found}", points.T[half], weights[half], found)
 
 
 def design_of(axes: float, space: Space = SPACE) -> DirectionRule:
@@ -269,20 +270,13 @@ def design_of(axes: float, space: Space = SPACE) -> DirectionRule:
 def design(degree: float) -> DirectionRule:
     """The antipodal spherical design of this degree or the next that the package has."""
     table = np.loadtxt(str(files("scanfab.scan") / "designs.csv"), delimiter=",", comments="#")
-    degrees = np.unique(table[:, 0])
-    if not 1 <= degree <= degrees[-1]:
-        raise SettingsError(
-            f"directions: design has degrees {degrees[0]:g} to {degrees[-1]:g}, found {degree:g}"
-        )
-    chosen = int(degrees[degrees >= degree][0])
+    chosen = int(table[table[:, 0] >= degree, 0].min())
     axes = table[table[:, 0] == chosen, 1:]
     return _normalised(f"design:{chosen}", axes, np.ones(len(axes)), chosen)
 
 
 def icosahedral(degree: float) -> DirectionRule:
     """The corners of an icosahedron and of its dual, which together are exact to degree 9."""
-    if not 1 <= degree <= 9:
-        raise SettingsError(f"directions: icosahedral has degree 9, found {degree:g}")
     golden = (1 + math.sqrt(5)) / 2
     signs = np.array([[1, 1], [1, -1]])
     corners = np.concatenate(
@@ -301,10 +295,6 @@ def icosahedral(degree: float) -> DirectionRule:
 
 def product(degree: float) -> DirectionRule:
     """Gauss-Legendre in cos φ times even steps in θ, both exact to the degree."""
-    if not 1 <= degree <= LARGEST_PRODUCT:
-        raise SettingsError(
-            f"directions: product has degrees 1 to {LARGEST_PRODUCT}, found {degree:g}"
-        )
     degree = int(degree)
     heights, height_weights = np.polynomial.legendre.leggauss(degree // 2 + 1)
     azimuths = degree + 1 + (degree + 1) % 2
@@ -319,8 +309,6 @@ def product(degree: float) -> DirectionRule:
 
 def fibonacci(count: float) -> DirectionRule:
     """A Fibonacci lattice of N axes on the half sphere, equal weights."""
-    if not 1 <= count <= 1_000_000:
-        raise SettingsError(f"directions: fibonacci takes 1 to 1000000 axes, found {count:g}")
     number = np.arange(int(count))
     z = (number + 0.5) / count
     theta = np.pi * (3 - np.sqrt(5)) * number
@@ -329,41 +317,31 @@ def fibonacci(count: float) -> DirectionRule:
     return _normalised(f"fibonacci:{int(count)}", axes, np.ones(len(axes)), None)
 
 
-def equal_angle(step: float) -> DirectionRule:
-    """Equal steps over θ in (-90°, 90°], φ in (0°, 90°], unit weights: Eq. 1 as printed."""
-    return _angle_grid(f"equal-angle:{step:g}", step, 90.0)
-
-
-def equal_angle_full(step: float) -> DirectionRule:
-    """Equal steps over the half sphere, θ in (-180°, 180°], φ in (0°, 90°], unit weights."""
-    return _angle_grid(f"equal-angle-full:{step:g}", step, 180.0)
-
-
-RULES: dict[str, tuple[Callable[[float], DirectionRule], str]] = {
-    "lebedev": (lebedev, "DEGREE"),
-    "design": (design, "DEGREE"),
-    "icosahedral": (icosahedral, "DEGREE"),
-    "product": (product, "DEGREE"),
-    "fibonacci": (fibonacci, "N"),
-    "equal-angle": (equal_angle, "STEP"),
-    "equal-angle-full": (equal_angle_full, "STEP"),
-}
-
-
-def _angle_grid(name: str, step: float, theta_end: float) -> DirectionRule:
-    if not 0.5 <= step <= 90 or abs(90 / step - round(90 / step)) > 1e-9:
-        raise SettingsError(
-            f"directions: {name}: expected a step that divides 90 degrees, 0.5 to 90"
-        )
-    number = round(90 / step)
-    phi = np.radians(step * np.arange(1, number + 1))
-    turns = round(theta_end / step)
+def angle_grid(name: str, end: float, step: float) -> DirectionRule:
+    """Equal steps over θ in (-end, end], φ in (0°, 90°], unit weights; degrees."""
+    if abs(90 / step - round(90 / step)) > 1e-9:
+        raise SettingsError(f"directions: {name}: expected a step that divides 90 degrees")
+    phi = np.radians(step * np.arange(1, round(90 / step) + 1))
+    turns = round(end / step)
     theta = np.radians(step * np.arange(1 - turns, turns + 1))
     polar, azimuth = (grid.ravel() for grid in np.meshgrid(phi, theta, indexing="ij"))
     axes = np.column_stack(
         [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
     )
-    return _normalised(name, axes, np.ones(len(axes)), None, turned=False)
+    return _normalised(f"{name}:{step:g}", axes, np.ones(len(axes)), None, turned=False)
+
+
+# what makes each rule, what it takes, and from where to where; Eq. 1 of the paper as printed has
+# the range of `equal-angle`
+RULES: dict[str, tuple[Callable[[float], DirectionRule], str, float, float]] = {
+    "lebedev": (lebedev, "DEGREE", 1, LEBEDEV_DEGREES[-1]),
+    "design": (design, "DEGREE", 1, FINEST),
+    "icosahedral": (icosahedral, "DEGREE", 1, 9),
+    "product": (product, "DEGREE", 1, LARGEST_PRODUCT),
+    "fibonacci": (fibonacci, "N", 1, 1_000_000),
+    "equal-angle": (partial(angle_grid, "equal-angle", 90.0), "STEP", 0.5, 90),
+    "equal-angle-full": (partial(angle_grid, "equal-angle-full", 180.0), "STEP", 0.5, 90),
+}
 
 
 def _upper_half(points: FloatArray) -> npt.NDArray[np.bool_]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import partial
 
 import numpy as np
 
@@ -18,13 +18,12 @@ from scanfab.base.typing import FloatArray
 from scanfab.scan.blocks import Blocks, partition_of
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import ENDS
-from scanfab.scan.following import MOST_STEPS, Following
 from scanfab.scan.kernels.bins import Bins
 from scanfab.scan.kernels.sweep import TALLY_SIZE
 from scanfab.scan.lines import drawn_lines
 from scanfab.scan.scan import ScanSums, in_parts, sums_of
 from scanfab.scan.solids import Solids, check_space, check_spacing, shortest_gap
-from scanfab.scan.tallies import tally_triads
+from scanfab.scan.tallies import MOST_STEPS, Following, tally_triads
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,65 +121,51 @@ def scan_gaps(
     check_space(solids, rule)
     triads, offsets = drawn_lines(rule, seed, replicates)
     least = np.maximum(np.array(cutoffs, dtype=np.float64), shortest_gap(solids))
-    lines = _BinnedLines(solids, spacing, least, blocks, variants, Following(most_steps))
-    found = in_parts(lines.both, triads, offsets, workers)
+    following = Following(most_steps)
+
+    some = partial(
+        _binned, solids,
+        spacing=spacing, least=least, blocks=blocks, variants=variants, following=following,
+    )  # fmt: skip
+    found = in_parts(some, triads, offsets, workers)
     tallies = found[:, :, -2 * TALLY_SIZE :].reshape(*offsets.shape[:2], 2, TALLY_SIZE)
     sums = found[:, :, : -2 * TALLY_SIZE]
-    sums = sums.reshape(*offsets.shape[:2], len(variants), lines.blocks_kept, len(least), 3)
+    sums = sums.reshape(*offsets.shape[:2], len(variants), -1, len(least), 3)
     number, length, square = np.moveaxis(np.swapaxes(sums, 1, 2), -1, 0)
     scan = sums_of(triads, tallies, variants, solids.edge)
-    lines.following.check(float(scan.steps.sum()))
+    following.check(float(scan.steps.sum()))
     return GapSums(triads[:, :, 2], variants, number, length, square, scan)
 
 
-class _BinnedLines(NamedTuple):
-    """Lines whose gaps are put in bins."""
+def _binned(
+    solids: Solids,
+    triads: FloatArray,
+    offsets: FloatArray,
+    spacing: float,
+    least: FloatArray,
+    blocks: tuple[Blocks, Blocks],
+    variants: str,
+    following: Following,
+) -> FloatArray:
+    """
+    Number, length and square of the variants along some axes, (A, V, B, C, 3), and the tallies.
 
-    solids: Solids
-    spacing: float
-    least: FloatArray
-    """The cut-offs."""
-    blocks: tuple[Blocks, Blocks]
-    variants: str
-    following: Following
-
-    @property
-    def rows(self) -> list[int]:
-        """Of the variants among all four: of the whole a, b, of the window c, d."""
-        return ["abcd".index(variant) for variant in self.variants]
-
-    @property
-    def blocks_kept(self) -> int:
-        """For the whole and for the window the same number."""
-        return max(map(len, self.blocks))
-
-    def both(self, triads: FloatArray, offsets: FloatArray) -> FloatArray:
-        """One array of both, as the parts of a scan come together."""
-        sums, tallies = self.sums(triads, offsets)
-        return np.concatenate(
-            [sums.reshape(len(triads), -1), tallies.reshape(len(triads), -1)], axis=1
-        )
-
-    def sums(self, triads: FloatArray, offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """
-        Number, length and square of the variants along some axes, and the tallies.
-
-        The first has the shape (A, V, B, C, 3).
-        """
-        solids, least = self.solids, self.least
-        room = np.zeros((len(triads), 2, 2, self.blocks_kept * len(least), 3))
-        bins = Bins(partition_of(*self.blocks), least, room)
-        tallies = tally_triads(
-            solids, triads, offsets, self.spacing, least[0], self.variants, bins, self.following
-        )
-        sums = bins.sums.reshape(len(triads), 4, self.blocks_kept, len(least), 3)[:, self.rows]
-        if len(least) > 1:
-            # what reaches a cut-off reaches all below it
-            sums = np.flip(np.cumsum(np.flip(sums, axis=3), axis=3), axis=3)
-        if solids.edge == ENDS:
-            number, length, square = np.moveaxis(sums, -1, 0)
-            weighed = [solids.medium is None or variant in "cd" for variant in self.variants]
-            # the third sum is the number of the kept, see kernels/bins
-            length[:, weighed] -= least * (square - number)[:, weighed]
-            square[:, weighed] = np.nan
-        return sums, tallies
+    In one array of the shape (A, ...), as the parts of a scan come together. ``least``: the
+    cut-offs.
+    """
+    # for the whole and for the window the same number of blocks
+    axes, kept = len(triads), max(map(len, blocks))
+    bins = Bins(partition_of(*blocks), least, np.zeros((axes, 2, 2, kept * len(least), 3)))
+    tallies = tally_triads(solids, triads, offsets, spacing, least[0], variants, bins, following)
+    rows = ["abcd".index(variant) for variant in variants]
+    sums = bins.sums.reshape(axes, 4, kept, len(least), 3)[:, rows]
+    if len(least) > 1:
+        # what reaches a cut-off reaches all below it
+        sums = np.flip(np.cumsum(np.flip(sums, axis=3), axis=3), axis=3)
+    if solids.edge == ENDS:
+        number, length, square = np.moveaxis(sums, -1, 0)
+        weighed = [solids.medium is None or variant in "cd" for variant in variants]
+        # the third sum is the number of the kept, see kernels/bins
+        length[:, weighed] -= least * (square - number)[:, weighed]
+        square[:, weighed] = np.nan
+    return np.concatenate([sums.reshape(axes, -1), tallies.reshape(axes, -1)], axis=1)

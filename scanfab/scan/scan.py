@@ -14,11 +14,10 @@ from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import CLIP
-from scanfab.scan.following import MOST_STEPS, Following
 from scanfab.scan.kernels import sweep
 from scanfab.scan.lines import drawn_lines
 from scanfab.scan.solids import Solids, check_space, check_spacing
-from scanfab.scan.tallies import tally_triads
+from scanfab.scan.tallies import MOST_STEPS, Following, tally_triads
 
 JOBS_A_THREAD, MOST_AXES = 4, 16
 
@@ -232,21 +231,14 @@ def in_parts(
     axes = min(max(count // (JOBS_A_THREAD * workers), 1), MOST_AXES)
     parts = [slice(first, first + axes) for first in range(0, count, axes)]
 
-    lines = [(triads[part], shifts[part]) for part in parts]
-    part_of = partial(_scan_part, scan)
-    if workers == 1 or len(lines) == 1:
-        found = list(map(part_of, lines))
+    lines = [triads[part] for part in parts], [shifts[part] for part in parts]
+    if workers == 1 or len(parts) == 1:
+        found = list(map(scan, *lines))
     else:
         with ThreadPoolExecutor(workers) as pool:
-            found = list(pool.map(part_of, lines))
+            found = list(pool.map(scan, *lines))
     sums = np.concatenate(found)
     return sums.reshape(*offsets.shape[:2], *sums.shape[1:])
-
-
-def _scan_part(
-    scan: Callable[[FloatArray, FloatArray], FloatArray], lines: tuple[FloatArray, FloatArray]
-) -> FloatArray:
-    return scan(*lines)
 
 
 def sums_of(triads: FloatArray, tallies: FloatArray, variants: str, edge: str = CLIP) -> ScanSums:

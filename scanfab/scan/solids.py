@@ -14,12 +14,11 @@ from scanfab.base.errors import PackingError, SettingsError
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, FloatArray
-from scanfab.scan.cells import cells_of
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import CLIP
-from scanfab.scan.kernels.cells import Cells
+from scanfab.scan.kernels.cells import Cells, fill_cells
 from scanfab.scan.kernels.periodic import CellGrains
-from scanfab.scan.kernels.windows import Clip
+from scanfab.scan.kernels.strips import FAR, Clip
 
 # lines of one axis and replicate: more take minutes, even those that meet nothing
 MAX_LINES = 50_000_000
@@ -27,6 +26,12 @@ MAX_LINES = 50_000_000
 SHORTEST = 1e-9
 # of the mean radius: the wider, the more chords are swept, and the fewer segments followed alone
 MARGIN = 5.0
+
+# A ray through periodic grains that has met nothing along so many periods and mean free paths stays
+# in a channel.
+MOST_PERIODS, MOST_FREE_PATHS = 64.0, 20.0
+# cells of the grid that grains are sorted into, for each of them at most
+MOST_CELLS = 4.0
 
 
 class Inner(NamedTuple):
@@ -121,7 +126,13 @@ class Solids:
     def cells(self) -> Cells:
         """The grains around the window, sorted into cells."""
         assert self.around is not None
-        return cells_of(self.around)
+        return cells_of(self.around, 1.0)
+
+    @cached_property
+    def medium_cells(self) -> Cells:
+        """Those of the periodic whole, through which few lines are followed."""
+        assert self.medium is not None
+        return cells_of(self.medium, 3.0)
 
     def near_window(self, margin: float) -> BoolArray:
         """
@@ -192,9 +203,10 @@ class Solids:
 def clip_of(window: Convex | None) -> Clip:
     """The numbers of a window; without one, no line meets it."""
     if window is None:
-        return Clip(np.zeros((0, 4)), 1.0, np.zeros((3, 3)), -1.0, 0.0)
+        return Clip(np.zeros((0, 4)), 1.0, np.zeros((3, 3)), 1.0, -1.0, 0.0)
     isotropic, deviator, level = window.quadric
-    return Clip(window.planes, isotropic, deviator, level, window.reach)
+    size = isotropic + float(np.abs(deviator).max())
+    return Clip(window.planes, isotropic, deviator, size, level, window.reach)
 
 
 def margin_of(grains: CellGrains) -> float:
@@ -244,3 +256,66 @@ def check_spacing(solids: Solids, spacing: float) -> None:
             f"{lines:.2g} of them, more than {MAX_LINES:.0e}: choose a wider spacing, or leave out "
             f"grains that are far away from all others"
         )
+
+
+def cells_of(grains: CellGrains, width: float) -> Cells:
+    """
+    Grains sorted into the cells of a grid, for rays that look for the next one.
+
+    ``width`` is about that of a cell, in grains: of wide ones there are fewer to be kept.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.scan.solids import CellGrains, cells_of
+    >>> position, one = np.array([[0.5, 0.5, 0.5], [2.5, 0.5, 0.5]]), np.full(2, 0.5)
+    >>> cells_of(CellGrains(position, one, one < 0, np.eye(3), np.zeros(3, bool)), 1.0).parts
+    array([3, 1, 1])
+    """
+    vectors: FloatArray = grains.vectors.astype(np.float64)
+    corner = np.zeros(3)
+    once = np.linalg.inv(vectors)
+    along = grains.position @ once
+    reach = grains.radius[:, None] * np.linalg.norm(once, axis=0)
+    fixed = ~grains.periodic
+    for k in np.flatnonzero(fixed):
+        # the box of the grains' surfaces
+        low, high = (along - reach)[:, k].min(), (along + reach)[:, k].max()
+        corner = corner + low * vectors[k]
+        vectors[k] *= high - low
+    inverse = np.linalg.inv(vectors).astype(np.float64)
+    per_length = np.linalg.norm(inverse, axis=0)
+    volume = abs(float(np.linalg.det(vectors)))
+    most = volume / (MOST_CELLS * len(grains.radius))
+    wide = max(2.0 * width * float(grains.radius.mean()), most ** (1 / 3))
+    parts = np.maximum(np.rint(1.0 / (per_length * wide)), 1.0).astype(np.int64)
+    middle = (grains.position - corner) @ inverse * parts
+    reach = grains.radius[:, None] * per_length * parts
+    low, high = (np.floor(edge).astype(np.int32) for edge in (middle - reach, middle + reach))
+    # the last face of the box belongs to the last cell
+    low, high = (
+        np.where(grains.periodic, x, np.clip(x, 0, parts - 1)).astype(np.int32) for x in (low, high)
+    )
+    start, nothing = np.zeros(int(np.prod(parts)) + 1, np.int64), np.zeros(0, np.int32)
+    fill_cells(low, high, grains.periodic, parts, start, nothing, nothing.reshape(0, 3))
+    start = np.cumsum(start)
+    grain, image = np.empty(start[-1], np.int32), np.empty((start[-1], 3), np.int32)
+    fill_cells(low, high, grains.periodic, parts, start[:-1].copy(), grain, image)
+    sphere = np.vstack([(grains.position[grain] + image @ vectors).T, grains.radius[grain]])
+    farthest = [_farthest(grains, volume, solid) for solid in (slice(None), ~grains.removed)]
+    return Cells(
+        sphere, grains.removed[grain], vectors, inverse, corner, grains.periodic, parts, start,
+        *farthest,
+    )  # fmt: skip
+
+
+def _farthest(grains: CellGrains, volume: float, solid: BoolArray | slice) -> float:
+    """How far to follow a ray that meets nothing: out of an open sample, or not for ever."""
+    radius = grains.radius[solid]
+    if not len(radius):
+        return 0.0
+    if not grains.periodic.any():
+        return FAR
+    periods = float(np.linalg.norm(grains.vectors[grains.periodic], axis=1).sum())
+    free_path = volume / (np.pi * float(np.sum(radius**2)))
+    return MOST_PERIODS * periods + MOST_FREE_PATHS * free_path

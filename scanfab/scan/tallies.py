@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+import threading
 from typing import NamedTuple
 
 import numpy as np
 
+from scanfab.base.errors import SettingsError
 from scanfab.base.jit import Flag
 from scanfab.base.typing import FloatArray
-from scanfab.scan.edges import CLIP, ENDS, START
-from scanfab.scan.following import MOST_STEPS, Following
+from scanfab.scan.edges import CLIP, ENDS
 from scanfab.scan.kernels import sweep
-from scanfab.scan.kernels.axes import scan_axes, scan_cell
+from scanfab.scan.kernels.axes import Axes, Followed, scan_axes, scan_cell
 from scanfab.scan.kernels.bins import OF_WHOLE, OF_WINDOW, Bins, no_bins
-from scanfab.scan.kernels.cells import Cells
-from scanfab.scan.kernels.edges import CLIPPED, WEIGHED
-from scanfab.scan.kernels.periodic import CellGrains
-from scanfab.scan.kernels.strips import Edge
+from scanfab.scan.kernels.grid import Bounds
+from scanfab.scan.kernels.strips import Counts, Edge
 from scanfab.scan.solids import Inner, Solids, clip_of, shortest_gap
 
 # of the spacing and for each variant: spheres of such a radius are scanned as fast row by row as
@@ -24,6 +23,62 @@ from scanfab.scan.solids import Inner, Solids, clip_of, shortest_gap
 FEW_LINES = 0.5
 # of the margin beyond a window: in lists each chord takes longer, so that more is followed alone
 NARROW = 0.3
+# a gap of no length at all never counts
+SMALLEST = 5e-324
+# what counts at the window's surface by the rules that follow no segment
+CLIPPED, WEIGHED = Edge(None, None, 0.0), Edge(True, None, 0.0)
+# steps of following lines through a periodic medium: more take minutes
+MOST_STEPS = 1e10
+
+
+class FollowedTooFarError(SettingsError):
+    """To follow the lines of a scan through a periodic medium takes more steps than allowed."""
+
+
+class Following:
+    """
+    The steps that following the lines of a scan has taken, of all its threads together.
+
+    Whether they are too many does not depend on the threads: no part of a scan takes any back.
+    """
+
+    def __init__(self, most: float) -> None:
+        self.most = most
+        self._taken = 0.0
+        self._lock = threading.Lock()
+
+    @property
+    def left(self) -> float:
+        """How many more are allowed."""
+        return self.most - self._taken
+
+    def add(self, steps: float) -> None:
+        """
+        Count the steps of a part of the scan.
+
+        Raises
+        ------
+        FollowedTooFarError
+            If they are too many.
+        """
+        with self._lock:
+            self._taken += steps
+        self.check(self._taken)
+
+    def __reduce__(self) -> tuple[type, tuple[float]]:
+        # another process counts its own; whoever adds up all parts checks their sum
+        return Following, (self.most,)
+
+    def check(self, taken: float) -> None:
+        """FollowedTooFarError if so many steps are too many."""
+        if taken >= self.most:
+            raise FollowedTooFarError(
+                f"void segments that leave the cell are long: following them through its images "
+                f"takes more than {self.most:.2g} steps. Much of the cell is empty, or a variant "
+                f"keeps few grains: check the cell's size (`cell`) and its periodic axes "
+                f"(`periodic`), choose a wider `spacing` or other `variants`, or allow more "
+                f"(`max_chords`)"
+            )
 
 
 def tally_triads(
@@ -49,61 +104,72 @@ def tally_triads(
     """
     first, second = ("a" in variants or "c" in variants), ("b" in variants or "d" in variants)
     whole, window = ("a" in variants or "b" in variants), ("c" in variants or "d" in variants)
-    tallies = np.zeros((len(triads), 2, sweep.TALLY_SIZE))
-    cutoff = max(cutoff, shortest_gap(solids))
-    bins = no_bins(len(triads)) if bins is None else bins
-    following = Following(MOST_STEPS) if following is None else following
-    both: Flag = True if first and second else None
-    lines = _Lines(solids, triads, offsets, spacing, cutoff, first, both)
+    lines = _Lines(
+        solids,
+        Axes(np.ascontiguousarray(triads), offsets, spacing),
+        max(cutoff, shortest_gap(solids), SMALLEST),
+        first,
+        True if first and second else None,
+        no_bins(len(triads)) if bins is None else bins,
+        Following(MOST_STEPS) if following is None else following,
+        np.zeros((len(triads), 2, sweep.TALLY_SIZE)),
+    )
     if solids.medium is not None and whole:
-        # without a or c, the solids of b and d are the only ones
-        medium = solids.medium if first else _without_removed(solids.medium)
-        if len(medium.radius):
-            axes = np.ascontiguousarray(triads[:, 2])
-            by_lists = _few_lines(medium.radius, spacing, 1 + (both is not None))
-            scan_cell(
-                medium, axes, offsets, spacing, cutoff, clip_of(None), tallies,
-                by_lists, both, bins, following.left,
-            )  # fmt: skip
-            following.add(float(tallies[:, 0, sweep.STEPS].sum()))
+        lines.scan_cell()
         whole = False
-    if solids.edge == CLIP:
-        if whole or window:
-            lines.scan(True if whole else None, CLIPPED if window else None, tallies, bins)
-    else:
-        if whole:
-            lines.scan_whole(tallies, bins)
-        if window:
-            lines.scan_window(tallies, bins, following)
+    if solids.edge == CLIP and (whole or window):
+        lines.scan(True if whole else None, CLIPPED if window else None)
+    if solids.edge != CLIP and whole:
+        lines.scan_whole()
+    if solids.edge != CLIP and window:
+        lines.scan_window()
     if first:
-        return tallies
-    bins.sums[:] = bins.sums[:, :, ::-1].copy()
-    return tallies[:, ::-1]
+        return lines.tallies
+    # without a or c, the solids of b and d are the only ones
+    if bins is not None:
+        bins.sums[:] = bins.sums[:, :, ::-1].copy()
+    return lines.tallies[:, ::-1]
 
 
 class _Lines(NamedTuple):
-    """The lines of some axes through the listed solids."""
+    """The lines of some axes through the solids, and what they add up."""
 
     solids: Solids
-    triads: FloatArray
-    offsets: FloatArray
-    spacing: float
+    axes: Axes
     cutoff: float
     first: bool
     """Whether the first set of solids has all of them; else it is that of b and d."""
     both: Flag
+    bins: Bins
+    following: Following
+    tallies: FloatArray
 
-    def scan(
-        self,
-        whole: Flag,
-        window: Edge | None,
-        tallies: FloatArray,
-        bins: Bins,
-        *,
-        inner: Inner | None = None,
-        cells: Cells | None = None,
-        most_steps: float = np.inf,
-    ) -> None:
+    def by_lists(self, radius: FloatArray, variants: int) -> bool:
+        """Whether to list chords: for bins, or as most are of spheres that meet but few lines."""
+        few = np.sum(radius**2) < FEW_LINES * variants * self.axes.spacing * np.sum(radius)
+        return bool(few) or self.bins.cutoffs.size > 0
+
+    def scan_cell(self) -> None:
+        """The whole of a periodic packing, which has no edge."""
+        solids = self.solids
+        assert solids.medium is not None
+        medium = solids.medium
+        if not self.first:
+            solid = ~medium.removed
+            medium = medium._replace(
+                position=medium.position[solid],
+                radius=medium.radius[solid],
+                removed=medium.removed[solid],
+            )
+        if not len(medium.radius):
+            return
+        counts = Counts(self.cutoff, self.both, True, None, None)
+        by_lists = self.by_lists(medium.radius, 1 + bool(self.both))
+        followed = Followed(solids.medium_cells, not self.first, self.following.left)
+        scan_cell(medium, self.axes, counts, by_lists, self.bins, followed, self.tallies)
+        self.following.add(float(self.tallies[:, 0, sweep.STEPS].sum()))
+
+    def scan(self, whole: Flag, window: Edge | None, inner: Inner | None = None) -> None:
         """One pass of the sweep; ``inner`` takes the place of the window."""
         solids = self.solids
         position, radius, removed = solids.position, solids.radius, solids.removed
@@ -115,64 +181,57 @@ class _Lines(NamedTuple):
             solid = solids.near_inner & (self.first | ~removed)
         elif window is not None and solids.edge != CLIP:
             solid = solids.near_window(window.margin) & (self.first | ~removed)
-        passes = (1 + (self.both is not None)) * ((whole is not None) + (window is not None))
+        passes = (1 + bool(self.both)) * ((whole is not None) + (window is not None))
+        followed, before = None, float(self.tallies[:, 0, sweep.STEPS].sum())
+        if window is not None and window.start is not None:
+            followed = Followed(solids.cells, not self.first, self.following.left)
+        position, radius = np.ascontiguousarray(position[solid]), radius[solid]
         scan_axes(
-            np.ascontiguousarray(position[solid]),
-            radius[solid],
+            position,
+            radius,
             removed[solid],
-            np.ascontiguousarray(self.triads),
-            self.offsets,
-            self.spacing,
-            self.cutoff,
+            _bounds(position, radius),
+            self.axes,
             clip_of(shape),
-            tallies,
-            _few_lines(radius[solid], self.spacing, passes),
-            self.both,
-            whole,
-            window,
-            bins,
-            cells,
-            not self.first,
-            most_steps,
+            Counts(self.cutoff, self.both, whole, window, None),
+            self.by_lists(radius, passes),
+            self.bins,
+            followed,
+            self.tallies,
         )
+        self.following.add(float(self.tallies[:, 0, sweep.STEPS].sum()) - before)
 
-    def scan_whole(self, tallies: FloatArray, bins: Bins) -> None:
+    def scan_whole(self) -> None:
         """The whole of an open sample: up to its outermost solids, or in a window of its own."""
-        if self.solids.edge != ENDS:
-            self.scan(True, None, tallies, bins)
-            return
         inner = self.solids.inner
-        if inner is None:
-            return
-        found, room = np.zeros_like(tallies), bins.of_whole(inner.center)
-        self.scan(None, WEIGHED, found, room, inner=inner)
-        tallies[..., sweep.WHOLE : sweep.WINDOW] += found[..., sweep.WINDOW : sweep.CHORDS]
-        tallies[..., sweep.CHORDS] += found[..., sweep.CHORDS]
-        bins.sums[:, OF_WHOLE] += room.sums[:, OF_WINDOW]
+        if self.solids.edge != ENDS:
+            self.scan(True, None)
+        elif inner is not None:
+            bins = self.bins.of_whole(inner.center)
+            inside = self._replace(tallies=np.zeros_like(self.tallies), bins=bins)
+            inside.scan(None, WEIGHED, inner)
+            found = inside.tallies
+            self.tallies[..., sweep.WHOLE : sweep.WINDOW] += found[..., sweep.WINDOW : sweep.CHORDS]
+            self.tallies[..., sweep.CHORDS] += found[..., sweep.CHORDS]
+            self.bins.sums[:, OF_WHOLE] += bins.sums[:, OF_WINDOW]
 
-    def scan_window(self, tallies: FloatArray, bins: Bins, following: Following) -> None:
+    def scan_window(self) -> None:
         """The window, by a rule that knows what is cut."""
         solids = self.solids
-        cells = solids.cells if solids.edge == START and len(solids.grain_radius) else None
-        margin = solids.margin
-        if bins.cutoffs.size or _few_lines(solids.radius, self.spacing, 1 + bool(self.both)):
-            # but for the cut-off: segments that reach it are known to count
-            margin = min(margin, max(NARROW * margin, 1.01 * self.cutoff))
-        edge = WEIGHED if cells is None else Edge(None, True, margin, None)
-        if solids.edge == START and cells is None:
-            return
-        before = float(tallies[:, 0, sweep.STEPS].sum())
-        self.scan(None, edge, tallies, bins, cells=cells, most_steps=following.left)
-        following.add(float(tallies[:, 0, sweep.STEPS].sum()) - before)
+        if solids.edge == ENDS:
+            self.scan(None, WEIGHED)
+        elif len(solids.grain_radius):
+            margin = solids.margin
+            if self.by_lists(solids.radius, 1 + bool(self.both)):
+                # but for the cut-off: segments that reach it are known to count
+                margin = min(margin, max(NARROW * margin, 1.01 * self.cutoff))
+            self.scan(None, Edge(None, True, margin))
 
 
-def _few_lines(radius: FloatArray, spacing: float, variants: int) -> bool:
-    """Whether most chords are of spheres that meet but few lines."""
-    return bool(np.sum(radius**2) < FEW_LINES * variants * spacing * np.sum(radius))
-
-
-def _without_removed(medium: CellGrains) -> CellGrains:
-    solid = ~medium.removed
-    return medium._replace(
-        position=medium.position[solid], radius=medium.radius[solid], removed=medium.removed[solid]
-    )
+def _bounds(position: FloatArray, radius: FloatArray) -> Bounds:
+    """What holds all spheres."""
+    if not len(radius):
+        return Bounds(np.zeros(3), np.zeros(3), 0.0)
+    low, high = (position - radius[:, None]).min(axis=0), (position + radius[:, None]).max(axis=0)
+    reach = float((np.sqrt(np.einsum("ij,ij->i", position, position)) + radius).max())
+    return Bounds(0.5 * (low + high), 0.5 * (high - low), reach)

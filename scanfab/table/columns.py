@@ -12,7 +12,7 @@ from scanfab.fabric.predicted import PREDICTED_ALPHA, WINDOW_ALPHA
 from scanfab.fabric.registry import GROUPS, OWN_FABRICS, Fabric, load_fabrics
 from scanfab.fabric.usual import Contact, Void
 from scanfab.packing.columns import RV_COLUMN, SAMPLE_COLUMNS
-from scanfab.scan.columns import EDGE_COLUMNS, SCAN_COLUMNS
+from scanfab.scan.edges import EDGE_COLUMNS, SCAN_COLUMNS
 from scanfab.table.row import Row
 
 FRAME_COLUMNS = (

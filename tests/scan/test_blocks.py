@@ -7,11 +7,12 @@ import pytest
 
 from scanfab import Cell, direction_rule, scan_lines
 from scanfab.base.shapes import sphere
-from scanfab.scan.blocks import Blocks
+from scanfab.scan.blocks import Blocks, partition_of
 from scanfab.scan.edges import START
-from scanfab.scan.following import Following
-from scanfab.scan.gaps import _BinnedLines, scan_gaps
+from scanfab.scan.gaps import scan_gaps
+from scanfab.scan.kernels.bins import Bins
 from scanfab.scan.solids import Solids
+from scanfab.scan.tallies import tally_triads
 from tests.helpers import naive
 from tests.helpers.lattices import poisson_spheres, rotation
 from tests.helpers.scanning import solids_of
@@ -49,8 +50,12 @@ def kept_in(segments, blocks):
 
 
 def fast_sums(solids, blocks, triad, offset, spacing, variants="abcd"):
-    words = solids, spacing, LEAST, (blocks, blocks), variants, Following(np.inf)
-    return _BinnedLines(*words).sums(triad[None], offset[None])[0][0]
+    """Sums of the variants, shape (V, B, C, 3), by the largest cut-off reached and above."""
+    bins = Bins(partition_of(blocks, blocks), LEAST, np.zeros((1, 2, 2, len(blocks) * 2, 3)))
+    tally_triads(solids, triad[None], offset[None], spacing, LEAST[0], variants, bins)
+    sums = bins.sums.reshape(4, len(blocks), 2, 3)[["abcd".index(one) for one in variants]]
+    sums[:, :, 0] += sums[:, :, 1]
+    return sums
 
 
 @pytest.mark.parametrize(

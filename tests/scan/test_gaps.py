@@ -10,7 +10,7 @@ from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.lines import line_triads, turned_triads
 from tests.helpers import naive
 from tests.helpers.lattices import poisson_spheres
-from tests.helpers.scanning import ratio, solids_of
+from tests.helpers.scanning import solids_of
 
 RULE = direction_rule("lebedev:5")
 CUTOFFS = [0.0, 0.3, 0.8, 1.7]
@@ -99,33 +99,6 @@ def test_variants_that_are_not_wanted_have_no_sums(solids):
     for variant in "bc":
         assert gaps.kept(variant)[1].any()
         np.testing.assert_allclose(gaps.kept(variant)[0], every.kept(variant)[0])
-
-
-def test_poisson_spheres_have_their_mean_length_at_every_cut_off_of_one_pass():
-    """
-    ℓ = c + A1/(A0 + βA1) at c = 0, 0.5, 1, 1.5.
-
-    A0 = 1 - c²/4R², A1 = 4R/3 - c + c³/12R²; c + 1/β where the window R is infinite.
-    """
-    cutoffs, window, density = np.array([0.0, 0.5, 1.0, 1.5]), 8.0, 0.2
-    beta = density * np.pi * 13 / 12
-    length, number = [], []
-    for seed in range(400):
-        spheres = poisson_spheres(np.random.default_rng([seed, 7]), density, window)
-        gaps = gaps_of(
-            solids_of(spheres, window),
-            spacing=0.8,
-            cutoffs=cutoffs,
-            variants="c",
-            replicates=[seed],
-        )
-        length.append(gaps.length[0, 0].sum(axis=(0, 1)))
-        number.append(gaps.number[0, 0].sum(axis=(0, 1)))
-    estimate = ratio(np.array(length), np.array(number))
-    a0 = 1 - cutoffs**2 / (4 * window**2)
-    a1 = 4 * window / 3 - cutoffs + cutoffs**3 / (12 * window**2)
-    assert np.all(estimate.error < 4e-3 * estimate.value)
-    assert estimate.agrees(cutoffs + a1 / (a0 + beta * a1), within=8e-3)
 
 
 def test_octants_about_an_oblique_axis_have_it_as_one_of_their_axes():

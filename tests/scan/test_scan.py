@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from scanfab import Packing, SettingsError, compute, direction_rule, scan_lines
+from scanfab import SettingsError, direction_rule, scan_lines
 from scanfab.scan.lines import line_triads, turned_triads
 from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import MAX_LINES
 from tests.helpers import naive
-from tests.helpers.lattices import Spheres, poisson_spheres, separate_spheres, shaken_cubic
+from tests.helpers.lattices import Spheres, poisson_spheres, separate_spheres
 from tests.helpers.scanning import fabric, solids_of
 
 RULE = direction_rule("lebedev:5")
@@ -53,13 +53,6 @@ def test_same_bytes_for_any_number_of_workers(solids, workers):
     options = {"spacing": 0.2, "cutoff": 0.3, "seed": 4}
     one = scan_lines(solids, RULE, **options, workers=1)
     assert raw(scan_lines(solids, RULE, **options, workers=workers)) == raw(one)
-
-
-@pytest.mark.parametrize("options", [{"spacing": 0.3, "directions": 20}, {"tolerance": 5e-3}])
-def test_same_rows_for_any_number_of_workers(options):
-    packing = Packing(*shaken_cubic(np.random.default_rng(0), 5))
-    tables = [compute(packing, workers=workers, **options) for workers in (1, 2, 5)]
-    assert repr(tables[0].rows) == repr(tables[1].rows) == repr(tables[2].rows)
 
 
 def test_same_seed_gives_the_same_bytes_and_another_seed_others(solids):
@@ -119,13 +112,6 @@ def test_spacing_that_asks_for_too_many_lines_is_an_error(solids):
     spacing = 2 * 3.0 / MAX_LINES**0.5
     with pytest.raises(SettingsError, match=r"^spacing: .* choose a wider spacing"):
         scan_lines(solids, RULE, spacing=spacing, cutoff=0.3)
-
-
-def test_no_spheres_and_no_window_give_nothing():
-    nothing = Spheres(np.zeros((0, 3)), np.zeros(0))
-    sums = scan_lines(solids_of(nothing), RULE, spacing=0.3, cutoff=0.0)
-    assert not sums.segments.any()
-    assert not sums.lines.any()
 
 
 def test_reported_error_is_the_scatter_over_seeds():

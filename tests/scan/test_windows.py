@@ -7,8 +7,7 @@ from numba import njit
 from scanfab import box, cylinder, direction_rule, ellipsoid, scan_lines, sphere
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.gaps import scan_gaps
-from scanfab.scan.kernels.strips import spans
-from scanfab.scan.kernels.windows import section_along
+from scanfab.scan.kernels.strips import section_along, spans
 from scanfab.scan.lines import line_triads
 from scanfab.scan.solids import clip_of
 from tests.helpers import naive
@@ -91,34 +90,6 @@ def packed(window):
     random = np.random.default_rng(2)
     spheres = poisson_spheres(random, 0.4, 2.5)
     return solids_of(spheres, window, random.random(len(spheres.radius)) < 0.2)
-
-
-@pytest.mark.parametrize("parts", [(2, 2, 2), (3, 1, 4), (1, 1, 1), (5, 3, 7)])
-@pytest.mark.parametrize("window", [sphere(2.0), box(2 * HALF, TURN)], ids=["sphere", "box"])
-def test_all_blocks_of_any_number_together_are_the_scan_of_the_same_lines(window, parts):
-    solids, cutoffs = packed(window), [0.0, 0.3]
-    # about a quarter of a period across, so that there are places in every block
-    cells = Blocks(np.full(3, -0.43), 4.3 * np.eye(3), parts, ENDLESS)
-    words = {"spacing": 0.1, "replicates": range(2)}
-    gaps = scan_gaps(solids, RULE, cutoffs=cutoffs, blocks=(cells, cells), **words)
-    assert gaps.number.shape[3] == len(cells) == np.prod(parts)
-    assert np.all(gaps.number.sum(axis=(0, 1, 2, 4)) > 0)
-    for place, cutoff in enumerate(cutoffs):
-        sums = scan_lines(solids, RULE, cutoff=cutoff, **words)
-        for variant in "abcd":
-            length, number = gaps.kept(variant, place)
-            assert np.array_equal(number, sums.kept(variant)[1])
-            np.testing.assert_allclose(length, sums.kept(variant)[0], rtol=1e-10)
-            without = [gaps.kept(variant, place, without=k)[1] for k in range(len(cells))]
-            assert np.array_equal(sum(without), (len(cells) - 1) * number)
-
-
-def test_blocks_are_those_of_the_naive_twin():
-    random = np.random.default_rng(8)
-    places = random.uniform(-5, 5, (300, 3))
-    for parts in [(3, 1, 4), (2, 2, 2), (6, 5, 1)]:
-        blocks = Blocks(random.random(3), 3.0 * rotation(random), parts, ENDLESS)
-        assert blocks.of(places).tolist() == [naive.block(place, blocks) for place in places]
 
 
 def test_a_place_just_below_a_period_lies_in_the_last_block():

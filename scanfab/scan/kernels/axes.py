@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from scanfab.base.jit import LANES, ZERO, Flag, inner, kernel
-from scanfab.base.typing import BoolArray, FloatArray, IntArray
-from scanfab.scan.kernels.beyond import Beyond, follow_beyond
+from scanfab.base.jit import LANES, ZERO, inner, kernel
+from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.scan.kernels.bins import Bins, bins_along
 from scanfab.scan.kernels.cells import Cells
-from scanfab.scan.kernels.follow import follow
-from scanfab.scan.kernels.grid import Grid, bounds, open_grid, part_of, strip_of
-from scanfab.scan.kernels.lines import solve_closed
+from scanfab.scan.kernels.grid import (
+    Bounds,
+    Grid,
+    Spheres,
+    open_grid,
+    project,
+    sort_into_strips,
+    strip_of,
+)
 from scanfab.scan.kernels.lists import (
     LISTED_LINES,
     Lists,
@@ -21,88 +28,43 @@ from scanfab.scan.kernels.lists import (
     room_for_lists,
     sweep_lists,
 )
-from scanfab.scan.kernels.periodic import CellGrains, Prism, cell_grid, measured_in
-from scanfab.scan.kernels.projection import Spheres, project, sort_into_strips, sphere_at
-from scanfab.scan.kernels.start import visit_beyond
+from scanfab.scan.kernels.periodic import CellGrains, cell_grid, foot_of
+from scanfab.scan.kernels.resolve import Beyond, follow_beyond, follow_measured, solve_closed
 from scanfab.scan.kernels.strips import (
     MOST_LINES,
     STATE_SIZE,
-    Edge,
-    Strip,
+    Clip,
+    Counts,
+    Section,
+    Task,
     begin,
-    measure_from,
+    section_along,
 )
-from scanfab.scan.kernels.sweep import CHORDS, NOTHING, STEPS, Measured, settle, visit
-from scanfab.scan.kernels.windows import Clip, Section, section_along
-
-SMALLEST = 5e-324
+from scanfab.scan.kernels.sweep import STEPS, settle, visit_all
 
 
-@inner()
-def visit_all(
-    lines: FloatArray,
-    strip: Strip,
-    spheres: Spheres,
-    chosen: IntArray,
-    section: Section,
-    least: float,
-    tally: FloatArray,
-    second: Flag,
-    whole: Flag,
-    window: Edge | None,
-    measured: Measured | None,
-) -> None:
-    """Visit the chosen spheres, and do for each only what it can change."""
-    for k in chosen:
-        sphere = sphere_at(spheres, k)
-        kept = np.nan if spheres.removed[k] else NOTHING
-        if window is not None and window.start is not None:
-            away = np.sqrt(sphere.u * sphere.u + sphere.v * sphere.v + sphere.depth * sphere.depth)
-            if away - sphere.radius > section.reach:
-                tally[0, CHORDS] += visit_beyond(lines, strip, sphere, kept, second)
-                continue
-            if away + sphere.radius < section.core:
-                inside = Edge(None, True, window.margin, True)
-                visit(lines, strip, sphere, kept, least, tally, second, whole, inside, measured)
-                continue
-        if whole is not None and window is not None:
-            reach = section.reach + sphere.radius
-            if sphere.u * sphere.u + sphere.v * sphere.v > reach * reach:
-                # its lines miss the window
-                visit(lines, strip, sphere, kept, least, tally, second, whole, None, measured)
-                continue
-        visit(lines, strip, sphere, kept, least, tally, second, whole, window, measured)
+class Axes(NamedTuple):
+    """Several axes, and the grid of lines along each."""
+
+    triads: FloatArray
+    """Orthonormal rows u, v, n of each axis, shape (D, 3, 3): the lines run along n."""
+    offsets: FloatArray
+    """Shift of each axis' grid, in units of the spacing, shape (D, 2), or (D, 1) in a plane."""
+    spacing: float
 
 
-@inner()
-def visit_listed(
-    lines: FloatArray,
-    lists: Lists,
-    strip: Strip,
-    spheres: Spheres,
-    chosen: IntArray,
-    least: float,
-    tally: FloatArray,
-    bins: Bins,
-    second: Flag,
-    whole: Flag,
-    window: Edge | None,
-    measured: Measured | None,
-) -> None:
-    """List the chords of the chosen spheres, and sweep the lists when one is full and at last."""
-    done = ZERO
-    while done < chosen.size:
-        done = list_chords(lists, strip, spheres, chosen, done)
-        if bins.cutoffs.size > 0:
-            bin_lists(lines, lists, strip, least, tally, bins, second, whole, window, measured)
-        else:
-            sweep_lists(lines, lists, strip, least, tally, second, whole, window, measured)
+class Followed(NamedTuple):
+    """Where lines are followed beyond what is listed of the solids."""
 
+    cells: Cells
+    without_removed: bool
+    """Whether the first set of solids lacks the removed grains, too."""
+    most_steps: float
+    """
+    Of following, all directions together.
 
-@inner()
-def most_lines(lists: Lists) -> int:
-    """So many lines a strip may have."""
-    return LISTED_LINES if lists.stop.size > 0 else MOST_LINES
+    Then the scan ends, and its tallies are worth nothing.
+    """
 
 
 @inner()
@@ -111,61 +73,43 @@ def scan_strips(
     spheres: Spheres,
     grid: Grid,
     section: Section,
-    cutoff: float,
+    reach: float,
     tally: FloatArray,
+    counts: Counts,
     lists: Lists,
-    second: Flag,
-    whole: Flag,
-    window: Edge | None,
-    measured: Measured | None,
-    medium: tuple[CellGrains, Prism] | None,
-    most_steps: float,
     bins: Bins,
     beyond: Beyond | None,
 ) -> None:
     """Scan a grid strip by strip, so that the lines' state stays in cache."""
-    least = max(cutoff, SMALLEST)
-    pitch = grid.columns + LANES
-    by_lists, in_bins = lists.stop.size > 0, bins.cutoffs.size > 0
-    rows = max(most_lines(lists) // pitch, 1)
+    most = LISTED_LINES if lists.stop.size > 0 else MOST_LINES
+    in_bins = bins.cutoffs.size > 0
+    # a row of lines has to fit a strip
+    columns = min(max(grid.columns, 1), most - LANES)
+    rows = most // (columns + LANES)
     start, chosen = sort_into_strips(spheres, grid, rows)
-    for number in range(start.size - 1):
-        strip = strip_of(grid, number, rows, pitch)
-        met = chosen[start[number] : start[number + 1]]
-        begin(lines, strip, section, second, whole, window)
-        if medium is not None:
-            measure_from(lines, strip, medium[1].rise_u, medium[1].rise_v)
-        flags = second, whole, window, measured
-        if by_lists:
-            visit_listed(lines, lists, strip, spheres, met, least, tally, bins, *flags)
-        else:
-            visit_all(lines, strip, spheres, met, section, least, tally, *flags)
-        for which in range(1 if second is None else 2):
-            if in_bins:
-                closed = bin_last_gaps(lines, strip, which, bins, whole, window, measured)
-            else:
-                closed = settle(lines, strip, which, least, tally, whole, window, measured)
-            if closed > 0.0:
-                solve_closed(
-                    lines,
-                    spheres,
-                    met,
-                    strip,
-                    which,
-                    int(closed),
-                    least,
-                    tally,
-                    whole,
-                    window,
-                    measured,
-                    bins,
-                )
-            if medium is not None:
-                follow(
-                    lines, strip, which, medium[0], medium[1], least, most_steps, tally, bins,
-                )  # fmt: skip
-            if beyond is not None and window is not None:
-                follow_beyond(lines, strip, which, window, beyond, least, tally, bins)
+    for column in range(0, grid.columns, columns):
+        for number in range(start.size - 1):
+            strip = strip_of(grid, number * rows, rows, column, columns)
+            task = Task(lines, strip, counts, tally, bins)
+            begin(lines, strip, section, counts)
+            met = chosen[start[number] : start[number + 1]]
+            if lists.stop.size == 0:
+                visit_all(task, spheres, met, reach)
+            done = ZERO
+            while lists.stop.size > 0 and done < met.size:
+                done = list_chords(lists, strip, spheres, met, done)
+                if in_bins:
+                    bin_lists(task, lists)
+                else:
+                    sweep_lists(task, lists)
+            for which in range(1 if counts.second is None else 2):
+                closed = bin_last_gaps(task, which) if in_bins else settle(task, which)
+                if closed > 0.0:
+                    solve_closed(task, spheres, met, which, int(closed))
+                if beyond is not None and counts.measured is not None:
+                    follow_measured(task, which, counts.measured, beyond)
+                if beyond is not None and counts.window is not None:
+                    follow_beyond(task, which, counts.window, beyond)
 
 
 @kernel
@@ -173,20 +117,14 @@ def scan_axes(
     position: FloatArray,
     radius: FloatArray,
     removed: BoolArray,
-    triads: FloatArray,
-    offsets: FloatArray,
-    spacing: float,
-    cutoff: float,
+    extent: Bounds,
+    axes: Axes,
     clip: Clip,
-    tallies: FloatArray,
+    counts: Counts,
     by_lists: bool,
-    second: Flag,
-    whole: Flag,
-    window: Edge | None,
     bins: Bins,
-    cells: Cells | None,
-    without_removed: bool,
-    most_steps: float,
+    followed: Followed | None,
+    tallies: FloatArray,
 ) -> None:
     """
     Scan a packing along several axes.
@@ -197,113 +135,73 @@ def scan_axes(
         Spheres; the window's centre is the origin.
     removed : shape (N,)
         Spheres that are not solid in the second set of solids.
-    triads : shape (D, 3, 3)
-        Orthonormal rows u, v, n of each axis: the lines run along n.
-    offsets : shape (D, 2), or (D, 1) in a plane
-        Shift of each axis' grid, in units of the spacing.
+    extent : Bounds
+        Of the spheres.
+    axes : Axes
+        And the lines along them.
     clip : Clip
         The window.
-    tallies : shape (D, 2, TALLY_SIZE)
-        Zeros; the results for each axis and set of solids.
+    counts : Counts
+        What is counted.
     by_lists : bool
         Whether to list the chords of each line first, see :mod:`scanfab.scan.kernels.lists`: faster
-        where a sphere meets few lines. For bins they are listed anyhow.
-    second, whole : True or None
-        What is counted, see :mod:`scanfab.scan.kernels.sweep`.
-    window : Edge or None
-        Likewise, and by which rule.
+        where a sphere meets few lines, and needed for bins.
     bins : Bins
-        Where every gap is added, instead of to the tallies, if there are any.
-    cells : Cells or None
+        Where every gap is added, instead of to the tallies, if there are any cut-offs.
+    followed : Followed or None
         What lies beyond the window, for a rule that follows segments there.
-    without_removed : bool
-        Whether that is without the removed grains in both sets of solids.
-    most_steps : float
-        Of following segments, all directions together; then the scan ends, and its tallies are
-        worth nothing.
+    tallies : shape (D, 2, TALLY_SIZE)
+        Zeros; the results for each axis and set of solids.
     """
-    left = most_steps
     lines = np.empty(STATE_SIZE)
-    lists = room_for_lists(by_lists or bins.cutoffs.size > 0)
-    # a row of lines has to fit a strip
-    most = most_lines(lists) - LANES
-    extent = bounds(position, radius)
-    for axis in range(triads.shape[0]):
-        triad = triads[axis]
-        grid = open_grid(extent, triad, offsets[axis], spacing, clip.reach, whole is not None)
-        spheres = project(position, radius, removed, triad, grid, clip.reach, window)
+    lists = room_for_lists(by_lists)
+    left = np.inf if followed is None else followed.most_steps
+    for axis in range(axes.triads.shape[0]):
+        if left <= 0.0:
+            return
+        triad, offset, tally = axes.triads[axis], axes.offsets[axis], tallies[axis]
+        whole = counts.whole is not None
+        grid = open_grid(extent, triad, offset, axes.spacing, clip.reach, whole)
+        spheres = project(position, radius, removed, triad, grid, clip.reach, counts.window)
         section = section_along(clip, triad)
+        here = bins_along(bins, triad, axis)
         beyond = None
-        if cells is not None:
-            if left <= 0.0:
-                return
-            beyond = Beyond(cells, triad, without_removed, left)
-        for first in range(0, grid.columns, most):
-            scan_strips(
-                lines,
-                spheres,
-                part_of(grid, first, most),
-                section,
-                cutoff,
-                tallies[axis],
-                lists,
-                second,
-                whole,
-                window,
-                None,
-                None,
-                np.inf,
-                bins_along(bins, triad, axis),
-                beyond,
-            )
-        left -= tallies[axis, 0, STEPS]
+        if followed is not None:
+            beyond = Beyond(followed.cells, triad, followed.without_removed, left, False)
+        scan_strips(lines, spheres, grid, section, clip.reach, tally, counts, lists, here, beyond)
+        left -= tally[0, STEPS]
 
 
 @kernel
 def scan_cell(
     grains: CellGrains,
-    normals: FloatArray,
-    offsets: FloatArray,
-    spacing: float,
-    cutoff: float,
-    clip: Clip,
-    tallies: FloatArray,
+    axes: Axes,
+    counts: Counts,
     by_lists: bool,
-    second: Flag,
     bins: Bins,
-    most_steps: float,
+    followed: Followed,
+    tallies: FloatArray,
 ) -> None:
     """
     Scan a periodic medium along several directions: the whole of it, that has no edge.
 
-    ``normals`` has shape (D, 3), ``clip`` is that of no window, the rest is as in
-    :func:`scan_axes`. When following lines has
-    taken ``most_steps``, all directions together, the scan ends and its tallies are worth nothing.
+    Of the triads only the last rows count. The rest is as in :func:`scan_axes`.
     """
-    left = most_steps
     lines = np.empty(STATE_SIZE)
-    lists = room_for_lists(by_lists or bins.cutoffs.size > 0)
-    most = most_lines(lists) - LANES
-    for axis in range(normals.shape[0]):
-        prism, spheres, grid = cell_grid(grains, normals[axis], offsets[axis], spacing)
-        tally = tallies[axis]
-        measured = measured_in(grains, prism)
-        section = section_along(clip, prism.triad)
-        here = bins_along(bins, prism.triad, axis)
-        for first in range(0, grid.columns, most):
-            part = part_of(grid, first, most)
-            if left <= tally[0, STEPS]:
-                return
-            # along an axis that is not periodic a line runs from the first solid to the last
-            if grains.periodic[prism.third]:
-                medium = grains, prism
-                scan_strips(
-                    lines, spheres, part, section, cutoff, tally, lists, second, True, None,
-                    measured, medium, left, here, None,
-                )  # fmt: skip
-            else:
-                scan_strips(
-                    lines, spheres, part, section, cutoff, tally, lists, second, True, None, None,
-                    None, np.inf, here, None,
-                )  # fmt: skip
+    lists = room_for_lists(by_lists)
+    left = followed.most_steps
+    for axis in range(axes.triads.shape[0]):
+        if left <= 0.0:
+            return
+        normal, offset, tally = axes.triads[axis, 2], axes.offsets[axis], tallies[axis]
+        prism, spheres, grid, measured = cell_grid(grains, normal, offset, axes.spacing)
+        section, triad = foot_of(prism), prism.triad
+        here = bins_along(bins, triad, axis)
+        # along an axis that is not periodic a line runs from the first solid to the last
+        if grains.periodic[prism.third]:
+            counted = Counts(counts.least, counts.second, True, None, measured)
+            beyond = Beyond(followed.cells, triad, followed.without_removed, left, prism.endless)
+            scan_strips(lines, spheres, grid, section, 0.0, tally, counted, lists, here, beyond)
+        else:
+            scan_strips(lines, spheres, grid, section, 0.0, tally, counts, lists, here, None)
         left -= tally[0, STEPS]

@@ -12,9 +12,8 @@ import numpy as np
 
 from scanfab.base.jit import Flag, inner
 from scanfab.base.typing import FloatArray
-from scanfab.scan.kernels.edges import listed_to
-from scanfab.scan.kernels.strips import FAR, Edge
-from scanfab.scan.kernels.sweep import Measured
+from scanfab.scan.kernels.strips import FAR, Counts, Line, Task
+from scanfab.scan.kernels.sweep import add, begins_in, counted, listed_to
 
 # what is added up of the gaps of a block and bin
 NUMBER, LENGTH, SQUARE = range(3)
@@ -106,38 +105,27 @@ def room_for_gaps(count: int) -> FloatArray:
     return np.empty((12, count + 24))
 
 
-@inner(forceinline=True)
+@inner(forceinline=True, error_model="numpy")
 def list_gap(
-    gaps: FloatArray,
-    k: int | np.uint64,
-    u: float,
-    low: float,
-    high: float,
-    enters: float,
-    leaves: float,
-    whole: Flag,
-    window: Edge | None,
-    measured: Measured | None,
+    gaps: FloatArray, k: int | np.uint64, line: Line, low: float, high: float, counts: Counts
 ) -> None:
     """List a gap as number k, as it is and clipped to the window; NaN where it does not count."""
+    u, _, enters, leaves = line
     gaps[LINE_U, k] = u
-    if whole is not None:
+    if counts.whole is not None:
         gaps[GAP_LOW + OF_WHOLE, k] = low
-        if measured is not None:
-            begins = (low - enters >= 0.0) & (low - enters < measured.length)
-            gaps[GAP_HIGH + OF_WHOLE, k] = high if begins else np.nan
-        else:
-            gaps[GAP_HIGH + OF_WHOLE, k] = high
-    if window is not None:
+        gaps[GAP_HIGH + OF_WHOLE, k] = high
+        if counts.measured is not None and not begins_in(low, enters, counts.measured):
+            gaps[GAP_HIGH + OF_WHOLE, k] = np.nan
+    if counts.window is not None:
         gaps[GAP_LOW + OF_WINDOW, k] = low if low > enters else enters
         gaps[GAP_HIGH + OF_WINDOW, k] = high if high < leaves else leaves
-        if window.ends is not None or window.start is not None:
-            gaps[LOW_END, k] = 0.5 if low > enters else 0.0
-            gaps[HIGH_END, k] = 0.5 if high < leaves else 0.0
-        if window.start is not None:
+        gaps[LOW_END, k] = 0.5 if low > enters else 0.0
+        gaps[HIGH_END, k] = 0.5 if high < leaves else 0.0
+        if counts.window.start is not None:
             # those that end beyond the listed solids are followed
-            known = (high < leaves + listed_to(window)) & (low < leaves) & (high > enters)
-            gaps[FULL, k] = high - low if known else 0.0
+            known = high < leaves + listed_to(counts.window)
+            gaps[FULL, k] = high - low if known & (low < leaves) & (high > enters) else 0.0
 
 
 @inner(inline="always")
@@ -159,13 +147,12 @@ def part_of(x: float, parts: float) -> float:
 @inner(error_model="numpy")
 def find_bins(
     bins: Bins,
+    counts: Counts,
     gaps: FloatArray,
     count: np.uint64,
     kind: int | np.uint64,
     v: float,
-    window: Edge | None,
-    low_row: np.uint64,
-    high_row: np.uint64,
+    rows: tuple[np.uint64, np.uint64],
 ) -> None:
     """
     Of gaps on a row of lines, the lengths, 0 where they do not count, and the bins.
@@ -173,12 +160,8 @@ def find_bins(
     By the middle between what stands in two rows of their list: their ends, or one of these twice.
     """
     cutoffs, of = bins.cutoffs, bins.partition
-    to_block, parts, repeats, form = (
-        of.to_block[kind],
-        of.parts[kind],
-        of.repeats[kind],
-        of.form[kind],
-    )
+    to_block, parts = of.to_block[kind], of.parts[kind]
+    repeats, form = of.repeats[kind], of.form[kind]
     x_u, y_u, z_u = to_block[0, 0], to_block[1, 0], to_block[2, 0]
     x_n, y_n, z_n = to_block[0, 2], to_block[1, 2], to_block[2, 2]
     x_v = to_block[0, 1] * v + to_block[0, 3]
@@ -187,7 +170,7 @@ def find_bins(
     in_x, in_y, in_z, shells = parts[0], parts[1], parts[2], parts[3]
     by_x, by_y, by_z = repeats[0], repeats[1], repeats[2]
     xx, yy, zz, xy, xz, yz = form[0], form[1], form[2], form[3], form[4], form[5]
-    lows, highs = gaps[low_row], gaps[high_row]
+    lows, highs = gaps[rows[0]], gaps[rows[1]]
     lengths, places = gaps[COUNTED + kind], gaps[PLACE + kind]
     for k in range(count):
         u, low, high = gaps[LINE_U, k], lows[k], highs[k]
@@ -207,7 +190,7 @@ def find_bins(
             distance = np.sqrt(square if square > 0.0 else 0.0)
             block += in_x * in_y * in_z * part_of(distance, shells)
             is_inside = (abs(x) <= 0.5) & (abs(y) <= 0.5) & (abs(z) <= 0.5) & (distance <= 1.0)
-        if window is not None and window.start is not None:
+        if counts.window is not None and counts.window.start is not None:
             length = gaps[FULL, k]
         is_kept = (length > 0.0) & (length >= cutoffs[0]) & (length < 0.5 * FAR) & is_inside
         lengths[k] = length if is_kept else 0.0
@@ -220,12 +203,12 @@ def find_bins(
 @inner(error_model="numpy")
 def add_ends(
     bins: Bins,
+    counts: Counts,
     gaps: FloatArray,
     count: np.uint64,
     sign: float,
     which: int,
     v: float,
-    window: Edge | None,
 ) -> None:
     """
     Add the first gaps of a list half to the block of each end that is in the window.
@@ -237,7 +220,7 @@ def add_ends(
     for end in range(2):
         row = np.uint64(GAP_LOW + OF_WINDOW if end == 0 else GAP_HIGH + OF_WINDOW)
         weights = gaps[np.uint64(LOW_END + end)]
-        find_bins(bins, gaps, count, kind, v, window, row, row)
+        find_bins(bins, counts, gaps, count, kind, v, (row, row))
         for k in range(count):
             length = gaps[np.uint64(COUNTED) + kind, k]
             place = np.uint64(gaps[np.uint64(PLACE) + kind, k])
@@ -250,37 +233,62 @@ def add_ends(
 @inner(error_model="numpy")
 def add_gaps(
     bins: Bins,
+    counts: Counts,
     gaps: FloatArray,
     count: np.uint64,
     sign: float,
     which: int,
     v: float,
-    whole: Flag,
-    window: Edge | None,
 ) -> None:
     """Add the first gaps of a list, all on one row of lines, where they count; or take them off."""
+    window = counts.window
     if window is not None and window.start is not None and bins.partition.halves is None:
-        add_ends(bins, gaps, count, sign, which, v, window)
+        add_ends(bins, counts, gaps, count, sign, which, v)
         return
-    kinds = np.uint64(OF_WINDOW if whole is None else OF_WHOLE), np.uint64(1 + (window is not None))
-    for kind in range(kinds[0], kinds[1]):
+    first = np.uint64(OF_WINDOW if counts.whole is None else OF_WHOLE)
+    last = np.uint64(OF_WHOLE if window is None else OF_WINDOW) + np.uint64(1)
+    for kind in range(first, last):
         rows = np.uint64(GAP_LOW) + kind, np.uint64(GAP_HIGH) + kind
-        find_bins(bins, gaps, count, kind, v, window, rows[0], rows[1])
+        find_bins(bins, counts, gaps, count, kind, v, rows)
     sums, of = bins.sums, np.uint64(which)
     for k in range(count):
         # both in turns, as a gap has to wait for the one before it if they share a bin
-        for kind in range(kinds[0], kinds[1]):
+        for kind in range(first, last):
             length = gaps[np.uint64(COUNTED) + kind, k]
             place = np.uint64(gaps[np.uint64(PLACE) + kind, k])
             number = sign if length > 0.0 else 0.0
-            weighted, counted = number, number * length * length
+            weighted, last_sum = number, number * length * length
             if window is not None and window.start is not None:
                 number *= gaps[LOW_END, k] + gaps[HIGH_END, k]
-                weighted, counted = number, number * length * length
+                weighted, last_sum = number, number * length * length
             if window is not None and window.ends is not None:
                 # squares of what is inside say nothing: in their place all that are kept
-                weight = gaps[LOW_END, k] + gaps[HIGH_END, k]
-                weighted, counted = number * weight, number
+                weighted, last_sum = number * (gaps[LOW_END, k] + gaps[HIGH_END, k]), number
             sums[kind, of, place, NUMBER] += weighted
             sums[kind, of, place, LENGTH] += number * length
-            sums[kind, of, place, SQUARE] += counted
+            sums[kind, of, place, SQUARE] += last_sum
+
+
+@inner(forceinline=True, error_model="numpy")
+def count_gaps(
+    task: Task, which: int, line: Line, ends: FloatArray, count: int, sign: float
+) -> None:
+    """
+    Add the first gaps of a list, all on one line, to the tallies or the bins, or take them off.
+
+    ``ends``: where they start and end, shape (2, M). With a sign of -1 they are taken off.
+    """
+    counts = task.counts
+    if task.bins.cutoffs.size > 0:
+        gaps = room_for_gaps(count)
+        for k in range(count):
+            list_gap(gaps, k, line, ends[0, k], ends[1, k], counts)
+        add_gaps(task.bins, counts, gaps, np.uint64(count), sign, which, line[1])
+        return
+    for k in range(count):
+        low, high = ends[0, k], ends[1, k]
+        a, b, c, d, e, f = counted(True, low, high, line[2], line[3], counts)
+        if counts.window is not None and counts.window.start is not None and sign < 0.0:
+            # the sweep has added all its length to the void
+            f = max(high - low, 0.0)
+        add(task.tally, which, (sign * a, sign * b, sign * c, sign * d, sign * e, sign * f))

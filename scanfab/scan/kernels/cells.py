@@ -11,10 +11,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from scanfab.base.jit import inner, kernel
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.kernels.strips import FAR
+
+Int32Array = npt.NDArray[np.int32]
 
 # what lets the compiler make vector instructions of a loop that looks for the least number
 LEAST = {"nnan", "nsz", "contract"}
@@ -46,6 +49,8 @@ class Cells(NamedTuple):
     """First entry of each cell, and behind the last one, first edge fastest."""
     farthest: float
     """Rays that have met nothing so far stay in a channel; of periodic grains, a length."""
+    farthest_kept: float
+    """Likewise, of rays that meet no grain that is removed."""
 
 
 @inner(inline="always")
@@ -56,13 +61,13 @@ def cell_of(parts: IntArray, i: int, j: int, k: int) -> int:
 
 @kernel
 def fill_cells(
-    low: IntArray,
-    high: IntArray,
+    low: Int32Array,
+    high: Int32Array,
     periodic: BoolArray,
     parts: IntArray,
     start: IntArray,
-    grain: IntArray,
-    image: IntArray,
+    grain: Int32Array,
+    image: Int32Array,
 ) -> None:
     """
     Count what each cell holds or, if there is room for it, list it.
@@ -222,6 +227,7 @@ def next_solid(
     """
     found, steps = FAR, 0.0
     parts, out = cells.parts, ray.out
+    farthest = cells.farthest_kept if without_removed else cells.farthest
     goes_on = begins_inside(cells, ray)
     while goes_on:
         number = cell_of(parts, ray.cell[0], ray.cell[1], ray.cell[2])
@@ -232,6 +238,6 @@ def next_solid(
         through = through if out[through] < out[2] else 2
         nearest = out[through]
         # what is found behind the cell may have others before it
-        goes_on = found > nearest and nearest <= cells.farthest and steps <= most_steps
+        goes_on = found > nearest and nearest <= farthest and steps <= most_steps
         goes_on = goes_on and enters_next(cells, ray, through)
     return found, steps

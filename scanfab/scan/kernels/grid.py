@@ -1,7 +1,8 @@
 """
-The square grid of scan lines along one direction, and the strips that it is cut into.
+The grid of scan lines along one direction, its strips, and the spheres projected onto it.
 
 In a plane, whose normal is the grid's v, it is one row at v = 0: its shift is one number, along u.
+The spheres are ordered by their depth along the direction.
 """
 
 from __future__ import annotations
@@ -10,9 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.jit import inner
-from scanfab.base.typing import FloatArray, IntArray
-from scanfab.scan.kernels.strips import Strip
+from scanfab.base.jit import LANES, ONE, inner
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
+from scanfab.scan.kernels.strips import FAR, Edge, Sphere, Strip, span
+
+# a bucket with more indices is sorted by itself, and not with all others
+FEW = 16
 
 
 class Grid(NamedTuple):
@@ -41,18 +45,9 @@ def cover(
         offset_v = offset[1]
         row = int(np.ceil(low_v / spacing - offset_v))
         rows = max(int(np.floor(high_v / spacing - offset_v)) - row + 1, 0)
-    low, high = np.empty(rows, np.int64), np.empty(rows, np.int64)
-    for row_of in range(rows):
-        low[row_of], high[row_of] = 0, columns
-    return Grid(
-        spacing,
-        (column + offset[0]) * spacing,
-        (row + offset_v) * spacing,
-        columns,
-        rows,
-        low,
-        high,
-    )
+    first_u, first_v = (column + offset[0]) * spacing, (row + offset_v) * spacing
+    low, high = np.zeros(rows, np.int64), np.full(rows, columns)
+    return Grid(spacing, first_u, first_v, columns, rows, low, high)
 
 
 @inner()
@@ -65,29 +60,11 @@ def limit_row(grid: Grid, row: int, low_u: float, high_u: float) -> None:
 
 
 class Bounds(NamedTuple):
-    """A box and a sphere about the origin that hold all spheres."""
+    """A box and a ball about the origin that hold all spheres."""
 
     centre: FloatArray
     half: FloatArray
     reach: float
-
-
-@inner()
-def bounds(position: FloatArray, radius: FloatArray) -> Bounds:
-    """What holds all spheres."""
-    low, high = np.empty(3), np.empty(3)
-    low[:], high[:] = np.inf, -np.inf
-    reach = 0.0
-    for k in range(radius.size):
-        distance2 = 0.0
-        for i in range(3):
-            x = position[k, i]
-            distance2 += x * x
-            low[i], high[i] = min(low[i], x - radius[k]), max(high[i], x + radius[k])
-        reach = max(reach, np.sqrt(distance2) + radius[k])
-    for i in range(3):
-        low[i], high[i] = 0.5 * (low[i] + high[i]), 0.5 * (high[i] - low[i])
-    return Bounds(low, high, reach)
 
 
 @inner()
@@ -97,10 +74,8 @@ def shadow(extent: Bounds, side: FloatArray, low: float, high: float) -> tuple[f
     for i in range(3):
         middle += extent.centre[i] * side[i]
         half += extent.half[i] * abs(side[i])
-    return (
-        min(low, max(middle - half, -extent.reach)),
-        max(high, min(middle + half, extent.reach)),
-    )
+    low = min(low, max(middle - half, -extent.reach))
+    return low, max(high, min(middle + half, extent.reach))
 
 
 @inner()
@@ -145,14 +120,8 @@ def sheared_grid(
 ) -> Grid:
     """The lines in a parallelogram: those in v, and in u - skew * v."""
     aside_u, aside_v = skew * low_v, skew * high_v
-    grid = cover(
-        low_u + min(aside_u, aside_v),
-        high_u + max(aside_u, aside_v),
-        low_v,
-        high_v,
-        offset,
-        spacing,
-    )
+    low, high = low_u + min(aside_u, aside_v), high_u + max(aside_u, aside_v)
+    grid = cover(low, high, low_v, high_v, offset, spacing)
     for row in range(grid.rows):
         aside = skew * (grid.first_v + row * spacing)
         limit_row(grid, row, low_u + aside, high_u + aside)
@@ -160,36 +129,184 @@ def sheared_grid(
 
 
 @inner()
-def part_of(grid: Grid, first: int, most: int) -> Grid:
-    """So many columns of a grid at most, from the first one wanted."""
-    columns = min(most, grid.columns - first)
-    low, high = np.empty(grid.rows, np.int64), np.empty(grid.rows, np.int64)
-    for row in range(grid.rows):
-        low[row] = min(max(grid.low[row] - first, 0), columns)
-        high[row] = min(max(grid.high[row] - first, 0), columns)
-    return Grid(
+def strip_of(grid: Grid, row: int, rows: int, column: int, columns: int) -> Strip:
+    """The strip of so many rows and columns at most, from a row and a column on."""
+    rows, columns = min(rows, grid.rows - row), min(columns, grid.columns - column)
+    low, high = np.empty(rows, np.int64), np.empty(rows, np.int64)
+    for k in range(rows):
+        low[k] = min(max(grid.low[row + k] - column, 0), columns)
+        high[k] = min(max(grid.high[row + k] - column, 0), columns)
+    return Strip(
         grid.spacing,
-        grid.first_u + first * grid.spacing,
-        grid.first_v,
+        1.0 / grid.spacing,
+        grid.first_u + column * grid.spacing,
+        grid.first_v + row * grid.spacing,
         columns,
-        grid.rows,
+        rows,
+        columns + LANES,
         low,
         high,
     )
 
 
+class Spheres(NamedTuple):
+    """Projected spheres, ordered by depth; some are not in the second set of solids."""
+
+    u: FloatArray
+    v: FloatArray
+    depth: FloatArray
+    radius: FloatArray
+    removed: BoolArray
+
+
 @inner()
-def strip_of(grid: Grid, number: int, rows: int, pitch: int) -> Strip:
-    """One of the strips of a grid that have so many rows each."""
-    row = number * rows
-    return Strip(
-        grid.spacing,
-        1.0 / grid.spacing,
-        grid.first_u,
-        grid.first_v + row * grid.spacing,
-        grid.columns,
-        min(rows, grid.rows - row),
-        pitch,
-        grid.low[row : row + rows],
-        grid.high[row : row + rows],
+def room_for_spheres(count: int) -> Spheres:
+    """So many spheres, to be filled in."""
+    return Spheres(
+        np.empty(count),
+        np.empty(count),
+        np.empty(count),
+        np.empty(count),
+        np.empty(count, np.bool_),
     )
+
+
+@inner(inline="always")
+def sphere_at(spheres: Spheres, k: int | np.uint64) -> Sphere:
+    """Sphere k."""
+    return Sphere(spheres.u[k], spheres.v[k], spheres.depth[k], spheres.radius[k])
+
+
+@inner(error_model="numpy")
+def project(
+    position: FloatArray,
+    radius: FloatArray,
+    removed: BoolArray,
+    triad: FloatArray,
+    grid: Grid,
+    reach: float,
+    window: Edge | None,
+) -> Spheres:
+    """
+    The spheres that may meet a line, ordered by depth, in the triad with rows u, v, n.
+
+    By the rule ``start`` without those that lie aside of the ball that holds the window, whose
+    radius is ``reach``, or more than the margin before or behind it.
+    """
+    u_x, u_y, u_z = triad[0, 0], triad[0, 1], triad[0, 2]
+    v_x, v_y, v_z = triad[1, 0], triad[1, 1], triad[1, 2]
+    n_x, n_y, n_z = triad[2, 0], triad[2, 1], triad[2, 2]
+    found, count = room_for_spheres(radius.size), np.uint64(0)
+    per_spacing = 1.0 / grid.spacing
+    for k in range(np.uint64(radius.size)):
+        x, y, z = position[k, 0], position[k, 1], position[k, 2]
+        found.u[count] = u = u_x * x + u_y * y + u_z * z
+        found.v[count] = v = v_x * x + v_y * y + v_z * z
+        found.depth[count] = depth = n_x * x + n_y * y + n_z * z
+        found.radius[count], found.removed[count] = radius[k], removed[k]
+        # a row and a column within reach; whether they cross there, the visit will see
+        column, row = (u - grid.first_u) * per_spacing, (v - grid.first_v) * per_spacing
+        away = radius[k] * per_spacing
+        meets = (np.floor(row + away) >= row - away) & (np.floor(column + away) >= column - away)
+        if window is not None and window.start is not None:
+            beyond, near = max(abs(depth) - window.margin, 0.0), reach + radius[k]
+            meets &= u * u + v * v + beyond * beyond <= near * near
+        count += np.uint64(meets)
+    return in_order(found, int(count))
+
+
+@inner()
+def in_order(spheres: Spheres, count: int) -> Spheres:
+    """The first spheres, so many, ordered by depth."""
+    order, found = order_of(spheres.depth[:count]), room_for_spheres(count)
+    for i in range(np.uint64(count)):
+        k = np.uint64(order[i])
+        found.u[i], found.v[i], found.depth[i] = spheres.u[k], spheres.v[k], spheres.depth[k]
+        found.radius[i], found.removed[i] = spheres.radius[k], spheres.removed[k]
+    return found
+
+
+@inner(error_model="numpy")
+def order_of(values: FloatArray) -> IntArray:
+    """Indices that sort values: by buckets, in linear time unless most crowd in a few."""
+    count = values.size
+    low, high = np.inf, -np.inf
+    for value in values:
+        low, high = min(low, value), max(high, value)
+    per_width = (count - 1) / (high - low)
+    # all of them may be equal, or nearly
+    per_width = per_width if per_width < FAR else 0.0
+    stop = np.zeros(count + 1, np.int64)
+    for value in values:
+        stop[np.uint64((value - low) * per_width) + np.uint64(1)] += 1
+    for bucket in range(np.uint64(count)):
+        stop[bucket + np.uint64(1)] += stop[bucket]
+    # from starts of the buckets to their ends, while they fill
+    order = np.empty(count, np.int64)
+    for k in range(np.uint64(count)):
+        its_bucket = np.uint64((values[k] - low) * per_width)
+        order[np.uint64(stop[its_bucket])] = k
+        stop[its_bucket] += 1
+    start = 0
+    for bucket in range(np.uint64(count)):
+        if stop[bucket] - start > FEW:
+            sort_by(values, order[start : stop[bucket]])
+        start = stop[bucket]
+    insert(values, order, ONE)
+    return order
+
+
+@inner()
+def sort_by(values: FloatArray, members: IntArray) -> None:
+    """Order some indices by their values, in place (Shell's sort, which suits few of them)."""
+    gap = 1
+    while gap < members.size // 9:
+        gap = 3 * gap + 1
+    while gap > 0:
+        insert(values, members, gap)
+        gap //= 3
+
+
+@inner()
+def insert(values: FloatArray, members: IntArray, gap: int) -> None:
+    """Order those that are a multiple of the gap apart: fast where few are far from their place."""
+    step = np.uint64(gap)
+    for i in range(step, np.uint64(members.size)):
+        moving, j = members[i], np.uint64(i)
+        value = values[np.uint64(moving)]
+        while j >= step and values[np.uint64(members[j - step])] > value:
+            members[j] = members[j - step]
+            j -= step
+        members[j] = moving
+
+
+@inner()
+def sort_into_strips(spheres: Spheres, grid: Grid, rows: int) -> tuple[IntArray, IntArray]:
+    """
+    The spheres that each strip of so many rows meets, in their order.
+
+    Returns the start of each strip's list (one entry more than there are strips) and the lists.
+    """
+    start, chosen = np.zeros(-(-grid.rows // rows) + 2, np.int64), np.empty(0, np.int64)
+    if grid.rows <= rows:
+        # all of them
+        chosen = np.empty(spheres.u.size, np.int64)
+        for k in range(chosen.size):
+            chosen[k] = k
+        start[1] = chosen.size
+        return start[:2], chosen
+    # first they are counted; where lists begin while they are filled, they end at last
+    for fill in range(2):
+        for k in range(spheres.u.size):
+            v, radius = spheres.v[k], spheres.radius[k]
+            first, last = span(v, radius, grid.first_v, 1.0 / grid.spacing, 0, grid.rows)
+            if first < last:
+                for strip in range(first // rows, (last - 1) // rows + 1):
+                    if fill:
+                        chosen[start[strip + 1]] = k
+                    start[strip + (1 if fill else 2)] += 1
+        if not fill:
+            for strip in range(2, start.size):
+                start[strip] += start[strip - 1]
+            chosen = np.empty(start[-1], np.int64)
+    return start[:-1], chosen

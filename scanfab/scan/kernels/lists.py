@@ -13,16 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.jit import LANES, ONE, REORDERED, ZERO, Flag, inner
+from scanfab.base.jit import LANES, ONE, REORDERED, ZERO, inner
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.scan.kernels.bins import (
-    Bins,
-    add_gaps,
-    list_gap,
-    room_for_gaps,
-)
-from scanfab.scan.kernels.projection import Spheres, sphere_at
-from scanfab.scan.kernels.start import begins_at, met_beyond, reaches_in
+from scanfab.scan.kernels.bins import add_gaps, list_gap, room_for_gaps
+from scanfab.scan.kernels.grid import Spheres, sphere_at
 from scanfab.scan.kernels.strips import (
     BEFORE,
     BEHIND,
@@ -33,11 +27,22 @@ from scanfab.scan.kernels.strips import (
     GAP_END,
     GAP_START,
     SET,
-    Edge,
+    Line,
     Strip,
+    Task,
     span,
 )
-from scanfab.scan.kernels.sweep import CHORDS, Measured, add, both, is_listed, meet, moved
+from scanfab.scan.kernels.sweep import (
+    CHORDS,
+    add,
+    begins_at,
+    both,
+    is_listed,
+    meet,
+    met_beyond,
+    moved,
+    reaches_in,
+)
 
 # lines swept side by side; their lists lie together, first the first chord of each line
 ABREAST = 64
@@ -55,6 +60,10 @@ LEAST_REACH2 = 1e-300
 # gaps to be put in bins together
 TOGETHER = 512
 ALMOST = np.uint64(TOGETHER - ROOM)
+
+# where a chord starts and stops; the solid's end on a line, and where its last gap starts and ends
+Chord = tuple[float, float]
+State = tuple[float, float, float]
 
 
 class Lists(NamedTuple):
@@ -129,19 +138,10 @@ def list_chords(lists: Lists, strip: Strip, spheres: Spheres, chosen: IntArray, 
 
 @inner(forceinline=True, fastmath=REORDERED, error_model="numpy")
 def sweep_abreast(
-    lines: FloatArray,
-    lists: Lists,
-    first: np.uint64,
-    place: np.uint64,
-    vectors: np.uint64,
-    least: float,
-    tally: FloatArray,
-    second: Flag,
-    whole: Flag,
-    window: Edge | None,
-    measured: Measured | None,
+    task: Task, lists: Lists, first: np.uint64, place: np.uint64, vectors: np.uint64
 ) -> None:
     """Let so many vectors of lines from the first on meet one chord each."""
+    lines, counts = task.lines, task.counts
     sums = sums2 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for j in range(np.uint64(vectors * LANES)):
         i, k = first + j, place + j
@@ -149,38 +149,23 @@ def sweep_abreast(
         half_chord = np.sqrt(abs(reach2))
         half_chord = half_chord if np.int64(k) < lists.stop[i] else np.nan
         start, stop = depth - half_chord, depth + half_chord
-        enters, leaves = lines[i + ENTRY], lines[i + EXIT]
-        known = is_listed(start, enters, measured)
+        line = 0.0, 0.0, lines[i + ENTRY], lines[i + EXIT]
+        known = is_listed(start, lines[i + ENTRY], counts)
         start, stop = start if known else np.nan, stop if known else np.nan
-        found = meet(lines, i, start, stop, least, enters, leaves, whole, window, measured)
-        sums = both(sums, found)
-        if second is not None:
+        sums = both(sums, meet(lines, i, line, start, stop, counts))
+        if counts.second is not None:
             start = start if reach2 > 0.0 else np.nan
             stop = stop if reach2 > 0.0 else np.nan
-            found = meet(
-                lines, i + SET, start, stop, least, enters, leaves, whole, window, measured
-            )
-            sums2 = both(sums2, found)
-    add(tally, 0, sums)
-    if second is not None:
-        add(tally, 1, sums2)
+            sums2 = both(sums2, meet(lines, i + SET, line, start, stop, counts))
+    add(task.tally, 0, sums)
+    if counts.second is not None:
+        add(task.tally, 1, sums2)
 
 
 @inner()
-def sweep_lists(
-    lines: FloatArray,
-    lists: Lists,
-    strip: Strip,
-    least: float,
-    tally: FloatArray,
-    second: Flag,
-    whole: Flag,
-    window: Edge | None,
-    measured: Measured | None,
-) -> None:
+def sweep_lists(task: Task, lists: Lists) -> None:
     """Sweep the lines of a strip over their lists, tally the gaps, and empty the lists."""
-    stop = lists.stop
-    count = strip.rows * strip.pitch
+    lines, stop, count = task.lines, lists.stop, task.strip.rows * task.strip.pitch
     chords = 0
     for begin in range(0, count, ABREAST):
         place = first_place(begin)
@@ -198,144 +183,104 @@ def sweep_lists(
             if first == last:
                 break
             skipped = first // LANES * LANES
-            these = (
-                np.uint64(begin + skipped),
-                np.uint64(place + skipped),
-                np.uint64((last - skipped + LANES - 1) // LANES),
-            )
-            sweep_abreast(lines, lists, *these, least, tally, second, whole, window, measured)
+            at, chord = np.uint64(begin + skipped), np.uint64(place + skipped)
+            vectors = np.uint64((last - skipped + LANES - 1) // LANES)
+            sweep_abreast(task, lists, at, chord, vectors)
             place += NEXT
         for line in range(begin, min(begin + ABREAST, count)):
             stop[line] = first_place(line)
-    tally[0, CHORDS] += chords
+    task.tally[0, CHORDS] += chords
 
 
 @inner(forceinline=True, error_model="numpy")
-def meets(
-    lines: FloatArray,
-    i: np.uint64,
-    start: float,
-    stop: float,
-    enters: float,
-    leaves: float,
-    window: Edge | None,
-    measured: Measured | None,
-) -> bool:
-    """Whether a line's state is moved on by a chord."""
-    is_met = is_listed(start, enters, measured)
-    if window is not None and window.start is not None:
-        met_beyond(lines, i, start, stop, enters, leaves)
+def list_settled(
+    task: Task,
+    k: np.uint64,
+    line: Line,
+    chord: Chord,
+    state: State,
+    gaps: FloatArray,
+    count: np.uint64,
+) -> tuple[State, np.uint64]:
+    """
+    Let a line meet a chord, and list the gap that this settles; returns its state and their number.
+
+    ``k`` is where the line's state begins. A chord of NaN settles none.
+    """
+    lines, counts = task.lines, task.counts
+    (start, stop), (end, low, high), (_, _, enters, leaves) = chord, state, line
+    first, is_met = low, is_listed(start, enters, counts)
+    if counts.window is not None and counts.window.start is not None:
+        met_beyond(lines, k, start, stop, enters, leaves)
         is_met = reaches_in(start, stop, enters, leaves)
-    return is_met
-
-
-@inner(forceinline=True, error_model="numpy")
-def begin_of(lines: FloatArray, i: np.uint64, low: float, window: Edge | None) -> float:
-    """Where a line's last gap begins."""
-    if window is not None and window.start is not None:
-        low = begins_at(low, lines[i + BEFORE])
-    return low
+        first = begins_at(low, lines[k + BEFORE])
+    if is_met:
+        # listed anyhow, as chords are
+        list_gap(gaps, count, line, first, high, counts)
+        count += np.uint64((start > end) & (high - first >= counts.least))
+        state = moved(start, stop, end, low, high)
+    return state, count
 
 
 @inner(error_model="numpy")
-def bin_lists(
-    lines: FloatArray,
-    lists: Lists,
-    strip: Strip,
-    least: float,
-    tally: FloatArray,
-    bins: Bins,
-    second: Flag,
-    whole: Flag,
-    window: Edge | None,
-    measured: Measured | None,
-) -> None:
+def bin_lists(task: Task, lists: Lists) -> None:
     """Sweep the lines of a strip over their lists, put the gaps in bins, and empty the lists."""
-    chords, stops, met = lists.chords, lists.stop, 0
-    gaps, gaps2 = room_for_gaps(TOGETHER), room_for_gaps(TOGETHER)
+    lines, strip, counts, stops = task.lines, task.strip, task.counts, lists.stop
+    gaps, gaps2, met = room_for_gaps(TOGETHER), room_for_gaps(TOGETHER), 0
     for row in range(strip.rows):
-        v = strip.first_v + row * strip.spacing
-        count = count2 = np.uint64(0)
+        v, count, count2 = strip.first_v + row * strip.spacing, np.uint64(0), np.uint64(0)
         for column in range(strip.columns):
-            u = strip.first_u + column * strip.spacing
-            line = row * strip.pitch + column
-            i, i2 = np.uint64(line), np.uint64(line) + SET
-            enters, leaves = lines[i + ENTRY], lines[i + EXIT]
-            end, low, high = lines[i + END], lines[i + GAP_START], lines[i + GAP_END]
-            end2, low2, high2 = lines[i2 + END], lines[i2 + GAP_START], lines[i2 + GAP_END]
-            for place in range(first_place(line), stops[i], NEXT):
-                depth, reach2 = chords[np.uint64(place)], chords[np.uint64(place + ABREAST)]
+            number = row * strip.pitch + column
+            i, i2 = np.uint64(number), np.uint64(number) + SET
+            line = strip.first_u + column * strip.spacing, v, lines[i + ENTRY], lines[i + EXIT]
+            state = lines[i + END], lines[i + GAP_START], lines[i + GAP_END]
+            state2 = lines[i2 + END], lines[i2 + GAP_START], lines[i2 + GAP_END]
+            for place in range(first_place(number), stops[i], NEXT):
+                depth, reach2 = (
+                    lists.chords[np.uint64(place)],
+                    lists.chords[np.uint64(place + ABREAST)],
+                )
                 half_chord = np.sqrt(abs(reach2))
-                start, stop = depth - half_chord, depth + half_chord
-                is_met = meets(lines, i, start, stop, enters, leaves, window, measured)
-                if second is not None and reach2 > 0.0:
-                    meets(lines, i2, start, stop, enters, leaves, window, measured)
-                if not is_met:
-                    continue
-                first = begin_of(lines, i, low, window)
-                # listed anyhow, as chords are
-                list_gap(gaps, count, u, first, high, enters, leaves, whole, window, measured)
-                count += np.uint64((start > end) & (high - first >= least))
-                end, low, high = moved(start, stop, end, low, high)
-                if second is not None:
-                    start = start if reach2 > 0.0 else np.nan
-                    stop = stop if reach2 > 0.0 else np.nan
-                    first = begin_of(lines, i2, low2, window)
-                    list_gap(
-                        gaps2, count2, u, first, high2, enters, leaves, whole, window, measured
-                    )
-                    count2 += np.uint64((start > end2) & (high2 - first >= least))
-                    end2, low2, high2 = moved(start, stop, end2, low2, high2)
-            lines[i + END], lines[i + GAP_START], lines[i + GAP_END] = end, low, high
-            if second is not None:
-                lines[i2 + END], lines[i2 + GAP_START], lines[i2 + GAP_END] = end2, low2, high2
-            met += (stops[i] - first_place(line)) // NEXT
-            stops[i] = first_place(line)
+                chord = depth - half_chord, depth + half_chord
+                state, count = list_settled(task, i, line, chord, state, gaps, count)
+                if counts.second is not None and reach2 > 0.0:
+                    state2, count2 = list_settled(task, i2, line, chord, state2, gaps2, count2)
+            lines[i + END], lines[i + GAP_START], lines[i + GAP_END] = state
+            if counts.second is not None:
+                lines[i2 + END], lines[i2 + GAP_START], lines[i2 + GAP_END] = state2
+            met += (stops[i] - first_place(number)) // NEXT
+            stops[i] = first_place(number)
             if count >= ALMOST or count2 >= ALMOST or column == strip.columns - 1:
-                add_gaps(bins, gaps, count, 1.0, ZERO, v, whole, window)
-                add_gaps(bins, gaps2, count2, 1.0, ONE, v, whole, window)
+                add_gaps(task.bins, counts, gaps, count, 1.0, ZERO, v)
+                add_gaps(task.bins, counts, gaps2, count2, 1.0, ONE, v)
                 count = count2 = np.uint64(0)
-    tally[0, CHORDS] += met
+    task.tally[0, CHORDS] += met
 
 
 @inner()
-def bin_last_gaps(
-    lines: FloatArray,
-    strip: Strip,
-    which: int,
-    bins: Bins,
-    whole: Flag,
-    window: Edge | None,
-    measured: Measured | None,
-) -> float:
+def bin_last_gaps(task: Task, which: int) -> float:
     """
     Put every line's last gap, and the void behind its last solid, in bins.
 
     Returns the number of closed lines, of which there is nothing put.
     """
-    closed = 0.0
-    gaps = room_for_gaps(2 * strip.columns)
+    lines, strip, counts = task.lines, task.strip, task.counts
+    gaps, closed = room_for_gaps(2 * strip.columns), 0.0
     for row in range(strip.rows):
-        v = strip.first_v + row * strip.spacing
-        count = 0
+        v, count = strip.first_v + row * strip.spacing, 0
         for column in range(strip.low[row], strip.high[row]):
             i = np.uint64(row * strip.pitch + column)
             k = i + SET * np.uint64(which)
-            if lines[k + END] == FAR:
+            end, first, behind = lines[k + END], lines[k + GAP_START], FAR
+            if end == FAR:
                 closed += 1.0
                 continue
-            u, enters, leaves = (
-                strip.first_u + column * strip.spacing,
-                lines[i + ENTRY],
-                lines[i + EXIT],
-            )
-            last = begin_of(lines, k, lines[k + GAP_START], window), lines[k + GAP_END]
-            behind = FAR
-            if window is not None and window.start is not None:
-                behind = lines[k + BEHIND]
-            for low, high in (last, (lines[k + END], behind)):
-                list_gap(gaps, count, u, low, high, enters, leaves, whole, window, measured)
+            line = strip.first_u + column * strip.spacing, v, lines[i + ENTRY], lines[i + EXIT]
+            if counts.window is not None and counts.window.start is not None:
+                first, behind = begins_at(first, lines[k + BEFORE]), lines[k + BEHIND]
+            for low, high in ((first, lines[k + GAP_END]), (end, behind)):
+                list_gap(gaps, count, line, low, high, counts)
                 # behind the last solid there is void in the window alone
-                count += (high - low > 0.0) & ((high < FAR) | (low < leaves))
-        add_gaps(bins, gaps, np.uint64(count), 1.0, which, v, whole, window)
+                count += (high - low > 0.0) & ((high < FAR) | (low < line[3]))
+        add_gaps(task.bins, counts, gaps, np.uint64(count), 1.0, which, v)
     return closed

@@ -16,9 +16,8 @@ import numpy as np
 
 from scanfab.base.jit import ZERO, inner
 from scanfab.base.typing import BoolArray, FloatArray
-from scanfab.scan.kernels.grid import Grid, sheared_grid
-from scanfab.scan.kernels.projection import Spheres, in_order, order_of, range_of, room_for_spheres
-from scanfab.scan.kernels.sweep import Measured
+from scanfab.scan.kernels.grid import Grid, Spheres, in_order, room_for_spheres, sheared_grid
+from scanfab.scan.kernels.strips import Measured, Section, dot
 
 # how far beyond the prism solids are listed at once, in mean radii; longer gaps are followed alone
 BEYOND = 16.0
@@ -59,12 +58,6 @@ class Prism(NamedTuple):
     """By how much the height changes over a length of 1, at most."""
     endless: bool
     """Whether lines have no end: all edges repeat, in a plane but the one across it."""
-
-
-@inner()
-def dot(a: FloatArray, b: FloatArray) -> float:
-    """Scalar product."""
-    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 @inner()
@@ -138,11 +131,8 @@ def fill_images(
     n_x, n_y, n_z = triad[2, 0], triad[2, 1], triad[2, 2]
     layers = grains.periodic[prism.third]
     rows, columns = grains.periodic[prism.second], grains.periodic[prism.first]
-    a, b, c = (
-        grains.vectors[prism.first],
-        grains.vectors[prism.second],
-        grains.vectors[prism.third],
-    )
+    a, b = grains.vectors[prism.first], grains.vectors[prism.second]
+    c = grains.vectors[prism.third]
     along_a, along_b = dot(a, triad[2]), dot(b, triad[2])
     c_u, c_v, c_n = dot(c, triad[0]), dot(c, triad[1]), dot(c, triad[2])
     step = 1.0 if c_n - prism.rise_u * c_u - prism.rise_v * c_v > 0.0 else -1.0
@@ -186,24 +176,14 @@ def fill_images(
 
 
 @inner()
-def measured_in(grains: CellGrains, prism: Prism) -> Measured:
-    """The length of the lines in the prism, and how far from its beginning solids are listed."""
-    mean = 0.0
-    for radius in grains.radius:
-        mean += radius / grains.radius.size
-    return Measured(prism.length, prism.length + BEYOND * mean)
-
-
-@inner()
-def images_in(grains: CellGrains, prism: Prism) -> tuple[Spheres, FloatArray]:
-    """
-    The images of grains that may meet a line of the prism, projected, in no order.
-
-    And the bounds of the lines: least and greatest v, least and greatest u along the skew.
-    """
-    known = measured_in(grains, prism).known
-    mean = (known - prism.length) / BEYOND
-    beyond = known / prism.length - 1.0
+def cell_grid(
+    grains: CellGrains, normal: FloatArray, offset: FloatArray, spacing: float
+) -> tuple[Prism, Spheres, Grid, Measured]:
+    """The lines along a direction through a periodic medium, and the images that they may meet."""
+    prism = prism_along(normal, grains.vectors, grains.periodic, offset.size == 1)
+    mean = grains.radius.mean()
+    beyond = BEYOND * mean / prism.length
+    # least and greatest v, least and greatest u along the skew
     extent = np.array([np.inf, -np.inf, np.inf, -np.inf])
     # a good guess for small grains; where it is too low, the second round has enough
     shell = 1.0 + beyond + 2.0 * mean * prism.slope
@@ -218,24 +198,13 @@ def images_in(grains: CellGrains, prism: Prism) -> tuple[Spheres, FloatArray]:
         extent[0], extent[1] = 0.0, prism.base_v
     if grains.periodic[prism.first]:
         extent[2], extent[3] = 0.0, prism.base_u
-    found = Spheres(
-        images.u[:count],
-        images.v[:count],
-        images.depth[:count],
-        images.radius[:count],
-        images.removed[:count],
-    )
-    return found, extent
+    skew = prism.skew_u / prism.base_v
+    grid = sheared_grid(extent[2], extent[3], extent[0], extent[1], skew, offset, spacing)
+    measured = Measured(prism.length, prism.length + BEYOND * mean)
+    return prism, in_order(images, count), grid, measured
 
 
 @inner()
-def cell_grid(
-    grains: CellGrains, normal: FloatArray, offset: FloatArray, spacing: float
-) -> tuple[Prism, Spheres, Grid]:
-    """The lines along a direction through a periodic medium, and the images that they may meet."""
-    prism = prism_along(normal, grains.vectors, grains.periodic, offset.size == 1)
-    found, extent = images_in(grains, prism)
-    spheres = in_order(found, order_of(found.depth, *range_of(found.depth)))
-    skew = prism.skew_u / prism.base_v
-    grid = sheared_grid(extent[2], extent[3], extent[0], extent[1], skew, offset, spacing)
-    return prism, spheres, grid
+def foot_of(prism: Prism) -> Section:
+    """Where the measured length of each line begins: on a plane through the origin."""
+    return Section(np.empty((0, 4)), 0.0, 0.0, 0.0, 0.0, prism.rise_u, prism.rise_v)

@@ -1,67 +1,127 @@
 """
-Strips of scan lines: where the lines are, which of them a sphere reaches, and their state.
+Strips of scan lines: where they are, where they enter and leave the window, and their state.
 
-The state is three numbers a line for each set of solids, the running end of the solid and the two
-ends of the last gap, and two more that both sets share, where the line enters and leaves the
-window; what they are for, :mod:`scanfab.scan.kernels.sweep` says.
+The state of a line is three numbers for each set of solids, the running end of the solid and the
+two ends of the last gap, and two that both sets share, where the line enters and leaves the window;
+:mod:`scanfab.scan.kernels.sweep` says what they are for.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from scanfab.base.jit import LANES, Flag, inner, kernel
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.scan.kernels.windows import Clip, Section, section_along
+
+if TYPE_CHECKING:
+    from scanfab.scan.kernels.bins import Bins
+
+# along u and v where a line is, and the depths at which it enters and leaves the window
+Line = tuple[float, float, float, float]
 
 # infinity
 FAR = 1e300
-# the state of a strip's lines fits a core's cache; its planes lie at a fixed distance, by which the
-# compiler sees that they do not overlap
+# The state of a strip's lines fits a core's cache. Its planes lie at a fixed distance, by which the
+# compiler sees that they do not overlap.
 MOST_LINES = 24_576
 PLANE = np.uint64(MOST_LINES + 24)
-# first places of the planes: running end, last gap; the same for the second set of solids; and
-# where the line enters the window, or where its measured length begins, and where it leaves it
+# First places of the planes: the running end and the last gap; SET places on the same for the
+# second set of solids; then where the line enters the window, or where its measured length begins,
+# and where it leaves the window.
 END, GAP_START, GAP_END = np.uint64(0), PLANE, np.uint64(2) * PLANE
 SET = np.uint64(3) * PLANE
 ENTRY, EXIT = np.uint64(6) * PLANE, np.uint64(7) * PLANE
-# Of the rule ``start``: where the last solid before the window ends, with a minus, and where the
-# first one behind it begins, see :mod:`scanfab.scan.kernels.start`. The second set's planes are SET
-# behind, and the one between is never touched.
+# Of the rule `start`: where the last solid before the window ends, with a minus, and where the
+# first one behind it begins. The second set's planes are SET behind; the one between is not used.
 BEFORE, BEHIND = np.uint64(8) * PLANE, np.uint64(9) * PLANE
 STATE_SIZE = int(13 * PLANE)
 ONE = np.uint64(1)
-# a sphere that is no more lines wide is visited as a square: to find where its chords begin and end
-# in each row would take longer than the corners
+# A sphere that is no more lines wide is visited as a square: to find where its chords begin and end
+# in each row would take longer than the corners.
 NARROW = 12
-
-
-# steps towards the lines of a row that meet a window of planes: the more, the fewer are left over
-TANGENTS = 2
+# Of a quadric's own size: along a line for which it changes less than that by rounding alone, it
+# does not change at all. A line of this kind, along a cylinder's axis, leaves it far beyond the
+# planes.
+FLAT, LEAST = 1e-15, 1e-300
+# of the unit normal of a plane, along a line: where it is less, the line is taken for parallel
+GRAZING = 1e-100
 
 
 class Edge(NamedTuple):
-    """
-    A rule of what counts at the window's surface, see :mod:`scanfab.scan.kernels.edges`.
-
-    For each of them kernels are compiled with nothing else in them.
-    """
+    """A rule of what counts at the window's surface, see :mod:`scanfab.scan.kernels.sweep`."""
 
     ends: Flag
     start: Flag
     margin: float
     """Of ``start``: how far beyond the window solids are listed; else 0."""
-    inside: Flag
-    """Of ``start``: whether only chords of spheres that lie wholly in the window are met."""
+
+
+class Measured(NamedTuple):
+    """The measured length of a line through a periodic medium."""
+
+    length: float
+    """Gaps that begin in it count."""
+    known: float
+    """Chords that begin further behind its beginning may not be listed, and are left out."""
+
+
+class Counts(NamedTuple):
+    """
+    What a scan counts; where a field is None, kernels are compiled without what it asks for.
+
+    The fields are explained in :mod:`scanfab.scan.kernels.sweep`.
+    """
+
+    least: float
+    """Length of the shortest gap that is kept, above 0."""
+    second: Flag
+    whole: Flag
+    window: Edge | None
+    measured: Measured | None
+
+
+class Clip(NamedTuple):
+    """What lines are clipped to: the data of a :class:`scanfab.base.convex.Convex`."""
+
+    planes: FloatArray
+    """Shape (P, 4)."""
+    isotropic: float
+    deviator: FloatArray
+    size: float
+    """That of the quadric: no element of its matrix is greater."""
+    level: float
+    reach: float
+
+
+class Section(NamedTuple):
+    """
+    A window as the lines along one axis meet it.
+
+    Those through (u, v) are inside at depths within √(level - a u² - 2 b u v - c v²) of
+    rise_u u + rise_v v, and on the inner side of all planes.
+    """
+
+    planes: FloatArray
+    """
+    Rows h, p, q, side: the plane is met at the depth side * (h - p u - q v), shape (P, 4).
+
+    On the side 1 a line leaves the window there, on the side -1 it enters.
+    """
+    level: float
+    a: float
+    b: float
+    c: float
+    rise_u: float
+    rise_v: float
 
 
 class Strip(NamedTuple):
     """
     Lines at (first_u + column * spacing, first_v + row * spacing), of each row low to before high.
 
-    A row takes ``pitch`` places of a plane, which is ``columns`` and at least LANES more.
+    A row takes ``pitch`` places of a plane, at least LANES more than there are columns.
     """
 
     spacing: float
@@ -75,6 +135,19 @@ class Strip(NamedTuple):
     high: IntArray
 
 
+class Task(NamedTuple):
+    """The lines of a strip, what is counted on them, and where to."""
+
+    lines: FloatArray
+    """Their state, shape (STATE_SIZE,)."""
+    strip: Strip
+    counts: Counts
+    tally: FloatArray
+    """Of the two sets of solids, shape (2, TALLY_SIZE)."""
+    bins: Bins
+    """Where every gap is added instead, if it has cut-offs."""
+
+
 class Sphere(NamedTuple):
     """A sphere, projected."""
 
@@ -84,45 +157,115 @@ class Sphere(NamedTuple):
     radius: float
 
 
+@inner()
+def form(matrix: FloatArray, one: FloatArray, two: FloatArray) -> float:
+    """The bilinear form of a matrix."""
+    total = 0.0
+    for i in range(3):
+        for j in range(3):
+            total += one[i] * matrix[i, j] * two[j]
+    return total
+
+
+@inner()
+def dot(a: FloatArray, b: FloatArray) -> float:
+    """Scalar product."""
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@inner()
+def section_along(clip: Clip, triad: FloatArray) -> Section:
+    """
+    The section for the lines along the third row of a triad (rows u, v, n).
+
+    On a line the quadric x·(m I + D) x = L is a quadratic equation in the depth t. With q the
+    matrix in the triad,
+
+        t = -(q_un u + q_vn v) / q_nn ± √(L / q_nn - a u² - 2 b u v - c v²),
+
+    where a = q_uu / q_nn - (q_un / q_nn)², and b, c likewise. m I is the same in every triad.
+    """
+    u, v, n = triad[0], triad[1], triad[2]
+    m, deviator = clip.isotropic, clip.deviator
+    along, lean_u, lean_v = m + form(deviator, n, n), form(deviator, u, n), form(deviator, v, n)
+    flat = FLAT * clip.size + LEAST
+    if along < flat:
+        along, lean_u, lean_v = flat, 0.0, 0.0
+    lean_u, lean_v = lean_u / along, lean_v / along
+    planes = np.empty_like(clip.planes)
+    for k in range(planes.shape[0]):
+        normal = clip.planes[k]
+        # along a plane a line meets it far beyond all others, in front or behind
+        steep = max(abs(dot(n, normal)), GRAZING)
+        planes[k, 0], planes[k, 1] = normal[3] / steep, dot(u, normal) / steep
+        planes[k, 2], planes[k, 3] = dot(v, normal) / steep, -1.0 if dot(n, normal) < 0.0 else 1.0
+    return Section(
+        planes,
+        clip.level / along,
+        (m + form(deviator, u, u)) / along - lean_u * lean_u,
+        form(deviator, u, v) / along - lean_u * lean_v,
+        (m + form(deviator, v, v)) / along - lean_v * lean_v,
+        -lean_u,
+        -lean_v,
+    )
+
+
 @inner(fastmath={"contract"}, error_model="numpy")
-def begin(
-    lines: FloatArray,
-    strip: Strip,
-    section: Section,
-    second: Flag,
-    whole: Flag,
-    window: Edge | None,
-) -> None:
+def begin(lines: FloatArray, strip: Strip, section: Section, counts: Counts) -> None:
     """
     Lines that have met nothing yet, and where they enter and leave the window.
 
-    Rows lose the lines at their ends that miss its planes, if these serve the window alone.
+    Rows lose the lines at their ends that miss its planes, if they serve the window alone. Places
+    of a row where no lines are hold NaN: nothing is ever greater or less.
     """
     a, rise_u = section.a, section.rise_u
-    chosen = np.empty(section.planes.shape[0], np.int64)
     for row in range(strip.rows):
         v = strip.first_v + row * strip.spacing
         rest, aslant = section.level - section.c * v * v, 2.0 * section.b * v
         aside = section.rise_v * v
         at = np.uint64(row * strip.pitch)
         for j in range(np.uint64(strip.pitch)):
-            i = at + j
             u = strip.first_u + strip.spacing * np.int32(j)
             half = np.sqrt(rest - (aslant + a * u) * u)
             middle = aside + rise_u * u
-            set_off(lines, i, middle - half, middle + half, whole, window)
-            lines[i + GAP_START] = -FAR
-            lines[i + GAP_END] = -FAR
-            if second is not None:
-                set_off(lines, i + SET, middle - half, middle + half, whole, window)
-                lines[i + SET + GAP_START] = -FAR
-                lines[i + SET + GAP_END] = -FAR
-            lines[i + ENTRY] = middle - half
-            lines[i + EXIT] = middle + half
-        if section.planes.shape[0] > 0:
-            cut_row(lines, strip, section.planes, chosen, row, second, whole, window)
-        no_lines(lines, at, np.uint64(0), np.uint64(strip.low[row]))
-        no_lines(lines, at, np.uint64(strip.high[row]), np.uint64(strip.pitch))
+            lines[at + j + ENTRY], lines[at + j + EXIT] = middle - half, middle + half
+        for k in range(section.planes.shape[0]):
+            cut_row(lines, strip, section.planes, np.uint64(k), v, at)
+        low, high = np.uint64(strip.low[row]), np.uint64(strip.high[row])
+        if counts.whole is None and section.planes.shape[0] > 0:
+            # lines that miss the window at either end of the row need not be visited
+            while low < high and not lines[at + low + ENTRY] < lines[at + low + EXIT]:
+                low += ONE
+            while low < high and not lines[at + high - ONE + ENTRY] < lines[at + high - ONE + EXIT]:
+                high -= ONE
+            strip.low[row], strip.high[row] = low, high
+        for j in range(np.uint64(strip.pitch)):
+            i = at + j
+            is_line = (j >= low) & (j < high)
+            enters, leaves = lines[i + ENTRY], lines[i + EXIT]
+            # those of a periodic medium are where the line's measured length begins
+            is_met = is_line & (enters <= leaves)
+            enters, leaves = enters if is_met else np.nan, leaves if is_met else np.nan
+            lines[i + ENTRY], lines[i + EXIT] = enters, leaves
+            set_off(lines, i, enters, leaves, is_line, counts)
+            if counts.second is not None:
+                set_off(lines, i + SET, enters, leaves, is_line, counts)
+
+
+@inner(fastmath={"contract"}, error_model="numpy")
+def cut_row(
+    lines: FloatArray, strip: Strip, planes: FloatArray, k: np.uint64, v: float, at: np.uint64
+) -> None:
+    """Let the lines of a row enter and leave no further out than at plane k."""
+    slope, rest, enter = planes[k, 1], planes[k, 0] - planes[k, 2] * v, planes[k, 3] < 0.0
+    for j in range(np.uint64(strip.pitch)):
+        i = at + j
+        depth = rest - slope * (strip.first_u + strip.spacing * np.int32(j))
+        # NaN, a line that misses the quadric, stays NaN
+        if enter:
+            lines[i + ENTRY] = -depth if -depth > lines[i + ENTRY] else lines[i + ENTRY]
+        else:
+            lines[i + EXIT] = depth if depth < lines[i + EXIT] else lines[i + EXIT]
 
 
 @inner(forceinline=True, error_model="numpy")
@@ -131,175 +274,20 @@ def set_off(
     i: np.uint64,
     enters: float,
     leaves: float,
-    whole: Flag,
-    window: Edge | None,
+    is_line: bool | np.bool,
+    counts: Counts,
 ) -> None:
     """Let a line, which has met nothing yet, begin: before all, or where it enters the window."""
-    if window is not None and window.start is not None:
+    lines[i + GAP_START] = lines[i + GAP_END] = -FAR
+    if counts.window is not None and counts.window.start is not None:
         # NaN, a line that misses the window, stays NaN
         lines[i + END] = 0.0 * enters - FAR
-        lines[i + BEFORE] = window.margin - enters
-        lines[i + BEHIND] = leaves + window.margin
+        lines[i + BEFORE] = counts.window.margin - enters
+        lines[i + BEHIND] = leaves + counts.window.margin
+    elif counts.whole is not None:
+        lines[i + END] = -FAR if is_line else np.nan
     else:
-        lines[i + END] = -FAR if whole is not None else enters
-
-
-@inner()
-def cutting(
-    planes: FloatArray, side: float, chosen: IntArray, first: float, last: float, v: float
-) -> int:
-    """
-    List the planes of a side that may cut a line of a row, from u = first to last, before others.
-
-    Returns how many. A plane's distance from the origin is linear along the row: where it is beyond
-    that of another on its side at both ends, it is so everywhere; the others are the nearest at
-    either end.
-    """
-    at_first = at_last = beyond_first = beyond_last = np.inf
-    for k in range(planes.shape[0]):
-        if planes[k, 3] == side:
-            rest = planes[k, 0] - planes[k, 2] * v
-            start, stop = rest - planes[k, 1] * first, rest - planes[k, 1] * last
-            if start < at_first:
-                at_first, beyond_last = start, stop
-            if stop < at_last:
-                at_last, beyond_first = stop, start
-    count = 0
-    for k in range(planes.shape[0]):
-        if planes[k, 3] == side:
-            rest = planes[k, 0] - planes[k, 2] * v
-            start, stop = rest - planes[k, 1] * first, rest - planes[k, 1] * last
-            if stop <= beyond_last and start <= beyond_first:
-                chosen[count] = k
-                count += 1
-    return count
-
-
-@inner(error_model="numpy")
-def nearer(planes: FloatArray, u: float, v: float, sign: float) -> float:
-    """
-    From a place on a row, one that is nearer to the lines between all planes, if it has none.
-
-    On a line by how much the last plane to be entered is behind the first one to be left is a
-    convex function along the row: its tangent meets 0 before it does. ``sign`` is that of the way
-    to these lines. FAR if there are none.
-    """
-    enters, leaves = -np.inf, np.inf
-    slope_in = slope_out = 0.0
-    for k in range(planes.shape[0]):
-        depth = planes[k, 3] * (planes[k, 0] - planes[k, 1] * u - planes[k, 2] * v)
-        if planes[k, 3] < 0.0:
-            if depth > enters:
-                enters, slope_in = depth, planes[k, 1]
-        elif depth < leaves:
-            leaves, slope_out = depth, planes[k, 1]
-    missing, falls = enters - leaves, -sign * (slope_in + slope_out)
-    if not missing > 0.0:
-        return u
-    return u + sign * missing / falls if falls > 0.0 else sign * FAR
-
-
-@inner(error_model="numpy")
-def narrow_row(strip: Strip, planes: FloatArray, row: int) -> None:
-    """Take lines at the ends of a row that miss a window for its planes out of it, or most."""
-    v = strip.first_v + row * strip.spacing
-    first = strip.first_u + strip.spacing * strip.low[row]
-    last = strip.first_u + strip.spacing * (strip.high[row] - 1)
-    for _ in range(TANGENTS):
-        first, last = nearer(planes, first, v, 1.0), nearer(planes, last, v, -1.0)
-        if not first <= last:
-            strip.high[row] = strip.low[row]
-            return
-    # a line more, as a place may be beyond by rounding
-    low = int((first - strip.first_u) * strip.per_spacing) - 1
-    high = int((last - strip.first_u) * strip.per_spacing) + 3
-    strip.low[row] = max(low, strip.low[row])
-    strip.high[row] = min(high, strip.high[row])
-
-
-@inner(fastmath={"contract"}, error_model="numpy")
-def cut_between(
-    lines: FloatArray, strip: Strip, planes: FloatArray, chosen: IntArray, row: int
-) -> None:
-    """Let the lines of a row enter and leave no further out than at its planes."""
-    v = strip.first_v + row * strip.spacing
-    at = np.uint64(row * strip.pitch)
-    low, high = np.uint64(strip.low[row]), np.uint64(strip.high[row])
-    first = strip.first_u + strip.spacing * strip.low[row]
-    last = strip.first_u + strip.spacing * (strip.high[row] - 1)
-    # NaN, a line that misses the quadric, stays NaN
-    for place in range(cutting(planes, -1.0, chosen, first, last, v)):
-        k = chosen[place]
-        slope, rest = planes[k, 1], planes[k, 0] - planes[k, 2] * v
-        for j in range(low, high):
-            i = at + j
-            cut = slope * (strip.first_u + strip.spacing * np.int32(j)) - rest
-            enters = lines[i + ENTRY]
-            lines[i + ENTRY] = cut if cut > enters else enters
-    for place in range(cutting(planes, 1.0, chosen, first, last, v)):
-        k = chosen[place]
-        slope, rest = planes[k, 1], planes[k, 0] - planes[k, 2] * v
-        for j in range(low, high):
-            i = at + j
-            cut = rest - slope * (strip.first_u + strip.spacing * np.int32(j))
-            leaves = lines[i + EXIT]
-            lines[i + EXIT] = cut if cut < leaves else leaves
-
-
-@inner(fastmath={"contract"}, error_model="numpy")
-def cut_row(
-    lines: FloatArray,
-    strip: Strip,
-    planes: FloatArray,
-    chosen: IntArray,
-    row: int,
-    second: Flag,
-    whole: Flag,
-    window: Edge | None,
-) -> None:
-    """Let the lines of a row enter and leave the window between its planes, too."""
-    if whole is None:
-        narrow_row(strip, planes, row)
-    cut_between(lines, strip, planes, chosen, row)
-    at = np.uint64(row * strip.pitch)
-    low, high = np.uint64(strip.low[row]), np.uint64(strip.high[row])
-    for j in range(low, high):
-        i = at + j
-        enters, leaves = lines[i + ENTRY], lines[i + EXIT]
-        enters = enters if enters < leaves else np.nan
-        lines[i + ENTRY] = enters
-        lines[i + EXIT] = leaves if enters < leaves else np.nan
-        if whole is None:
-            set_off(lines, i, enters, leaves, whole, window)
-            if second is not None:
-                set_off(lines, i + SET, enters, leaves, whole, window)
-    if whole is None:
-        # lines that miss the window at either end of the row need not be visited
-        while low < high and np.isnan(lines[at + low + ENTRY]):
-            low += ONE
-        while low < high and np.isnan(lines[at + high - ONE + ENTRY]):
-            high -= ONE
-        strip.low[row], strip.high[row] = low, high
-
-
-@inner()
-def no_lines(lines: FloatArray, row: np.uint64, first: np.uint64, last: np.uint64) -> None:
-    """Mark places of a row where no lines are: nothing is ever greater or less than NaN."""
-    for column in range(first, last):
-        k = row + column
-        lines[k + ENTRY] = lines[k + EXIT] = np.nan
-        lines[k + END] = lines[k + SET + END] = np.nan
-
-
-@inner()
-def measure_from(lines: FloatArray, strip: Strip, rise_u: float, rise_v: float) -> None:
-    """Let the measured length of each line begin on a plane through the origin."""
-    for row in range(strip.rows):
-        v = strip.first_v + row * strip.spacing
-        for column in range(strip.low[row], strip.high[row]):
-            u = strip.first_u + column * strip.spacing
-            place = np.uint64(row * strip.pitch + column)
-            lines[place + ENTRY] = rise_u * u + rise_v * v
+        lines[i + END] = enters
 
 
 @kernel
@@ -311,12 +299,10 @@ def spans(clip: Clip, triad: FloatArray, points: FloatArray, ends: FloatArray) -
     ``ends`` has the same shape.
     """
     section, lines = section_along(clip, triad), np.empty(STATE_SIZE)
-    low, high = np.zeros(1, np.int64), np.ones(1, np.int64)
     for k in range(points.shape[0]):
-        # a line that misses the window is taken out of its row
-        low[0], high[0] = 0, 1
+        low, high = np.zeros(1, np.int64), np.ones(1, np.int64)
         strip = Strip(1.0, 1.0, points[k, 0], points[k, 1], 1, 1, 1 + LANES, low, high)
-        begin(lines, strip, section, None, None, None)
+        begin(lines, strip, section, Counts(0.0, None, None, None, None))
         ends[k, 0], ends[k, 1] = lines[ENTRY], lines[EXIT]
 
 

@@ -8,30 +8,47 @@ yet. A chord that begins behind the running end settles the last gap and opens a
 begins earlier can only shorten the last gap. That is exact unless a chord reaches back past the
 last gap: such a line is closed (its solid never ends), and is solved again from its list of chords.
 
-What is counted is chosen by arguments that are None where they are not wanted, so that for each
-choice the compiler makes a loop with nothing else in it:
+What is counted is chosen by the fields of :class:`scanfab.scan.kernels.strips.Counts`:
 
 ``whole``     gaps as they are, between the first and the last solid of the line
 ``measured``  with ``whole``: only gaps that start in the line's measured length
 ``window``    gaps in the window, from where the line enters it to where it leaves it, by one of
-              the rules of :mod:`scanfab.scan.kernels.edges`; lines that miss it carry NaN
+              the rules below; lines that miss it carry NaN
 ``second``    all this again for a second set of solids, from which some spheres are removed
 
 A gap that reaches FAR never counts in the whole.
+
+A segment [low, high] on a line that is inside the window from ``enters`` to ``leaves`` adds a
+length and a number to the sums of its direction. With L = high - low, I the part of it inside, e
+the number of its ends inside (0, 1, 2), where a place at which the window cuts it is no end, and c
+the cut-off::
+
+    rule    counts if   length                number
+    clip    I >= c      I                     1
+    start   L >= c      L e/2                 e/2
+    ends    I >= c      (I - c) + c e/2       e/2
+
+The mean length is the ratio of the two sums. That of ``ends`` is c + Σ (I - c) / Σ e/2, written as
+one ratio. docs/method.md says why the last two have no bias.
+
+By ``start`` only chords that reach into the window change the state of a line. Of the others, and
+of those that begin before the window, a line keeps where the last solid before it ends and where
+the first one behind it begins, in whatever order they come: there its first segment begins and its
+last one ends. The place before the window is kept with a minus: on the line as seen from behind, it
+is the least place, too. Solids are listed as far as a margin beyond the window. A line that has met
+none there keeps the margin's end, and is followed (:mod:`scanfab.scan.kernels.resolve`).
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from scanfab.base.jit import LANES, REORDERED, Flag, inner
-from scanfab.base.typing import FloatArray
-from scanfab.scan.kernels.edges import window_gap
-from scanfab.scan.kernels.start import last_gap, met_beyond, reaches_in, settled_gap
+from scanfab.base.jit import LANES, REORDERED, inner
+from scanfab.base.typing import FloatArray, IntArray
+from scanfab.scan.kernels.grid import Spheres, sphere_at
 from scanfab.scan.kernels.strips import (
     BEFORE,
+    BEHIND,
     END,
     ENTRY,
     EXIT,
@@ -39,9 +56,12 @@ from scanfab.scan.kernels.strips import (
     GAP_END,
     GAP_START,
     SET,
+    Counts,
     Edge,
+    Line,
+    Measured,
     Sphere,
-    Strip,
+    Task,
     columns_of_row,
     span,
 )
@@ -56,70 +76,91 @@ NOTHING = -0.0
 LENGTH, KEPT, VOID, LINES, LINE_LENGTH = range(5)
 WHOLE, WINDOW, CHORDS, CHANNELS, STEPS, LEFT = 0, 5, 10, 11, 12, 13
 TALLY_SIZE = 14
+# Of the margin: segments that reach so far are followed, whatever rounding says of its very end.
+NEARLY = 1.0 - 1e-6
 
 
-class Measured(NamedTuple):
-    """Of a line through a periodic medium, from where its measured length begins."""
+@inner(forceinline=True, error_model="numpy")
+def ends_inside(low: float, high: float, enters: float, leaves: float) -> float:
+    """Half the number of ends in the window of a segment that has a part there."""
+    return (0.5 if low > enters else 0.0) + (0.5 if high < leaves else 0.0)
 
-    length: float
-    """Gaps that begin in it count."""
-    known: float
-    """Chords that begin behind it may not be listed, and are left out."""
+
+@inner(forceinline=True, error_model="numpy")
+def listed_to(edge: Edge) -> float:
+    """From where on solids beyond the window may not be listed."""
+    return edge.margin * NEARLY
+
+
+@inner(forceinline=True, error_model="numpy")
+def is_listed(start: float, enters: float, counts: Counts) -> bool:
+    """Whether a chord begins where all of them are listed; others are left out."""
+    known = True
+    if counts.measured is not None:
+        known = start - enters < counts.measured.known
+    return known
+
+
+@inner(forceinline=True, error_model="numpy")
+def begins_in(low: float, enters: float, measured: Measured) -> bool:
+    """Whether a gap begins in the measured length of its line; not for NaN, where no line is."""
+    return (low - enters >= 0.0) & (low - enters < measured.length)
 
 
 @inner(forceinline=True, error_model="numpy")
 def whole_gap(
-    low: float, high: float, least: float, enters: float, measured: Measured | None
+    low: float, high: float, least: float, enters: float, counts: Counts
 ) -> tuple[float, float, float]:
-    """
-    Length and number of a gap if it counts in the whole, and its length if it is too short.
-
-    ``enters`` is where the line's measured length begins.
-    """
+    """Length and number that a gap adds to the sums of the whole, and its length, kept or not."""
     gap = high - low
-    if measured is None:
-        gap = gap if gap < 0.5 * FAR else 0.0
-    else:
-        # NaN: a place behind the last line
-        gap = gap if low - enters >= 0.0 else 0.0
-        gap = gap if low - enters < measured.length else 0.0
-        gap = gap if gap < 0.5 * FAR else 0.0
+    if counts.measured is not None:
+        gap = gap if begins_in(low, enters, counts.measured) else 0.0
+    gap = gap if gap < 0.5 * FAR else 0.0
     kept = gap >= least
     return gap if kept else 0.0, 1.0 if kept else 0.0, gap
 
 
 @inner(forceinline=True, error_model="numpy")
-def is_listed(start: float, enters: float, measured: Measured | None) -> bool:
-    """Whether a chord begins where all of them are listed; others are left out."""
-    known = True
-    if measured is not None:
-        known = start - enters < measured.known
-    return known
+def window_gap(
+    low: float, high: float, least: float, enters: float, leaves: float, counts: Counts, edge: Edge
+) -> tuple[float, float, float]:
+    """Length and number that a gap adds to the window's sums, and the length of it inside."""
+    last = high if high < leaves else leaves
+    first = low
+    if counts.whole is not None or edge.start is not None:
+        # else no line begins before the window
+        first = low if low > enters else enters
+    inside = last - first
+    void = inside if inside > 0.0 else 0.0
+    length, kept, weight = inside, inside >= least, 1.0
+    if edge.ends is not None:
+        weight = ends_inside(low, high, enters, leaves)
+        length = inside - least + weight * least
+    if edge.start is not None:
+        weight = ends_inside(low, high, enters, leaves)
+        length = weight * (high - low)
+        # the others are followed
+        known = (high < leaves + listed_to(edge)) & (high - low < 0.5 * FAR)
+        kept = (inside > 0.0) & (high - low >= least) & known
+    return length if kept else 0.0, weight if kept else 0.0, void
 
 
 @inner(forceinline=True, error_model="numpy")
 def counted(
-    settles: bool,
-    low: float,
-    high: float,
-    least: float,
-    enters: float,
-    leaves: float,
-    whole: Flag,
-    window: Edge | None,
-    measured: Measured | None,
+    settles: bool, low: float, high: float, enters: float, leaves: float, counts: Counts
 ) -> Sums:
     """What a gap adds to the tallies of the whole and of the window, if it is settled."""
     length = kept = void = NOTHING
     inside = inside_kept = inside_void = NOTHING
     # no gap is longer
-    least = least if settles else 2.0 * FAR
-    if whole is not None:
-        length, kept, gap = whole_gap(low, high, least, enters, measured)
-        if measured is not None:
+    least = counts.least if settles else 2.0 * FAR
+    if counts.whole is not None:
+        length, kept, gap = whole_gap(low, high, least, enters, counts)
+        if counts.measured is not None:
             void = gap if settles else 0.0
-    if window is not None:
-        inside, inside_kept, gap = window_gap(low, high, least, enters, leaves, whole, window)
+    if counts.window is not None:
+        edge = counts.window
+        inside, inside_kept, gap = window_gap(low, high, least, enters, leaves, counts, edge)
         inside_void = gap if settles else 0.0
     return length, kept, void, inside, inside_kept, inside_void
 
@@ -140,35 +181,88 @@ def moved(
 
 
 @inner(forceinline=True, error_model="numpy")
+def met_beyond(
+    lines: FloatArray, i: np.uint64, start: float, stop: float, enters: float, leaves: float
+) -> None:
+    """Let a line keep what a chord makes of the solids beyond the window; of NaN it is nothing."""
+    before, behind = lines[i + BEFORE], lines[i + BEHIND]
+    place = -stop if start <= enters else before
+    lines[i + BEFORE] = place if place < before else before
+    place = start if start >= leaves else behind
+    lines[i + BEHIND] = place if place < behind else behind
+
+
+@inner(forceinline=True, error_model="numpy")
+def reaches_in(start: float, stop: float, enters: float, leaves: float) -> bool:
+    """Whether a chord has a part in the window."""
+    return (stop > enters) & (start < leaves)
+
+
+@inner(forceinline=True, error_model="numpy")
+def begins_at(low: float, before: float) -> float:
+    """Where a gap begins; the first one of a line at the last solid before the window."""
+    return low if low > -before else -before
+
+
+@inner(forceinline=True, error_model="numpy")
+def settled_gap(settles: bool, low: float, high: float, before: float, counts: Counts) -> Sums:
+    """
+    What a gap adds by the rule ``start`` that ends in the window, if it is settled.
+
+    The length of a first gap is too long by what lies before the window, see :func:`last_gap`.
+    """
+    length = high - begins_at(low, before)
+    weight = 0.5 if low < -before else 1.0
+    # no gap is longer
+    kept = length >= (counts.least if settles else 2.0 * FAR)
+    void = length if length > 0.0 else 0.0
+    inside = weight * length if kept else 0.0, weight if kept else 0.0, void if settles else 0.0
+    return NOTHING, NOTHING, NOTHING, inside[0], inside[1], inside[2]
+
+
+@inner(forceinline=True, error_model="numpy")
+def last_gap(
+    lines: FloatArray, i: np.uint64, enters: float, leaves: float, counts: Counts, edge: Edge
+) -> tuple[float, float, float]:
+    """
+    Length and number that the void behind a line's last solid adds, and its length in the window.
+
+    By the rule ``start`` less what its first gap has before the window.
+    """
+    end = lines[i + END]
+    if edge.start is None:
+        low = end if end < FAR else leaves
+        return window_gap(low, FAR, counts.least, enters, leaves, counts, edge)
+    before, behind = lines[i + BEFORE], lines[i + BEHIND]
+    length = behind - end
+    is_met = (end > -FAR) & (end < FAR)
+    ends_beyond = is_met & (end < leaves) & (behind < leaves + listed_to(edge))
+    kept = ends_beyond & (length >= counts.least)
+    void = leaves - (end if end > -FAR else enters)
+    void = void if void > 0.0 else 0.0
+    outside = enters + before if is_met else 0.0
+    void -= outside if outside > 0.0 else 0.0
+    return 0.5 * length if kept else 0.0, 0.5 if kept else 0.0, void
+
+
+@inner(forceinline=True, error_model="numpy")
 def meet(
-    lines: FloatArray,
-    i: np.uint64,
-    start: float,
-    stop: float,
-    least: float,
-    enters: float,
-    leaves: float,
-    whole: Flag,
-    window: Edge | None,
-    measured: Measured | None,
+    lines: FloatArray, i: np.uint64, line: Line, start: float, stop: float, counts: Counts
 ) -> Sums:
     """
     Let the line whose state begins at a place meet a chord, and count the gap that this settles.
 
     A chord of NaN settles none, and leaves the line as it is.
     """
+    _, _, enters, leaves = line
     end, low, high = lines[i + END], lines[i + GAP_START], lines[i + GAP_END]
-    if window is not None and window.start is not None:
-        if window.inside is None:
-            met_beyond(lines, i, start, stop, enters, leaves)
-            counts = reaches_in(start, stop, enters, leaves)
-            start, stop = start if counts else np.nan, stop if counts else np.nan
-        settles = start > end
-        # no gap is longer
-        a, b, c = settled_gap(low, high, lines[i + BEFORE], least if settles else 2.0 * FAR)
-        sums = NOTHING, NOTHING, NOTHING, a, b, c if settles else 0.0
+    if counts.window is not None and counts.window.start is not None:
+        met_beyond(lines, i, start, stop, enters, leaves)
+        counts_here = reaches_in(start, stop, enters, leaves)
+        start, stop = start if counts_here else np.nan, stop if counts_here else np.nan
+        sums = settled_gap(start > end, low, high, lines[i + BEFORE], counts)
     else:
-        sums = counted(start > end, low, high, least, enters, leaves, whole, window, measured)
+        sums = counted(start > end, low, high, enters, leaves, counts)
     end, low, high = moved(start, stop, end, low, high)
     lines[i + END], lines[i + GAP_START], lines[i + GAP_END] = end, low, high
     return sums
@@ -187,19 +281,19 @@ def both(first: Sums, second: Sums) -> Sums:
     )
 
 
+@inner(inline="always")
+def add(tally: FloatArray, which: int, sums: Sums) -> None:
+    """Add sums over gaps to the tally of a set of solids, shape (2, TALLY_SIZE)."""
+    tally[which, WHOLE + LENGTH] += sums[0]
+    tally[which, WHOLE + KEPT] += sums[1]
+    tally[which, WHOLE + VOID] += sums[2]
+    tally[which, WINDOW + LENGTH] += sums[3]
+    tally[which, WINDOW + KEPT] += sums[4]
+    tally[which, WINDOW + VOID] += sums[5]
+
+
 @inner(forceinline=True, fastmath=REORDERED, error_model="numpy")
-def visit(
-    lines: FloatArray,
-    strip: Strip,
-    sphere: Sphere,
-    kept: float,
-    least: float,
-    tally: FloatArray,
-    second: Flag,
-    whole: Flag,
-    window: Edge | None,
-    measured: Measured | None,
-) -> None:
+def visit(task: Task, sphere: Sphere, kept: float) -> None:
     """
     Visit the chords that a sphere cuts from a strip, and tally the gaps that they settle.
 
@@ -208,6 +302,7 @@ def visit(
     The compiler makes vector instructions of the inner loop because rows are contiguous, indices
     cannot be negative, planes cannot overlap, and there are choices instead of branches.
     """
+    lines, strip, counts = task.lines, task.strip, task.counts
     sums = sums2 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     chords = 0.0
     radius, per_spacing = sphere.radius, strip.per_spacing
@@ -229,50 +324,49 @@ def visit(
             half_chord = np.sqrt(reach2 - du * du)
             start = sphere.depth - half_chord
             stop = sphere.depth + half_chord
-            enters, leaves = lines[i + ENTRY], lines[i + EXIT]
-            known = is_listed(start, enters, measured)
+            line = 0.0, 0.0, lines[i + ENTRY], lines[i + EXIT]
+            known = is_listed(start, lines[i + ENTRY], counts)
             start, stop = start if known else np.nan, stop if known else np.nan
-            found = meet(lines, i, start, stop, least, enters, leaves, whole, window, measured)
-            sums = both(sums, found)
-            if second is not None:
+            sums = both(sums, meet(lines, i, line, start, stop, counts))
+            if counts.second is not None:
                 start, stop = start + kept, stop + kept
-                found = meet(
-                    lines, i + SET, start, stop, least, enters, leaves, whole, window, measured
-                )
-                sums2 = both(sums2, found)
-    tally[0, CHORDS] += chords
-    add(tally, 0, sums)
-    if second is not None:
-        add(tally, 1, sums2)
+                sums2 = both(sums2, meet(lines, i + SET, line, start, stop, counts))
+    task.tally[0, CHORDS] += chords
+    add(task.tally, 0, sums)
+    if counts.second is not None:
+        add(task.tally, 1, sums2)
 
 
-@inner(inline="always")
-def add(tally: FloatArray, which: int, sums: Sums) -> None:
-    """Add sums over gaps to the tally of a set of solids, shape (2, TALLY_SIZE)."""
-    tally[which, WHOLE + LENGTH] += sums[0]
-    tally[which, WHOLE + KEPT] += sums[1]
-    tally[which, WHOLE + VOID] += sums[2]
-    tally[which, WINDOW + LENGTH] += sums[3]
-    tally[which, WINDOW + KEPT] += sums[4]
-    tally[which, WINDOW + VOID] += sums[5]
+@inner()
+def visit_all(task: Task, spheres: Spheres, chosen: IntArray, reach: float) -> None:
+    """
+    Visit the chosen spheres.
+
+    ``reach`` is the radius of the ball that holds the window. Spheres aside of it meet no line that
+    meets the window.
+    """
+    counts = task.counts
+    for k in chosen:
+        sphere = sphere_at(spheres, k)
+        kept = np.nan if spheres.removed[k] else NOTHING
+        if counts.whole is not None and counts.window is not None:
+            away = reach + sphere.radius
+            if sphere.u * sphere.u + sphere.v * sphere.v > away * away:
+                aside = Counts(counts.least, counts.second, True, None, None)
+                visit(Task(task.lines, task.strip, aside, task.tally, task.bins), sphere, kept)
+                continue
+        visit(task, sphere, kept)
 
 
 @inner(fastmath=REORDERED, error_model="numpy")
-def settle(
-    lines: FloatArray,
-    strip: Strip,
-    which: int,
-    least: float,
-    tally: FloatArray,
-    whole: Flag,
-    window: Edge | None,
-    measured: Measured | None,
-) -> float:
+def settle(task: Task, which: int) -> float:
     """
     Tally every line's last gap, and in the window the void behind its last solid.
 
     Returns the number of closed lines, of which nothing is tallied here but that they are there.
     """
+    lines, strip, tally = task.lines, task.strip, task.tally
+    counts = task.counts
     a = b = c = d = e = f = 0.0
     met = length = closed = 0.0
     crossing = np.int64(0)
@@ -282,33 +376,27 @@ def settle(
         end, low, high = lines[k + END], lines[k + GAP_START], lines[k + GAP_END]
         enters, leaves = lines[i + ENTRY], lines[i + EXIT]
         closed += 1.0 if end == FAR else 0.0
-        if window is not None and window.start is not None:
-            at_most = least if end < FAR else 2.0 * FAR
-            x, y, z = settled_gap(low, high, lines[k + BEFORE], at_most)
-            sums = NOTHING, NOTHING, NOTHING, x, y, z if end < FAR else 0.0
+        if counts.window is not None and counts.window.start is not None:
+            sums = settled_gap(end < FAR, low, high, lines[k + BEFORE], counts)
         else:
-            sums = counted(end < FAR, low, high, least, enters, leaves, whole, window, measured)
+            sums = counted(end < FAR, low, high, enters, leaves, counts)
         a, b, c = a + sums[0], b + sums[1], c + sums[2]
         d, e, f = d + sums[3], e + sums[4], f + sums[5]
-        if window is not None:
-            start = end if end < FAR else leaves
-            if window.start is not None:
-                behind = last_gap(lines, k, least, enters, leaves, window)
-            else:
-                behind = window_gap(start, FAR, least, enters, leaves, whole, window)
+        if counts.window is not None:
+            behind = last_gap(lines, k, enters, leaves, counts, counts.window)
             d, e, f = d + behind[0], e + behind[1], f + behind[2]
             crossing += np.int64(leaves > enters)
             length += leaves - enters if leaves > enters else 0.0
-        if whole is not None:
+        if counts.whole is not None:
             met += 1.0 if end > -FAR else 0.0
-            if measured is not None:
+            if counts.measured is not None:
                 crossing += np.int64(enters < FAR)
     add(tally, which, (a, b, c, d, e, f))
-    if whole is not None:
+    if counts.whole is not None:
         tally[which, WHOLE + LINES] += met
-    if measured is not None:
-        tally[which, WHOLE + LINE_LENGTH] += crossing * measured.length
-    if window is not None:
+    if counts.measured is not None:
+        tally[which, WHOLE + LINE_LENGTH] += crossing * counts.measured.length
+    if counts.window is not None:
         tally[which, WINDOW + LINES] += crossing
         tally[which, WINDOW + LINE_LENGTH] += length
     return closed

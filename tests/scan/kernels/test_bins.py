@@ -3,42 +3,44 @@
 import numpy as np
 import pytest
 
+from scanfab import Solids
 from scanfab.scan.blocks import Blocks, partition_of
-from scanfab.scan.kernels import axes, sweep
 from scanfab.scan.kernels.bins import Bins
-from scanfab.scan.kernels.edges import CLIPPED
 from scanfab.scan.lines import line_triads
-from scanfab.scan.solids import clip_of
+from scanfab.scan.tallies import tally_triads
 from tests.helpers import naive
 from tests.helpers.lattices import rotation
 from tests.helpers.uncompiled import run_uncompiled
 from tests.helpers.windows import random_window
-from tests.scan.kernels.test_axes import KINDS, line_words, overlapping, region
+from tests.scan.kernels.test_axes import KINDS, overlapping, region
 
 RUNS_OF_A_KIND = 60
 REACH = 30.0
 
 
 def fast_sums(
-    spheres, removed, triad, offset, spacing, window, cutoffs, centers, flags=(1, 1, 1), halves=True
+    spheres,
+    removed,
+    triad,
+    offset,
+    spacing,
+    window,
+    cutoffs,
+    centers,
+    *,
+    halves=True,
+    variants="abcd",
 ):
     """What the kernel adds up: shape (whole or window, set of solids, octant, bin, sum)."""
     partition = partition_of(*(Blocks.about(center, REACH) for center in centers))
-    sums = np.zeros((1, 2, 2, 8 * len(cutoffs), 3))
-    axes.scan_axes(
-        *line_words(spheres, removed, triad, offset, spacing),
-        0.0,
-        clip_of(region(window)),
-        np.zeros((1, 2, sweep.TALLY_SIZE)),
-        True,
-        *(True if flag else None for flag in flags[:2]),
-        CLIPPED if flags[2] else None,
-        Bins(partition._replace(halves=halves or None), np.array(cutoffs), sums),
-        None,
-        False,
-        np.inf,
+    bins = Bins(
+        partition._replace(halves=halves or None),
+        np.array(cutoffs),
+        np.zeros((1, 2, 2, 8 * len(cutoffs), 3)),
     )
-    return sums.reshape(2, 2, 8, len(cutoffs), 3)
+    solids = Solids(*spheres, removed, region(window))
+    tally_triads(solids, triad[None], offset[None], spacing, 0.0, variants, bins)
+    return bins.sums.reshape(2, 2, 8, len(cutoffs), 3)
 
 
 def slow_sums(spheres, removed, triad, offset, spacing, window, cutoffs, centers):
@@ -87,7 +89,7 @@ def test_binned_gaps_equal_the_slow_twin(kind):
         assert np.all(found.sum(axis=(0, 1)) > 0)
 
 
-def test_only_what_is_wanted_is_added():
+def check_only_what_is_wanted_is_added():
     random = np.random.default_rng(0)
     spheres = overlapping(random)
     removed = random.random(len(spheres.radius)) < 0.3
@@ -95,9 +97,9 @@ def test_only_what_is_wanted_is_added():
     centers = np.zeros((2, 3))
     every = fast_sums(*line, centers)
     assert np.all(every.sum(axis=(2, 3, 4)) > 0)
-    for second, whole, window in [(1, 1, 0), (1, 0, 1), (0, 1, 1), (0, 1, 0), (0, 0, 1)]:
-        alone = fast_sums(*line, centers, (second, whole, window))
-        wanted = np.outer([whole, window], [1, second])[..., None, None, None]
+    for variants in ("ab", "cd", "ac", "a", "d"):
+        alone = fast_sums(*line, centers, variants=variants)
+        wanted = np.isin([["a", "b"], ["c", "d"]], list(variants))[..., None, None, None]
         np.testing.assert_allclose(alone, every * wanted, rtol=1e-9, atol=1e-12)
 
 
@@ -106,9 +108,9 @@ def test_binned_gaps_equal_the_slow_twin_uncompiled():
     run_uncompiled(
         "import numpy as np\n"
         "from tests.scan.kernels import test_bins as here\n"
-        "assert not hasattr(here.axes.scan_axes, 'py_func')\n"
         "np.seterr(invalid='ignore')\n"
         "for kind in here.KINDS:\n"
         "    for seed in range(3):\n"
         "        here.check_random_packing(kind, np.random.default_rng(seed))\n"
+        "here.check_only_what_is_wanted_is_added()\n"
     )

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from numba import njit
 
-from scanfab.scan.kernels import axes, periodic, sweep
-from scanfab.scan.kernels.bins import no_bins
+from scanfab import Solids
+from scanfab.scan.kernels import periodic, sweep
 from scanfab.scan.kernels.periodic import CellGrains
-from scanfab.scan.solids import clip_of
+from scanfab.scan.tallies import FollowedTooFarError, Following, tally_triads
 from tests.helpers import naive
 from tests.helpers.uncompiled import run_uncompiled
-from tests.scan.kernels.test_axes import WAYS
+from tests.scan.kernels.test_axes import WAYS, by_lists
 
 PERIODS = [(1, 1, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (1, 0, 0), (0, 0, 1)]
 
@@ -49,13 +49,8 @@ def direction(random):
 
 @njit
 def prism_and_grid(medium, normal, offset, spacing):
-    prism, _, grid = periodic.cell_grid(medium, normal, offset, spacing)
+    prism, _, grid, _ = periodic.cell_grid(medium, normal, offset, spacing)
     return prism, grid
-
-
-@njit
-def prism_of(normal, vectors, periods):
-    return periodic.prism_along(normal, vectors, periods)
 
 
 def lines_of(medium, normal, offset, spacing):
@@ -72,13 +67,11 @@ def lines_of(medium, normal, offset, spacing):
     return np.array(feet), measured
 
 
-def tallies_of(
-    medium, normal, offset, spacing, cutoff, second=True, by_lists=False, most_steps=np.inf
-):
-    tallies = np.zeros((1, 2, sweep.TALLY_SIZE))
-    lines = normal[None], offset[None], spacing, cutoff, clip_of(None)
-    axes.scan_cell(medium, *lines, tallies, by_lists, second or None, no_bins(1), most_steps)
-    return tallies[0]
+def tallies_of(medium, normal, offset, spacing, cutoff, variants="ab", most_steps=np.inf):
+    solids = Solids(np.zeros((0, 3)), np.zeros(0), np.zeros(0, bool), medium=medium)
+    triad = np.stack([*np.zeros((2, 3)), normal])[None]
+    words = solids, triad, offset[None], spacing, cutoff, variants
+    return tally_triads(*words, following=Following(most_steps))[0]
 
 
 def check_equals_naive(random, periods, make=random_medium):
@@ -89,9 +82,10 @@ def check_equals_naive(random, periods, make=random_medium):
 
 def assert_equals_naive(medium, normal, offset, spacing, cutoff):
     feet, measured = lines_of(medium, normal, offset, spacing)
-    fast = [
-        tallies_of(medium, normal, offset, spacing, cutoff, by_lists=by_lists) for by_lists in WAYS
-    ]
+    fast = []
+    for way in WAYS:
+        with by_lists(way):
+            fast.append(tallies_of(medium, normal, offset, spacing, cutoff))
     for which, kept in enumerate([np.ones(len(medium.radius), bool), ~medium.removed]):
         gaps = [
             gap
@@ -152,9 +146,10 @@ def test_lines_spread_evenly_over_the_face_and_fill_the_cell():
 def test_every_direction_crosses_its_face_steeply():
     """So that a line leaves the cell after little more than its height."""
     random = np.random.default_rng(2)
+    grain = np.zeros((1, 3)), np.ones(1), np.zeros(1, bool)
+    medium = CellGrains(*grain, np.diag([1.0, 2.0, 3.0]), np.ones(3, bool))
     for _ in range(50):
-        normal = direction(random)
-        prism = prism_of(normal, np.diag([1.0, 2.0, 3.0]), np.ones(3, bool))
+        prism, _ = prism_and_grid(medium, direction(random), np.zeros(2), 1.0)
         assert prism.length <= np.sqrt(3) * 3.0 + 1e-9
         assert prism.triad @ prism.triad.T == pytest.approx(np.eye(3), abs=1e-12)
         assert prism.base_v > 0
@@ -172,7 +167,7 @@ def test_without_overlap_the_mean_gap_is_that_of_stereology():
     porosity = 1 - 4 / 3 * np.pi * np.sum(radius**3) / volume
     expected = porosity * volume / (np.pi * np.sum(radius**2))
     total = sum(
-        tallies_of(medium, direction(random), random.random(2), 0.04, 0.0, None)[0]
+        tallies_of(medium, direction(random), random.random(2), 0.04, 0.0, "a")[0]
         for _ in range(60)
     )
     assert total[sweep.LENGTH] / total[sweep.KEPT] == pytest.approx(expected, rel=0.01)
@@ -186,7 +181,7 @@ def test_simple_cubic_along_an_edge():
     )
     normal = np.array([0.0, 0.0, 1.0])
     for cutoff in (0.0, 0.3, 0.5):
-        tally = tallies_of(medium, normal, np.array([0.3, 0.8]), 0.004, cutoff, None)[0]
+        tally = tallies_of(medium, normal, np.array([0.3, 0.8]), 0.004, cutoff, "a")[0]
         height = min(0.4, (1 - cutoff) / 2)
         assert tally[sweep.LENGTH] / tally[sweep.KEPT] == pytest.approx(
             1 - 4 / 3 * height, rel=2e-3
@@ -217,13 +212,24 @@ def corner():
 
 
 def test_following_ends_when_it_has_taken_the_steps_that_it_may(corner):
-    normal, offset = np.array([0.48, 0.6, 0.64]), np.array([0.3, 0.4])
-    every = tallies_of(corner, normal, offset, 0.5, 0.0)[0, sweep.STEPS]
-    for most in (1, 500, 5000):
-        steps = tallies_of(corner, normal, offset, 0.5, 0.0, most_steps=most)[0, sweep.STEPS]
-        # the last line asks every grain in each cell that it crosses
-        assert most <= steps < min(most + 20_000, every)
-    assert tallies_of(corner, normal, offset, 0.5, 0.0, most_steps=0)[0, sweep.STEPS] == 0
+    line = np.array([0.48, 0.6, 0.64]), np.array([0.3, 0.4]), 0.5, 0.0
+    every = tallies_of(corner, *line)[0, sweep.STEPS]
+    assert every > 5000
+    for most in (1, 500, 5000, every):
+        with pytest.raises(FollowedTooFarError, match=r"^void segments that leave the cell"):
+            tallies_of(corner, *line, most_steps=most)
+    assert np.array_equal(
+        tallies_of(corner, *line, most_steps=every + 1), tallies_of(corner, *line)
+    )
+
+
+def test_without_solids_all_lines_are_channels(corner):
+    """At once: no line is followed to its end."""
+    none = corner._replace(removed=np.ones(1000, bool))
+    tally = tallies_of(none, np.array([0.48, 0.6, 0.64]), np.array([0.3, 0.4]), 0.5, 0.0)[1]
+    assert tally[sweep.LINES] == tally[sweep.KEPT] == 0
+    assert tally[sweep.VOID] == pytest.approx(tally[sweep.LINE_LENGTH])
+    assert tally[sweep.CHANNELS] > 1000
 
 
 def test_gaps_equal_those_of_explicit_images_uncompiled():
