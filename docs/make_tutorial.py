@@ -1,4 +1,4 @@
-"""Write the outputs of docs/tutorial.md: run its commands in turn, in a folder of their own."""
+"""Write the outputs of the pages: run the commands of each page in turn, in a folder of its own."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs" / "tutorial.md"
+DOCS = ROOT / "docs"
+BY_OTHERS = ("validation.md",)  # its outputs are written by a script of its own
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -52,12 +53,22 @@ def page_with_outputs(page: str, folder: Path) -> str:
     return BLOCK.sub(run, page)
 
 
-def fresh_page() -> str:
+def pages() -> list[Path]:
+    """The pages that show what commands print."""
+    return [
+        page
+        for page in sorted(DOCS.rglob("*.md"))
+        if page.name not in BY_OTHERS and BLOCK.search(page.read_text(encoding="utf-8"))
+    ]
+
+
+def fresh_page(page: Path) -> str:
     """The page as it should be."""
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(ROOT / "sample_data", Path(folder) / "sample_data")
-        return page_with_outputs(PAGE.read_text(encoding="utf-8"), Path(folder))
+        return page_with_outputs(page.read_text(encoding="utf-8"), Path(folder))
 
 
 if __name__ == "__main__":
-    PAGE.write_text(fresh_page(), encoding="utf-8")
+    for named in [Path(name).resolve() for name in sys.argv[1:]] or pages():
+        named.write_text(fresh_page(named), encoding="utf-8")

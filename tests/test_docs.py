@@ -221,9 +221,10 @@ def words_and_numbers(text: str) -> tuple[list[str], list[float]]:
     return re.split(number, text), [float(match) for match in re.findall(number, text)]
 
 
-@pytest.mark.skipif(shutil.which("bash") is None, reason="its commands are for bash")
-def test_the_tutorial_runs_and_prints_what_it_says() -> None:
-    said = words_and_numbers((DOCS / "tutorial.md").read_text(encoding="utf-8"))
-    now = words_and_numbers(script("make_tutorial").fresh_page())
-    assert now[0] == said[0], "run python docs/make_tutorial.py"
+@pytest.mark.skipif(shutil.which("bash") is None, reason="the commands are for bash")
+@pytest.mark.parametrize("page", script("make_tutorial").pages(), ids=lambda page: page.name)
+def test_commands_in_the_pages_run_and_print_what_the_pages_say(page: Path) -> None:
+    said = words_and_numbers(page.read_text(encoding="utf-8"))
+    now = words_and_numbers(script("make_tutorial").fresh_page(page))
+    assert now[0] == said[0], f"run python docs/make_tutorial.py {page.relative_to(ROOT)}"
     assert now[1] == pytest.approx(said[1], rel=1e-6)
