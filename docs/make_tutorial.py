@@ -20,7 +20,7 @@ def commands(block: str) -> list[str]:
     """The lines behind a $ sign, with the lines that they go on in."""
     return [
         match[1].replace("\\\n> ", "\\\n")
-        for match in re.finditer(r"^\$ (.*(?:\\\n> .*)*)$", block, re.MULTILINE)
+        for match in re.finditer(r"^\$ ((?:.*\\\n> )*.*)$", block, re.MULTILINE)
     ]
 
 
