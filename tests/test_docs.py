@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import doctest
 import importlib.util
 import math
@@ -102,14 +103,15 @@ def test_every_column_has_a_meaning_and_a_kind_and_stands_on_the_page(
 
 
 def test_every_reader_rule_and_dependency_is_on_its_page() -> None:
-    overview, method, house = (
-        (DOCS / f"{name}.md").read_text("utf-8") for name in ("formats", "method", "architecture")
+    overview, directions, house = (
+        (DOCS / f"{name}.md").read_text("utf-8")
+        for name in ("formats", "details/directions-and-errors", "architecture")
     )
     for name in installed_readers():
         assert f"(formats/{name}.md)" in overview
         assert (DOCS / "formats" / f"{name}.md").read_text("utf-8").startswith(f"# {name}\n")
     for name, (_, argument) in RULES.items():
-        assert f"`{name}:{argument}`" in method
+        assert f"`{name}:{argument}`" in directions
     project = (ROOT / "pyproject.toml").read_text("utf-8")
     (listed,) = re.findall(r"\ndependencies = \[(.*?)\]", project, re.DOTALL)
     for name in re.findall(r'"([a-z0-9]+)', listed):
@@ -194,6 +196,22 @@ def test_every_option_is_documented_and_the_pages_speak_of_no_others() -> None:
         text = re.sub(r"#SBATCH .*|sbatch .*|dask .*|`python .*", "", page.read_text("utf-8"))
         for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", text):
             assert option in known, f"{page.name}: {option}"
+
+
+def test_messages_on_their_page_stand_there_once_and_are_those_of_the_program() -> None:
+    page = (DOCS / "messages.md").read_text(encoding="utf-8")
+    cells = re.findall(r"^\| (`.*?`) \| ", page, re.MULTILINE)
+    messages = [text for cell in cells for text in re.findall("`(.*?)`", cell)]
+    assert len(messages) > 100
+    assert len({*messages}) == len(messages)
+    sources = [path.read_text(encoding="utf-8") for path in (ROOT / "scanfab").rglob("*.py")]
+    nodes = [node for source in sources for node in ast.walk(ast.parse(source))]
+    texts = "\n".join(str(node.value) for node in nodes if isinstance(node, ast.Constant))
+    for words in (message.split() for message in messages):
+        # names and numbers of a case stand between words that are always the same
+        runs = [" ".join(words[place : place + 3]) for place in range(max(1, len(words) - 2))]
+        is_of_the_system = words[:3] == ["No", "space", "left"]
+        assert is_of_the_system or any(run in texts for run in runs), words
 
 
 def test_the_result_in_the_readme_is_that_of_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
