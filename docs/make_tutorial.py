@@ -17,11 +17,8 @@ BLOCK = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def commands(block: str) -> list[str]:
-    """The lines behind a $ sign, with the lines that they go on in."""
-    return [
-        match[1].replace("\\\n> ", "\\\n")
-        for match in re.finditer(r"^\$ ((?:.*\\\n> )*.*)$", block, re.MULTILINE)
-    ]
+    """The lines behind a $ sign, with the lines that they go on in behind a backslash."""
+    return re.findall(r"^\$ ((?:.*\\\n)*.*)$", block, re.MULTILINE)
 
 
 def page_with_outputs(page: str, folder: Path) -> str:
@@ -44,10 +41,9 @@ def page_with_outputs(page: str, folder: Path) -> str:
                 text=True,
                 check=False,
             )
-            shown = command.replace("\\\n", "\\\n> ")
             # said once on each machine
             output = re.sub(r"^scanfab: compiling .*\n", "", done.stdout, flags=re.MULTILINE)
-            parts.append(f"$ {shown}\n{output}")
+            parts.append(f"$ {command}\n{output}")
         return "```console\n" + "".join(parts) + "```"
 
     return BLOCK.sub(run, page)
