@@ -69,7 +69,7 @@ def solve(degree: int) -> np.ndarray:
 if __name__ == "__main__":
     print(
         "# Antipodal spherical designs: degree, x, y, z; one axis a line, equal weights "
-        "(docs/make_designs.py)"
+        "(docs/make/designs.py)"
     )
     for degree in range(3, 22, 2):
         for axis in solve(degree):

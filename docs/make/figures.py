@@ -47,6 +47,6 @@ def draw() -> None:
     with workplace() as folder:
         (folder / "figures").symlink_to(FIGURES)
         for line in (line for page in PAGES for line in commands(page)):
-            program, command, *words = shlex.split(line, comments=True)
+            _, command, *words = shlex.split(line, comments=True)
             if command != "view" and run([command, *words, "--quiet"]) != 0:
                 raise SystemExit(f"{line}: failed")

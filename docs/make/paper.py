@@ -69,7 +69,7 @@ def half_width(fit: Any, name: str) -> float:
 
 
 def slope_tables() -> Iterator[tuple[str, dict[str, Any], str]]:
-    """Every stored table with both anisotropies, and its parts: name, chosen rows, what they are."""
+    """Every stored table with octants, in its parts: name, chosen rows, what they are."""
     for path in sorted(TABLES.glob("*.csv")):
         name = path.stem
         with path.open(encoding="utf-8") as lines:
@@ -106,10 +106,10 @@ def slope_cell(fit: Any, name: str) -> str:
 
 def write_slopes(folder: Path) -> None:
     """All slopes with their intervals, up to 12 % strain and of all frames, as a file."""
-    head = "table,chosen,variant,slope_12,half_12,slope_origin_12,slope_all,half_all".split(",")
+    head = ["table", "chosen", "variant", "slope_12", "half_12", "slope_origin_12", "slope_all"]
     with (folder / "slopes.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(head)
+        writer.writerow([*head, "half_all"])
         for name, chosen, _ in slope_tables():
             early, full = fits(name, **chosen), fits(name, None, **chosen)
             part = " ".join(f"{key}={value:g}" for key, value in chosen.items())
@@ -229,7 +229,7 @@ def held() -> str:
 
 
 def pooled() -> str:
-    """The mean of the RV's slopes over the samples of spheres, with its error from their scatter."""
+    """The mean slope of c over the samples of spheres, with its error from their scatter."""
     found = [fits(f"{run}_default")["c"].slope for run in SPHERES]
     error = np.std(found, ddof=1) / math.sqrt(len(found))
     return f"{np.mean(found):.3f} ± {error:.3f}"

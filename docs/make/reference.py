@@ -99,7 +99,10 @@ def definition(option: str, kinds: dict[tuple[str, str], list[str]]) -> str:
 
 def default_alone(text: str, other: str) -> str:
     """The default of an option in another command, if they differ in nothing else."""
-    (before, _, _), (same, _, default) = text.partition("  [default: "), other.partition("  [default: ")
+    (before, _, _), (same, _, default) = (
+        text.partition("  [default: "),
+        other.partition("  [default: "),
+    )
     return f"default {default.rstrip(']')}." if before == same else ""
 
 
