@@ -34,6 +34,7 @@ nb_execution_timeout = 300
 nb_output_stderr = "remove"  # notes name paths of the machine
 
 default_role = "code"
+smartquotes = False  # two dashes stay two
 autodoc_typehints = "none"  # numpydoc's sections say them
 autosummary_ignore_module_all = False
 numpydoc_class_members_toctree = False
@@ -46,7 +47,9 @@ html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_copy_source = False
 html_math_renderer = "mathml"
+html_sidebars = {"**": ["nav.html"]}
 html_theme_options = {
+    "navbar_center": [],
     "navigation_with_keys": False,
     "show_prev_next": False,
     "secondary_sidebar_items": ["page-toc"],

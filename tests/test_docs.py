@@ -90,10 +90,8 @@ def test_a_line_of_the_page_has_all_columns_that_differ_in_their_component(
 ) -> None:
     text = page_texts["columns.md"]
     names = ", ".join(f"`gvs_{axes}`" for axes in ("xx", "yy", "zz", "xy", "xz", "yz"))
-    assert f"| {names} |  | void fabric tensor, whose trace is 1 |" in text
-    assert (
-        "| `q` | stress | stress along the loading axis minus the mean stress across it |" in text
-    )
+    assert f"| {names} | void fabric tensor, whose trace is 1 |" in text
+    assert "| `p` | mean stress, a third of the trace, for discs half of it (stress) |" in text
 
 
 def test_every_reader_rule_and_dependency_is_on_its_page(page_texts: dict[str, str]) -> None:

@@ -101,7 +101,7 @@ def slope_cell(fit: Any, name: str) -> str:
     """A slope with half its interval."""
     half, expected = half_width(fit, name), SLOPE_2D if "biaxial" in name else SLOPE
     misses = "\\*" if abs(fit.slope - expected) > half else ""
-    return f"{fit.slope:.3f} ± {half:.3f}{misses}"
+    return f"{fit.slope:.3f}\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}{half:.3f}{misses}"
 
 
 def write_slopes(folder: Path) -> None:

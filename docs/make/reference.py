@@ -110,7 +110,7 @@ def escaped(text: str) -> str:
     """Help as Markdown."""
     for sign in "*_<>[]|":
         text = text.replace(sign, "\\" + sign)
-    return text.replace("--", "\\--").replace("  \\[", " \\[")
+    return text.replace("  \\[", " \\[")
 
 
 def taken() -> str:
@@ -138,7 +138,7 @@ def columns() -> str:
         told = {one.name: one.meaning for one in listed} | told
         alike = groupby((one for one in listed if is_new[one]), key=without_component)
         rows = [row(list(group)) for _, group in alike]
-        parts.append(f"## {title}\n\n{markdown(['column', 'unit', 'what it holds'], rows)}")
+        parts.append(f"## {title}\n\n{markdown(['column', 'what it holds (unit)'], rows)}")
         if again := [f"`{one.name}`" for one in listed if not is_new[one]]:
             parts.append(f"As above: {', '.join(again)}.\n")
     return "\n".join(parts)
@@ -157,4 +157,5 @@ def row(alike: list[Column]) -> list[str]:
         meaning = re.sub(r"^(xx|x) of (the )?", "", meaning)
     if any("the contact fabric" in one.meaning for one in alike[1:]):
         meaning = meaning.replace("the void fabric", "void or contact fabric")
-    return [names, alike[0].unit, escaped(meaning)]
+    unit = f" ({alike[0].unit})" if alike[0].unit else ""
+    return [names, escaped(meaning) + unit]
