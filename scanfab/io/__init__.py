@@ -1,7 +1,7 @@
 """
 Reading and writing of files: users name files, scanfab makes series of frames of them.
 
-Readers in other packages may import the names below (see docs/adding-a-reader.md). The modules that
+Readers in other packages may import the names below (see docs/extending/reader.md). The modules that
 define these names may change.
 """
 

@@ -12,7 +12,7 @@ the cut-off::
     ends    I >= c      (I - c) + c e/2       e/2
 
 The mean length is the ratio of the two sums. That of ``ends`` is c + Σ (I - c) / Σ e/2, written as
-one ratio. docs/method.md says why the last two have no bias.
+one ratio. docs/details/edges.md says why the last two have no bias.
 
 What ``start`` keeps of the solids beyond the window, :mod:`scanfab.scan.kernels.start` says.
 """
