@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,7 +25,7 @@ def workplace() -> Iterator[Path]:
     """A new folder with the sample data, as the current folder."""
     before = Path.cwd()
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "sample_data").symlink_to(DOCS.parent / "sample_data")
+        shutil.copytree(DOCS.parent / "sample_data", Path(folder) / "sample_data")
         os.chdir(folder)
         try:
             yield Path(folder)

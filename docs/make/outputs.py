@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
-DOCS = ROOT / "docs"
+from figures import DOCS, workplace
+
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -20,32 +18,23 @@ def commands(block: str) -> list[str]:
     return re.findall(r"^\$ ((?:.*\\\n)*.*)$", block, re.MULTILINE)
 
 
-def page_with_outputs(page: str, folder: Path) -> str:
-    """The page with the outputs that its commands have in this folder."""
-    environment = {
-        **os.environ,
-        "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
-        "COLUMNS": "100",
-    }
-
-    def run(match: re.Match[str]) -> str:
-        parts = []
-        for command in commands(match[1]):
-            done = subprocess.run(
-                ["bash", "-c", command],
-                cwd=folder,
-                env=environment,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                text=True,
-                check=False,
-            )
-            # said once on each machine
-            output = re.sub(r"^scanfab: compiling .*\n", "", done.stdout, flags=re.MULTILINE)
-            parts.append(f"$ {command}\n{output}")
-        return "```console\n" + "".join(parts) + "```"
-
-    return BLOCK.sub(run, page)
+def with_outputs(block: re.Match[str]) -> str:
+    """A block of commands, each with what it prints."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    parts = []
+    for command in commands(block[1]):
+        done = subprocess.run(
+            ["bash", "-c", command],
+            env={**os.environ, "PATH": path, "COLUMNS": "100"},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            check=False,
+        )
+        # said once on each machine
+        output = re.sub(r"^scanfab: compiling .*\n", "", done.stdout, flags=re.MULTILINE)
+        parts.append(f"$ {command}\n{output}")
+    return "```console\n" + "".join(parts) + "```"
 
 
 def pages() -> list[Path]:
@@ -59,9 +48,8 @@ def pages() -> list[Path]:
 
 def fresh_page(page: Path) -> str:
     """The page as it should be."""
-    with tempfile.TemporaryDirectory() as folder:
-        shutil.copytree(ROOT / "sample_data", Path(folder) / "sample_data")
-        return page_with_outputs(page.read_text(encoding="utf-8"), Path(folder))
+    with workplace():
+        return BLOCK.sub(with_outputs, page.read_text(encoding="utf-8"))
 
 
 if __name__ == "__main__":
