@@ -181,7 +181,7 @@ def test_the_commands_of_the_pages_draw_their_figures(
     shown = {
         name
         for page in PAGES
-        for name in re.findall(r"!\[.*\]\(.*figures/(.*)\.png\)", page.read_text("utf-8"))
+        for name in re.findall(r"!\[.*\]\(.*figures/(\S*)\.png\)", page.read_text("utf-8"))
     }
     assert shown <= {path.stem for path in tmp_path.glob("*.png")}
 

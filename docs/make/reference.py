@@ -18,7 +18,10 @@ from scanfab.pipeline.options import DECLARED
 from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS, map_columns
 from scanfab.table.compare import DIFFERENCES, FRAMES, SUMMARY
 
-COMPONENT = re.compile(r"\b([xyz]{1,2}|\d)\b|(?<=_)\d\b|\b(void|contact) fabric\b")
+COMPONENT = re.compile(
+    r"\b([xyz]{1,2}|\d)\b|(?<=_)\d\b|\b(void|contact) fabric\b|\balpha_(vs|c)_axial\b"
+    r"|(?<=without the )(segments|contacts)"
+)
 COLUMNS: dict[str, tuple[Column, ...]] = {
     "`scanfab compute`": OWN_COLUMNS,
     "`scanfab compute` with further options": MORE_COLUMNS,
@@ -155,7 +158,11 @@ def row(alike: list[Column]) -> list[str]:
     meaning = alike[0].meaning.removeprefix("of a map: ")
     if len(alike) > 1:
         meaning = re.sub(r"^(xx|x) of (the )?", "", meaning)
+        meaning = re.sub(r"_1\b", "_N", meaning).replace("octant 1 (at", "octant N (1 is at")
     if any("the contact fabric" in one.meaning for one in alike[1:]):
         meaning = meaning.replace("the void fabric", "void or contact fabric")
+    if "alpha_vs_axial" in meaning and any("alpha_c_axial" in one.meaning for one in alike[1:]):
+        meaning = meaning.replace("alpha_vs_axial", "alpha_vs_axial or alpha_c_axial")
+        meaning = meaning.replace("the segments", "the segments or contacts")
     unit = f" ({alike[0].unit})" if alike[0].unit else ""
     return [names, escaped(meaning) + unit]
