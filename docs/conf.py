@@ -41,6 +41,7 @@ numpydoc_class_members_toctree = False
 numpydoc_show_inherited_class_members = False
 
 html_theme = "pydata_sphinx_theme"
+html_context = {"default_mode": "auto"}
 html_title = "scanfab"
 html_static_path = ["make/static"]
 html_css_files = ["site.css"]

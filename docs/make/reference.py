@@ -55,7 +55,7 @@ def commands() -> str:
         for paragraph in dedent(command(name).help or "").split("\n\n"):
             is_block = paragraph.startswith("\b\n")
             text = paragraph.removeprefix("\b\n")
-            parts.append(f"```text\n{text}\n```\n" if is_block else f"{text}\n")
+            parts.append(f"```text\n{text}\n```\n" if is_block else f"{as_code(text)}\n")
     return "\n".join(parts)
 
 
@@ -113,7 +113,12 @@ def escaped(text: str) -> str:
     """Help as Markdown."""
     for sign in "*_<>[]|":
         text = text.replace(sign, "\\" + sign)
-    return text.replace("  \\[", " \\[")
+    return as_code(text.replace("  \\[", " \\["))
+
+
+def as_code(text: str) -> str:
+    """A text whose options are set as code, so that no line breaks inside them."""
+    return re.sub(r"(?<![\w-])--[a-z][a-z-]+", r"`\g<0>`", text)
 
 
 def taken() -> str:
