@@ -1,4 +1,4 @@
-"""The scripts of docs/cluster.md work as they stand."""
+"""The scripts of docs/howto/many-folders.md work as they stand."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ import pytest
 from scanfab.cli.main import run
 from tests.helpers.interruptions import write_series
 
-PAGE = (Path(__file__).parents[1] / "docs" / "cluster.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[1] / "docs" / "howto" / "many-folders.md").read_text("utf-8")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="scripts for bash")
 
 
 def script(words: str) -> str:
     """The one block of the page that holds some words."""
-    blocks = re.findall(r"```(?:bash|make)\n(.*?)```", PAGE, re.DOTALL)
+    blocks = re.findall(r"```(?:bash|make|sh)\n(.*?)```", PAGE, re.DOTALL)
     (found,) = [block for block in blocks if words in block]
     return str(found)
 
@@ -88,33 +88,32 @@ def whole(tmp_path, monkeypatch):
     return whole
 
 
-def test_the_array_of_slurm(call, interrupt, whole, tmp_path):
-    """One task finds no frame, and another one is preempted and submitted again."""
-    write_series(tmp_path / "dumps", 2)
-    command = "bash", "-c", script("#SBATCH --array")
-    shared = {"SLURM_ARRAY_TASK_COUNT": "3", "SLURM_CPUS_PER_TASK": "1"}
-    interrupt(signal.SIGKILL, "parts/*.part", *command, **shared, SLURM_ARRAY_TASK_ID="0")
-    for task in range(3):
-        call(*command, **shared, SLURM_ARRAY_TASK_ID=str(task))
-    call("bash", "-c", script("scanfab merge parts/"))
-    assert (tmp_path / "fabric.csv").read_bytes() == whole("dumps/")
+@pytest.fixture
+def folders(tmp_path):
+    """The folders of two tests, with a series in each."""
+    for name in ("dense", "loose"):
+        (tmp_path / "tests").mkdir(exist_ok=True)
+        write_series(tmp_path / "tests" / name, 2)
+    return tmp_path / "tests"
 
 
-def test_the_array_of_pbs(call, whole, tmp_path):
-    write_series(tmp_path / "dumps", 2)
-    text = script("#PBS -J").replace("JOBS=8", "JOBS=2")
+def test_the_array_of_slurm(call, interrupt, whole, folders):
+    """A task computes the folder of its index, and is submitted again after it was killed."""
+    command = "bash", "-c", script("#SBATCH --array").replace("--boundary type=2 ", "")
+    interrupt(
+        signal.SIGKILL, "tests/*.part", *command,
+        SLURM_CPUS_PER_TASK="1", SLURM_ARRAY_TASK_ID="0",
+    )  # fmt: skip
     for task in range(2):
-        call("bash", "-c", text, PBS_ARRAY_INDEX=str(task), PBS_O_WORKDIR=str(tmp_path))
-    call("bash", "-c", script("scanfab merge parts/"))
-    assert (tmp_path / "fabric.csv").read_bytes() == whole("dumps/")
+        call(*command, SLURM_CPUS_PER_TASK="1", SLURM_ARRAY_TASK_ID=str(task))
+    call("bash", "-c", script("scanfab merge tests/"))
+    table = folders.parent / "fabric.csv"
+    assert table.read_bytes() == whole("tests/dense", "tests/loose")
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
-def test_the_makefile(call, interrupt, whole, tmp_path):
+def test_the_makefile(call, interrupt, whole, folders, tmp_path):
     """Interrupted, killed, run to its end; and again when there is another dump."""
-    (tmp_path / "tests").mkdir()
-    for name in ("dense", "loose"):
-        write_series(tmp_path / "tests" / name, 2)
     (tmp_path / "Makefile").write_text(script("FOLDERS"), encoding="utf-8")
     interrupt(signal.SIGINT, "tests/*.part", "make", "-j", "2")
     interrupt(signal.SIGKILL, "tests/*.csv", "make", "-j", "2")
@@ -122,7 +121,7 @@ def test_the_makefile(call, interrupt, whole, tmp_path):
     assert (tmp_path / "fabric.csv").read_bytes() == whole("tests/dense/", "tests/loose/")
     assert "up to date" in call("make")
     # another dump is added to its table, and that to the one of all
-    source = tmp_path / "tests" / "loose"
+    source = folders / "loose"
     text = (source / "dump_100.txt").read_text().replace("TIMESTEP\n100\n", "TIMESTEP\n200\n")
     (source / "dump_200.txt").write_text(text)
     assert "dense/" not in call("make")

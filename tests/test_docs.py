@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import ast
 import doctest
-import importlib.util
 import math
 import pkgutil
 import re
@@ -12,23 +12,24 @@ import sys
 import warnings
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 
 import click
 import pytest
 
 import scanfab
-from scanfab.base.column import Column, columns_of_fields
+from scanfab.base.column import Column
 from scanfab.cli.group import COMMANDS, cli
 from scanfab.io.reader import installed_readers
-from scanfab.pipeline import calibration, inspection
 from scanfab.scan.directions import RULES
-from scanfab.table import compare
 from scanfab.table.columns import table_columns
 from tests.helpers.docstrings import faults, faults_of
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
+sys.path.append(str(DOCS / "make"))
+figures, outputs, pages, reference = map(
+    import_module, ("figures", "outputs", "pages", "reference")
+)
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
 MODULES = [
     name
@@ -37,41 +38,35 @@ MODULES = [
 ]
 
 
-def script(name: str) -> ModuleType:
-    """A script of the docs, as a module; as when it runs, it finds the modules beside it."""
-    if str(DOCS) not in sys.path:
-        sys.path.append(str(DOCS))
-    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+@pytest.fixture(scope="module")
+def page_texts() -> dict[str, str]:
+    """All pages as the site has them: what scripts make stands in its places."""
+    return {
+        page.relative_to(DOCS).as_posix(): pages.filled(page.read_text("utf-8"))
+        for page in PAGES[1:]
+    }
 
 
-def test_the_command_line_page_is_fresh() -> None:
-    assert (DOCS / "command-line.md").read_text(encoding="utf-8") == script(
-        "make_command_line"
-    ).page(), "run python docs/make_command_line.py"
+def test_every_part_that_scripts_make_is_on_a_page(page_texts: dict[str, str]) -> None:
+    asked = [
+        name for page in PAGES for name in re.findall(r"\{\{(\w+)\}\}", page.read_text("utf-8"))
+    ]
+    assert sorted(asked) == sorted(pages.PARTS)
+    assert not any("nan" in text.split() for text in page_texts.values())
 
 
-def test_the_python_page_is_fresh_and_has_every_public_name_once() -> None:
-    python = script("make_python")
-    page = (DOCS / "python.md").read_text(encoding="utf-8")
-    assert page == python.page(), "run python docs/make_python.py"
-    assert sorted(name for group in python.GROUPS.values() for name in group) == sorted(
-        scanfab.__all__
-    )
+def test_every_public_name_is_once_in_the_api() -> None:
+    text = (DOCS / "api" / "index.md").read_text("utf-8")
+    assert sorted(re.findall(r"^   scanfab\.(\w+)$", text, re.MULTILINE)) == scanfab.__all__
 
 
-def test_the_architecture_page_is_short_and_names_what_there_is() -> None:
-    text = (DOCS / "architecture.md").read_text(encoding="utf-8")
-    assert len(text.split()) <= 1000
+def test_the_page_for_developers_names_what_there_is() -> None:
+    text = (DOCS / "developers.md").read_text(encoding="utf-8")
     package = ROOT / "scanfab"
     for room in [path.parent.name for path in package.glob("*/__init__.py")]:
         assert re.search(rf"^\d .*\b{room}\b", text, re.MULTILINE), room
     for name in re.findall(r"`(\w+/[\w/.]*)`", text):
-        assert (package / name).exists(), name
+        assert (package / name).exists() or (ROOT / name).exists(), name
 
 
 def test_no_file_is_long() -> None:
@@ -79,41 +74,38 @@ def test_no_file_is_long() -> None:
         assert len(path.read_text(encoding="utf-8").splitlines()) <= 400, path
 
 
-@pytest.mark.parametrize(
-    "columns",
-    [
-        table_columns(),
-        compare.FRAMES,
-        compare.SUMMARY,
-        compare.DIFFERENCES,
-        columns_of_fields(calibration.StepRow),
-        columns_of_fields(inspection.FrameReport),
-    ],
-)
+@pytest.mark.parametrize("columns", [table_columns(), *reference.COLUMNS.values()])
 def test_every_column_has_a_meaning_and_a_kind_and_stands_on_the_page(
-    columns: tuple[Column, ...],
+    columns: tuple[Column, ...], page_texts: dict[str, str]
 ) -> None:
-    text = (DOCS / "command-line.md").read_text(encoding="utf-8")
+    text = page_texts["columns.md"]
     assert len({column.name for column in columns}) == len(columns)
     for column in columns:
         assert column.kind in (int, float, str, list)
-        assert f"| `{column.name}` | {column.unit} | {column.meaning} |" in text
         assert column.meaning
+        assert f"`{column.name}`" in text, column.name
 
 
-def test_every_reader_rule_and_dependency_is_on_its_page() -> None:
-    overview, method, house = (
-        (DOCS / f"{name}.md").read_text("utf-8") for name in ("formats", "method", "architecture")
-    )
+def test_a_line_of_the_page_has_all_columns_that_differ_in_their_component(
+    page_texts: dict[str, str],
+) -> None:
+    text = page_texts["columns.md"]
+    names = ", ".join(f"`gvs_{axes}`" for axes in ("xx", "yy", "zz", "xy", "xz", "yz"))
+    assert f"| {names} | void fabric tensor, whose trace is 1 |" in text
+    assert "| `p` | mean stress, a third of the trace, for discs half of it (stress) |" in text
+
+
+def test_every_reader_rule_and_dependency_is_on_its_page(page_texts: dict[str, str]) -> None:
     for name in installed_readers():
-        assert f"(formats/{name}.md)" in overview
-        assert (DOCS / "formats" / f"{name}.md").read_text("utf-8").startswith(f"# {name}\n")
+        assert f"[`{name}`]({name}.md)" in page_texts["formats/index.md"]
+        assert page_texts[f"formats/{name}.md"].startswith(f"# {name}\n")
+    directions = page_texts["details/directions-and-errors.md"]
     for name, (_, argument, *_) in RULES.items():
-        assert f"`{name}:{argument}`" in method
+        assert f"`{name}:{argument}`" in directions
     project = (ROOT / "pyproject.toml").read_text("utf-8")
     (listed,) = re.findall(r"\ndependencies = \[(.*?)\]", project, re.DOTALL)
     for name in re.findall(r'"([a-z0-9]+)', listed):
-        assert f"| {name} |" in house
+        assert f"| {name} |" in page_texts["developers.md"]
 
 
 @pytest.mark.parametrize("name", MODULES)
@@ -159,11 +151,14 @@ def test_a_docstring_that_does_not_fit_its_signature_is_found() -> None:
 
 
 def python_blocks() -> list[tuple[str, str]]:
-    return [
-        (page.name, block)
-        for page in PAGES
-        for block in re.findall(r"^```python\n(.*?)^```", page.read_text("utf-8"), re.M | re.S)
-    ]
+    """The blocks of each page, and the cells of each notebook as one."""
+    found = []
+    for page in PAGES:
+        text = page.read_text("utf-8")
+        blocks = re.findall(r"^```python\n(.*?)^```", text, re.M | re.S)
+        cells = re.findall(r"^```\{code-cell\}\n((?:[^:].*\n|\n)*?)```", text, re.M)
+        found += [(page.name, block) for block in [*blocks, *(["\n".join(cells)] * bool(cells))]]
+    return found
 
 
 @pytest.mark.parametrize(("page", "block"), python_blocks())
@@ -176,24 +171,70 @@ def test_python_in_the_pages_runs(
     exec(compile(block, page, "exec"), {"__name__": "docs"})
 
 
+def test_the_commands_of_the_pages_draw_their_figures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("cut", "view"):
+        shutil.copy(figures.FIGURES / f"{name}.png", tmp_path)
+    monkeypatch.setattr(figures, "FIGURES", tmp_path)
+    figures.draw()
+    shown = {
+        name
+        for page in PAGES
+        for name in re.findall(r"!\[.*\]\(.*figures/(\S*)\.png\)", page.read_text("utf-8"))
+    }
+    assert shown <= {path.stem for path in tmp_path.glob("*.png")}
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_links_between_pages_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8")):
-        if "://" not in target:
+        # figures and tables are made with the site
+        if "://" not in target and "figures/" not in target and "tables/" not in target:
             assert (page.parent / target).exists(), target
 
 
-def test_every_option_is_documented_and_the_pages_speak_of_no_others() -> None:
-    commands = [cli.get_command(click.Context(cli), name) for name in COMMANDS]
-    options = {x for one in commands for parameter in one.params for x in parameter.opts}
-    text = (DOCS / "command-line.md").read_text("utf-8")
-    assert [one for one in options if one.startswith("-") and one not in text] == []
-    known = {*options, "--format", "--help", "--version", "--debug"}
-    for page in PAGES:
-        # what a batch system is told, and scripts of the tests, have options of their own
-        text = re.sub(r"#SBATCH .*|sbatch .*|dask .*|`python .*", "", page.read_text("utf-8"))
-        for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", text):
-            assert option in known, f"{page.name}: {option}"
+def test_every_option_is_documented_once_and_the_pages_speak_of_no_others(
+    page_texts: dict[str, str],
+) -> None:
+    commands = {name: cli.get_command(click.Context(cli), name) for name in COMMANDS}
+    text = page_texts["command-line.md"]
+    matrix = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| [`")}
+    takers = {
+        option: [name for name, one in commands.items() if option in one_options(one)]
+        for option in sorted({x for one in commands.values() for x in one_options(one)})
+    }
+    for option, names in takers.items():
+        assert text.count(f"]{{#{option.lstrip('-')}}}") == 1
+        cells = matrix[option].split("|")[2:-1]
+        assert [name for name, cell in zip(COMMANDS, cells, strict=True) if cell.strip()] == names
+    known = {*takers, "--format", "--help", "--version", "--debug"}
+    for name, page in {**page_texts, "README.md": PAGES[0].read_text("utf-8")}.items():
+        # batch systems, pip and scripts of the tests have options of their own
+        own = r"#SBATCH .*|sbatch .*|dask .*|`?python3? .*|ruff .*|apt-get .*|yade .*|lmp .*"
+        for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", re.sub(own, "", page)):
+            assert option in known, f"{name}: {option}"
+
+
+def one_options(command: click.Command) -> set[str]:
+    """The options of a command, as its help spells them."""
+    return {one.opts[0] for one in command.params if isinstance(one, click.Option)}
+
+
+def test_messages_on_their_page_stand_there_once_and_are_those_of_the_program() -> None:
+    page = (DOCS / "messages.md").read_text(encoding="utf-8")
+    cells = re.findall(r"^\| (`.*?`) \| ", page, re.MULTILINE)
+    messages = [text for cell in cells for text in re.findall("`(.*?)`", cell)]
+    assert len(messages) > 100
+    assert len({*messages}) == len(messages)
+    sources = [path.read_text(encoding="utf-8") for path in (ROOT / "scanfab").rglob("*.py")]
+    nodes = [node for source in sources for node in ast.walk(ast.parse(source))]
+    texts = "\n".join(str(node.value) for node in nodes if isinstance(node, ast.Constant))
+    for words in (message.split() for message in messages):
+        # names and numbers of a case stand between words that are always the same
+        runs = [" ".join(words[place : place + 3]) for place in range(max(1, len(words) - 2))]
+        is_of_the_system = words[:3] == ["No", "space", "left"]
+        assert is_of_the_system or any(run in texts for run in runs), words
 
 
 def test_the_result_in_the_readme_is_that_of_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -221,9 +262,10 @@ def words_and_numbers(text: str) -> tuple[list[str], list[float]]:
     return re.split(number, text), [float(match) for match in re.findall(number, text)]
 
 
-@pytest.mark.skipif(shutil.which("bash") is None, reason="its commands are for bash")
-def test_the_tutorial_runs_and_prints_what_it_says() -> None:
-    said = words_and_numbers((DOCS / "tutorial.md").read_text(encoding="utf-8"))
-    now = words_and_numbers(script("make_tutorial").fresh_page())
-    assert now[0] == said[0], "run python docs/make_tutorial.py"
+@pytest.mark.skipif(shutil.which("bash") is None, reason="the commands are for bash")
+@pytest.mark.parametrize("page", outputs.pages(), ids=lambda page: page.name)
+def test_commands_in_the_pages_run_and_print_what_the_pages_say(page: Path) -> None:
+    said = words_and_numbers(page.read_text(encoding="utf-8"))
+    now = words_and_numbers(outputs.fresh_page(page))
+    assert now[0] == said[0], f"run python docs/make/outputs.py {page.relative_to(ROOT)}"
     assert now[1] == pytest.approx(said[1], rel=1e-6)

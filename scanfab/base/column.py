@@ -23,7 +23,7 @@ class Column:
     A column of a table; it is declared beside the code that computes its values.
 
     The declarations decide the header and order of CSV files, the schema of Parquet files, the rows
-    of empty frames and the tables in docs/command-line.md.
+    of empty frames and the tables in docs/columns.md.
 
     Parameters
     ----------

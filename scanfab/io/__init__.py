@@ -1,8 +1,8 @@
 """
 Reading and writing of files: users name files, scanfab makes series of frames of them.
 
-Readers in other packages may import the names below (see docs/adding-a-reader.md). The modules that
-define these names may change.
+Readers in other packages may import the names below (see docs/extending/reader.md). The modules
+that define these names may change.
 """
 
 from scanfab.io.columns import grain_table as grain_table

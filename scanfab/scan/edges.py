@@ -2,7 +2,7 @@
 The rules of what counts at a window's surface, and the columns that say how a sample was scanned.
 
 What a segment counts by each rule stands in :mod:`scanfab.scan.kernels.sweep`, their theory in
-docs/method.md; `VariantColumns` has the values of the columns.
+docs/details/edges.md; `VariantColumns` has the values of the columns.
 """
 
 from __future__ import annotations

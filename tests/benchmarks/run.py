@@ -1,9 +1,9 @@
 """
-All benchmarks by one command; see docs/performance.md.
+All benchmarks by one command; docs/developers.md has the main results.
 
-python tests/benchmarks/run.py [--only chords reading ...] [--repeats 5] [--largest] [-w]
+python tests/benchmarks/run.py [--only chords reading ...] [--repeats 5] [--largest]
 
-Each section of the page is a function of a module's SECTIONS, which takes how many runs of each way
+Each section is a function of a module's SECTIONS, which takes how many runs of each way
 there are and returns a table.
 """
 
@@ -41,26 +41,22 @@ def machine() -> str:
 
 
 def main() -> None:
-    """Measure, print, and with --write renew the page."""
+    """Measure and print."""
     warnings.simplefilter("ignore")
     sys.path[0] = str(ROOT)  # not this folder, whose modules have common names
-    timing = import_module("tests.benchmarks.timing")
     sections = {}
     for module in MODULES:
         sections |= import_module(f"tests.benchmarks.{module}").SECTIONS
-    parser = argparse.ArgumentParser(description="Measure the ratios of docs/performance.md.")
+    parser = argparse.ArgumentParser(description="Measure and print how fast scanfab is.")
     parser.add_argument("--only", nargs="+", choices=sections, default=[*sections], metavar="NAME")
     parser.add_argument("--repeats", type=int, default=5, help="runs of which the median counts")
     parser.add_argument("--largest", action="store_true", help="ten million grains too")
-    parser.add_argument("-w", "--write", action="store_true", help="renew the tables of the page")
     given = parser.parse_args()
     if given.largest:
         sections["growth"] = partial(sections["growth"], largest=True)
     for name in given.only:
         dated = f"{machine()}\n\n{sections[name](given.repeats)}"
         print(f"\n## {name}\n\n{dated}", flush=True)
-        if given.write:
-            timing.write_section(name, dated)
 
 
 if __name__ == "__main__":

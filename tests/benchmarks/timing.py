@@ -1,19 +1,16 @@
-"""Interleaved runs of several ways to do a thing, and the tables of docs/performance.md."""
+"""Interleaved runs of several ways to do a thing, and tables of their times."""
 
 from __future__ import annotations
 
 import gc
 import random
-import re
 import time
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 ENOUGH = 10.0
-PAGE = Path(__file__).parents[2] / "docs" / "performance.md"
 
 
 def samples(
@@ -54,14 +51,3 @@ def table(titles: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     """A Markdown table."""
     lines = [titles, ["---"] * len(titles), *rows]
     return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines)
-
-
-def write_section(name: str, text: str) -> None:
-    """Replace what stands between the markers of a section of the page."""
-    page = PAGE.read_text(encoding="utf-8")
-    begin, end = f"<!-- {name} -->\n", f"\n<!-- end of {name} -->"
-    pattern = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
-    changed, count = pattern.subn(lambda _: begin + text + end, page)
-    if count != 1:
-        raise SystemExit(f"{PAGE}: expected one section {name}, found {count}")
-    PAGE.write_text(changed, encoding="utf-8")

@@ -10,7 +10,7 @@ in a folder of its name::
 Writes sample_data/paper/RUN_MEASURE.csv, and RUN_engine.csv beside it.
 
 Half an hour to an hour for each run of 13,723 grains on two cores. A table that exists is not
-computed again; an unfinished one goes on. `python docs/make_validation.py` makes the page of them.
+computed again; an unfinished one goes on. docs/make/paper.py makes the page of them.
 """
 
 from __future__ import annotations

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 from dataclasses import dataclass
-from pathlib import Path
 
 import click
 import pytest
@@ -18,7 +16,6 @@ from scanfab.pipeline.options import OPTIONS
 from scanfab.pipeline.record import asked_for
 from scanfab.pipeline.settings import Settings
 
-DOCS = Path(__file__).parents[2] / "docs"
 TITLES = ["Most used options", *(group.capitalize() for group in GROUPS)]
 
 
@@ -81,11 +78,3 @@ def test_a_made_up_option_takes_one_declaration(monkeypatch):
         """{options}"""
 
     assert function.__doc__.endswith("stray_light : int, optional\n    How much of it, as `rv`.")
-
-
-def test_the_page_of_the_command_line_shows_what_the_help_has():
-    """So that a declared option is on the page without another word."""
-    spec = importlib.util.spec_from_file_location("page", DOCS / "make_command_line.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    assert help_of(compute, 100).split("\n\n", 1)[1] in module.page()
