@@ -3,7 +3,8 @@ Void fabric by scan lines: G_vs = Σ w ℓ n⊗n / Σ w ℓ, Eq. 1 of the 2017 p
 
 Theocharis, Vairaktaris and Dafalias (2017), Powders and Grains 2017, EPJ Web of
 Conferences 140, after Oda, Nemat-Nasser and Konishi (1985),
-doi:10.3208/sandf1972.25.3_85. In the paper all weights w of directions are 1; see docs/method.md.
+doi:10.3208/sandf1972.25.3_85. In the paper all weights w of directions are 1; see
+docs/details/directions-and-errors.md.
 """
 
 from __future__ import annotations

@@ -181,7 +181,7 @@ class Frame:
             cell=grains.cell,
             step=self.step,
             time=self.snapshot.time,
-            dim=series.space_of(self.number, grains.position),
+            dim=series.space_of(self.number, grains.position, grains.id),
         )
 
     def _contacts(self, grains: GrainTable) -> tuple[list[Path], list[JoinedContacts]]:

@@ -14,7 +14,7 @@ from typing import Any, Literal, SupportsIndex, overload
 from scanfab.base.errors import NoFrameError, PackingError, ReadError, SettingsError, note
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
-from scanfab.base.typing import FloatArray
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.companions import companion_file, read_frame
 from scanfab.io.families import Family
 from scanfab.io.files import Stamp, stamp_of, unpacking_up_to
@@ -42,7 +42,9 @@ class Known:
     snapshots: dict[Path, tuple[Stamp | None, list[Snapshot]]] = field(default_factory=dict)
     """The snapshots of each file that was searched, and the stamp of the file at that time."""
     space: Space | None = None
-    """The plane or space in which the particles of the first frame with particles lie."""
+    """The plane or space in which the particles of the reference frame lie."""
+    reference: int | None = None
+    """Number of the reference frame; None for the first frame that has particles."""
 
 
 @dataclass
@@ -163,7 +165,7 @@ class Series:
             return self.numbers[: len(self)][frames]
         return self.numbers[frames]
 
-    def space_of(self, number: int, position: FloatArray) -> Space:
+    def space_of(self, number: int, position: FloatArray, id: IntArray | None = None) -> Space:
         """
         The plane or space in which the particles of the series lie, when one frame has been read.
 
@@ -173,6 +175,8 @@ class Series:
             The number of the frame that has been read, in the whole series.
         position : ndarray, shape (N, 3)
             Its centres, dump's length unit.
+        id : ndarray, shape (N,), optional
+            Its ids, for an error.
 
         Returns
         -------
@@ -189,10 +193,15 @@ class Series:
         if self.dim == 3:
             return SPACE
         if self.known.space is None:
-            first = next(filter(len, self._centres_before(number)), position)
+            before = self._centres_before(0 if number == self.known.reference else number)
+            first = next(filter(len, before), position)
             if not len(first):
                 return SPACE
-            first_space = flat_space(first) if self.dim == 2 else space_of(first)
+            first_space = (
+                flat_space(first, id if first is position else None)
+                if self.dim == 2
+                else space_of(first)
+            )
             if first_space.is_plane and self.dim == "auto":
                 advice = "they are read as discs, in 2D; `dim=3` reads them as spheres"
                 where = spelt_plane(first, first_space)

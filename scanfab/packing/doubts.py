@@ -12,7 +12,7 @@ from scanfab.base.errors import Note, PackingError
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
-from scanfab.packing.packing import FEWEST, Packing, space_of, spelt_plane
+from scanfab.packing.packing import FEWEST, Packing, off_plane, space_of, spelt_plane, spelt_some
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox
 
@@ -128,6 +128,13 @@ def cell_hint(sample: Sample, carries: str) -> str:
 def _read_as_spheres(sample: Sample) -> str:
     """Centres that lie in a plane are those of discs."""
     packing, plane = sample.packing, space_of(sample.packing.position)
+    nearly, rows = off_plane(packing.position)
+    if len(rows) and not packing.space.is_plane:
+        return (
+            f"all centres lie in {nearly} but those of {spelt_some(packing.id[rows])}, so all are "
+            f"taken for spheres: `dim=2` reads discs once these grains are taken out of the dump, "
+            f"`dim=3` reads spheres"
+        )
     if packing.space.is_plane or not plane.is_plane:
         return ""
     return (

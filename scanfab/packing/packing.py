@@ -26,6 +26,8 @@ from scanfab.packing.contacts import (
 )
 
 # Fewer centres may share a coordinate by chance.
+# grains that a message names, and the share of centres that may lie off the plane of all others
+MOST_NAMED, OFF_PLANE = 5, 0.01
 FEWEST = 10
 
 
@@ -113,7 +115,7 @@ class Packing:
         if isinstance(space, Space):
             _refuse_outside(centres, space)
         else:
-            space = flat_space(centres) if space == 2 else SPACE
+            space = flat_space(centres, self.id) if space == 2 else SPACE
         self.space: Space = space
         if cell is not None and self.space.is_plane:
             cell = _cell_in_plane(cell, self.space)
@@ -255,6 +257,12 @@ def check_lengths(position: FloatArray, radius: FloatArray, id: IntArray) -> Non
     )
 
 
+def spelt_some(id: IntArray) -> str:
+    """The ids of the first grains of some, and how many more there are."""
+    more = f" and {len(id) - MOST_NAMED} more" if len(id) > MOST_NAMED else ""
+    return f"{counted(len(id), 'grain')} (id {', '.join(map(str, id[:MOST_NAMED]))}{more})"
+
+
 def space_of(position: FloatArray) -> Space:
     """
     The plane in which centres lie, or all space.
@@ -277,9 +285,25 @@ def space_of(position: FloatArray) -> Space:
     return Space(shared[0]) if len(shared) == 1 else SPACE
 
 
-def flat_space(position: FloatArray) -> Space:
+def off_plane(position: FloatArray) -> tuple[Space, IntArray]:
+    """
+    The plane in which nearly all centres lie, and the rows of the few that lie off it.
+
+    All space and no rows, unless at least 99 % of the centres, but not all, share exactly one
+    coordinate.
+    """
+    off = position != np.median(position, axis=0)
+    few = np.flatnonzero((off.mean(axis=0) <= OFF_PLANE) & off.any(axis=0))
+    if len(position) < FEWEST or len(few) != 1 or not off.any(axis=0).all():
+        return SPACE, np.zeros(0, np.int64)
+    return Space(int(few[0])), np.flatnonzero(off[:, few[0]])
+
+
+def flat_space(position: FloatArray, id: IntArray | None = None) -> Space:
     """
     The plane of discs; if centres share several coordinates, the last of them is constant.
+
+    ``id`` names the grains in the error.
 
     Raises
     ------
@@ -288,6 +312,13 @@ def flat_space(position: FloatArray) -> Space:
     """
     shared = np.flatnonzero((position == position[:1]).all(axis=0))
     if len(shared) == 0:
+        plane, rows = off_plane(position)
+        if len(rows):
+            names = rows if id is None else id[rows]
+            raise PackingError(
+                f"the centres do not lie in one coordinate plane: all lie in {plane} but those of "
+                f"{spelt_some(names)}: discs share one coordinate exactly; `dim=3` reads spheres"
+            )
         extents = ", ".join(f"{edge:.4g}" for edge in np.ptp(position, axis=0))
         raise PackingError(
             f"the centres do not lie in one coordinate plane (their extents along x, y, z are "

@@ -110,6 +110,8 @@ class Frames:
             raise SettingsError(f"frames: {what}, which nobody knows while it is followed")
         self.named = number_of_reference(self.source, self.settings)
         """Number of the reference frame, if the user names one."""
+        if isinstance(self.source, Series):
+            self.source.known.reference = self.named
         self.name = self.source.name
         self.ready: dict[int, Sample | None] = {}
         """Chosen frames that :meth:`reference` has read; None for damaged frames."""

@@ -15,7 +15,7 @@ from scanfab.base.errors import Note, ScanfabNote, SettingsError
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.io.surface import read_surface
-from scanfab.packing.packing import spelt_plane
+from scanfab.packing.packing import spelt_plane, spelt_some
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import RV_MEANING, SurfaceBox, Window
 from scanfab.pipeline.settings import Settings
@@ -24,8 +24,6 @@ from scanfab.pipeline.values import Vector
 
 # in radii of the smallest grain: a smaller RV is refused as a mistake
 SMALLEST = 1e-9
-# grains that have flown away and are named in a message
-MOST_NAMED = 5
 
 
 class RV(NamedTuple):
@@ -134,9 +132,7 @@ def in_sample(rv: RV, sample: Sample) -> RV:
         )
         escaped = packing.id[sample.escaped.grains]
         if escaped.size and not sample.escaped.are_many:
-            more = ", ..." if len(escaped) > MOST_NAMED else ""
-            named = ", ".join(map(str, escaped[:MOST_NAMED])) + more
-            lack += f" (without the grains that have flown away: {named})"
+            lack += f", which leaves out {spelt_some(escaped)} that flew away"
     return rv._replace(lack=lack)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from scanfab.base.arrays import compressed, concatenated
-from scanfab.base.errors import Note, joined
+from scanfab.base.errors import Note, ScanfabNote, ScanfabWarning, joined
 from scanfab.base.space import SPACE
 from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, FloatArray
@@ -228,7 +228,7 @@ class VariantMap:
         if blocks.radius:
             arrays |= {"r_inner": blocks.bounds[:-1], "r_outer": blocks.bounds[1:]}
         number, tensors = blocks.of(points), fabrics.tensors.mean(axis=0)
-        for block, exists in enumerate(fabrics.exists):
+        for block, exists in enumerate(self.exists):
             own = normals[number == block]
             # rows hold None in place of NaN
             values = {name: array[block].item() for name, array in arrays.items()}
@@ -258,6 +258,11 @@ class VariantMap:
         inside = number >= 0
         sums = (np.bincount(number[inside], array[inside], count) for array in values)
         return [self.blocks.by_part(array.astype(np.float64)) for array in sums]
+
+    @cached_property
+    def exists(self) -> BoolArray:
+        """Which blocks have a void fabric, shape (B,): not those that hold no centre of a grain."""
+        return np.asarray(self.fabrics.exists & (self.grains["grains"] > 0))
 
     @cached_property
     def grains(self) -> dict[str, Any]:
@@ -291,7 +296,7 @@ class VariantMap:
             "alpha_vs_axial_sample_se": part_errors(axial(rest.tensors, axis), held),
             "mean_length_se": part_errors(ratio(rest.length, rest.number), held),
         }
-        return {name: np.where(fabrics.exists, values, np.nan) for name, values in columns.items()}
+        return {name: np.where(self.exists, values, np.nan) for name, values in columns.items()}
 
     def _solid_fraction(self) -> dict[str, FloatArray]:
         """1 - volume of the void in the block / volume of the block inside the window."""
@@ -322,32 +327,38 @@ class VariantMap:
         kept = float(fabrics.segments.sum())
         left_out = left_out_of(self.scan, variant, edge_of(variant, self.plan, self.solids), kept)
         texts = doubts_of_lines(self.scan, variant, left_out)
-        lacking, empty = (int((~mask).sum()) for mask in (fabrics.exists, fabrics.is_met))
+        without_grains = self.grains["grains"] == 0
+        lacking, bare = int((~self.exists).sum()), int(without_grains.sum())
+        empty = int((~fabrics.is_met & ~without_grains).sum())
         if lacking:
             texts["few_segments"] = (
-                f"{lacking} of {counted(len(self.blocks), 'block')} have no void fabric: {empty} "
-                f"have no void segment, {lacking - empty} have none in over 5 % of the directions: "
-                f"choose fewer blocks, closer lines (`spacing`) or a shorter `cutoff`"
+                f"{lacking} of {counted(len(self.blocks), 'block')} have no void fabric: {bare} "
+                f"hold no centre of a grain, {empty} have no void segment, "
+                f"{lacking - bare - empty} have none in over 5 % of the directions: choose fewer "
+                f"blocks, closer lines (`spacing`) or a shorter `cutoff`"
             )
-        texts[HOMOGENEITY] = self._homogeneity()
-        return (Note(code, text, (variant.name,)) for code, text in texts.items())
+        notes = [Note(code, text, (variant.name,)) for code, text in texts.items()]
+        return iter([*notes, self._homogeneity()])
 
-    def _homogeneity(self) -> str:
-        """The result of the test for homogeneity, in words."""
-        inner = self.fabrics.exists & ~self.at_surface
+    def _homogeneity(self) -> Note:
+        """The result of the test for homogeneity; a warning only if the sample is not."""
+        inner = self.exists & ~self.at_surface
         values = np.where(inner, self.void["alpha_vs_axial"], np.nan)
         variances = self.void["alpha_vs_axial_sample_se"] ** 2
         variances = variances + np.nan_to_num(self.void["alpha_vs_axial_se"]) ** 2
         test = homogeneity_of(values, variances, self.fabrics.segments.sum(axis=0), FREEDOM)
         if test is not None:
             chance = "p < 0.0001" if test.chance < 1e-4 else f"p = {test.chance:.2g}"
-            sign = "" if test.chance < UNLIKELY else "no sign that "
-            return (
+            is_homogeneous = test.chance >= UNLIKELY
+            result = "as in a homogeneous" if is_homogeneous else "this is not a homogeneous"
+            text = (
                 f"alpha_vs_axial of {test.blocks} blocks scatters {test.ratio:.2g} times as much "
-                f"as their errors explain ({chance}): {sign}the sample is not homogeneous"
+                f"as their errors explain ({chance}): {result} sample"
             )
+            kind = ScanfabNote if is_homogeneous else ScanfabWarning
+            return Note(HOMOGENEITY, text, (self.variant.name,), kind)
         text = "too few blocks to tell whether the sample is homogeneous"
         if self.at_surface.any():
             text += f": {inner.sum()} of {len(inner)} are neither empty nor at a surface"
             text += " (choose smaller blocks, or those of the RV with `edge=start`)"
-        return text
+        return Note(HOMOGENEITY, text, (self.variant.name,), ScanfabNote)

@@ -29,7 +29,7 @@ the cut-off::
     ends    I >= c      (I - c) + c e/2       e/2
 
 The mean length is the ratio of the two sums. That of ``ends`` is c + Σ (I - c) / Σ e/2, written as
-one ratio. docs/method.md says why the last two have no bias.
+one ratio. docs/details/edges.md says why the last two have no bias.
 
 By ``start`` only chords that reach into the window change the state of a line. Of the others, and
 of those that begin before the window, a line keeps where the last solid before it ends and where
