@@ -206,7 +206,14 @@ def compare_tables(
     _tell_of_strains(rows, column, strain_max)
     if is_turned(rows):
         note(TURNED)
+    origins = {row.get("contacts_from") for row in rows} - {None, ""}
+    if len(origins) > 1:
+        note(
+            "contacts come from files in some frames and from geometry in others (contacts_from): "
+            "the slope on the contact fabric mixes both"
+        )
     fits = [_fitted_group(group, column, strain_max) for group in groups.values()]
+    _tell_of_errors([summary for summary, _ in fits], rows)
     normalised = [row for group in groups.values() for row in _normalised(group)]
     # the last column, rv, is dropped if there are no several RVs
     end = None if numbers_of(rows, "rv") else -1
@@ -248,6 +255,21 @@ def _tell_of_strains(rows: Rows, column: str, strain_max: float | None) -> None:
                 f"a fit needs {FEWEST_FRAMES}: the next larger strain is {min(beyond):.10g}; "
                 f"{lie}"
             )
+
+
+def _tell_of_errors(summary: Iterable[Mapping[str, Any]], rows: Rows) -> None:
+    """Note why slopes have no standard error."""
+    without = [one for one in summary if one["slope"] is not None and one["slope_se"] is None]
+    if not without:
+        return
+    parts = [row.get("alpha_vs_axial_without_1") for row in rows]
+    reason = "the noise of the scan hides the scatter of the octants"
+    if all(part is None for part in parts):
+        reason = "the table has no parts of the jackknife (alpha_vs_axial_without_1 and so on)"
+    elif None in parts:
+        reason = "some frame has no fabric without one of its octants, so it has too few grains"
+    names = ", ".join(dict.fromkeys(variant_of(one) for one in without))
+    note(f"slope_se is empty for variant {names}: {reason}")
 
 
 def _within(strain: float | None, strain_max: float | None) -> bool:

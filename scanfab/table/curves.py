@@ -1,4 +1,4 @@
-"""Curves of fabric tables: one for each source and variant, over strain or frame number."""
+"""Curves of fabric tables: one for each source and variant, over strain, time or frame."""
 
 from __future__ import annotations
 
@@ -16,6 +16,12 @@ from scanfab.table.row import Rows, column_of, groups_of, number_of, numbers_of,
 STRAINS = {
     "strain": ("axial strain", r"$\varepsilon_a$"),
     "shear_strain": ("shear strain", r"$\varepsilon_q$"),
+}
+# what curves are drawn over without a strain, each with its label and its words in a sentence
+OTHERS = {
+    "time": ("time (dump's unit)", "the time"),
+    "step": ("time step", "the time step"),
+    "frame": ("frame", "the number of the frame"),
 }
 # smaller differences between strains are rounding
 SAME = 1e-9
@@ -36,7 +42,7 @@ class Curve:
     variant: str
     """Variant, with the size of its RV if there are several."""
     x: FloatArray
-    """Strain in per cent, or the number of the frame, shape (F,)."""
+    """Strain in per cent, else time, time step or number of the frame, shape (F,)."""
     rows: Rows
     """The rows of the curve."""
 
@@ -69,14 +75,15 @@ class Curve:
 def curves_of(rows: Iterable[Mapping[str, Any]]) -> list[Curve]:
     """The curves of a table, in the order of their first rows."""
     rows = list(rows)
-    abscissa = strain_column(rows)
+    abscissa = _abscissa(rows)
+    factor = 100.0 if abscissa in STRAINS else 1.0
     groups = groups_of(rows)
     names = short_names(source for source, _ in groups)
     return [
         Curve(
             names[source],
             variant,
-            _drawable(column_of(group, abscissa or "frame")) * (100.0 if abscissa else 1.0),
+            factor * _drawable(column_of(group, abscissa)),
             group,
         )
         for (source, variant), group in groups.items()
@@ -119,7 +126,7 @@ def why_not_strain(rows: Rows) -> str | None:
     lacking = _lacking(rows, "strain")
     if not lacking or not numbers_of(rows, "strain"):
         return None
-    instead, cure = "the frame number", "chooses the length that it is measured by"
+    instead, cure = abscissa_words(rows), "chooses the length that it is measured by"
     if strain_column(rows) is not None:
         instead, cure = "shear_strain", "chooses another length"
     return (
@@ -178,16 +185,27 @@ def spelt_strain(row: Mapping[str, Any], column: str | None, *, symbol: bool = F
     return f"{f'{sign} =' if symbol else words} {100 * value:.3g} %"
 
 
+def _abscissa(rows: Rows) -> str:
+    """The column over which curves are drawn: a strain, else the first that all frames have."""
+    if column := strain_column(rows):
+        return column
+    for name in ("time", "step"):
+        places = {(row["source"], row["frame"]): number_of(row, name) for row in rows}
+        if None not in places.values() and len(set(places.values())) > 1:
+            return name
+    return "frame"
+
+
 def abscissa_label(rows: Rows) -> str:
     """Label of the abscissa in figures."""
-    column = strain_column(rows)
-    return "frame" if column is None else f"{' '.join(STRAINS[column])} in %"
+    column = _abscissa(rows)
+    return f"{' '.join(STRAINS[column])} in %" if column in STRAINS else OTHERS[column][0]
 
 
 def abscissa_words(rows: Rows) -> str:
     """Name of the abscissa within a sentence."""
-    column = strain_column(rows)
-    return "the number of the frame" if column is None else f"the {STRAINS[column][0]}"
+    column = _abscissa(rows)
+    return f"the {STRAINS[column][0]}" if column in STRAINS else OTHERS[column][1]
 
 
 def is_turned(rows: Rows) -> bool:

@@ -21,12 +21,14 @@ NAMES = ("source", "variant")
 NUMBERS = tuple(
     column.name for column in (*OWN_COLUMNS, *MORE_COLUMNS) if column.kind in (int, float)
 )
+# a column that only tables of maps have
+MAP = "at_surface"
 # columns that show that a table is no fabric table, with a name for such a table
 OTHER_TABLES = {
     "alpha_vs_axial_norm": "a table of scanfab compare",
     "slope_origin": "the summary of scanfab compare",
     "difference": "the differences of scanfab compare",
-    "at_surface": "a table of scanfab map",
+    MAP: "a table of scanfab map, which scanfab report shows",
 }
 # cut-offs that agree in the three digits that are printed count as equal
 ROUNDING = 5e-3

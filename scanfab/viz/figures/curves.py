@@ -231,7 +231,7 @@ class Curves(Figure):
         if len(known) == 1:
             # a single frame gives no scale
             axes.set_xlim(known[0] - 1, known[0] + 1)
-        if label == "frame":
+        if label in ("frame", "time step"):
             axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
@@ -325,7 +325,8 @@ class Evolution(Curves):
         which = "contacts taken as independent" if alone else "the sample's"
         parts = [f"of {VOID} scan and sample together"] * self._has_errors("alpha_vs_axial")
         parts += [f"of {CONTACT} {which}"] * self._has_errors("alpha_c_axial")
-        lines = [f"bands: one total standard error, {', '.join(parts)}"] if parts else []
+        # two lines, because one would be wider than the page
+        lines = ["bands: one total standard error,", ", ".join(parts)] if parts else []
         scan = np.concatenate([curve.errors("alpha_vs_axial_se") for curve in self.curves])
         if np.isfinite(scan).any() and not self.share:
             largest = f"{1e3 * np.nanmax(scan):.2g}"

@@ -30,15 +30,17 @@ AXES = "xyz"
 # Coordinates that differ by less than this part of their spread are the same.
 SAME = 1e-6
 MISSING = "0.85"
+SURFACE = "block at the surface (α is biased)"
 
 
 class Map(Figure):
     """
     The fabric by place.
 
-    Slices and shells as profiles: bands are standard errors (of void anisotropy total ones), open
-    symbols blocks at a surface. A grid as colour maps of the planes of blocks next to its middle,
-    of the last frame; grey blocks have no value, hatched ones lie at a surface.
+    Slices and shells are profiles, whose bands are standard errors (of the void anisotropy the
+    total errors); grey symbols are blocks at a surface. A grid gives colour maps of the planes of
+    blocks next to its middle, of the last frame; grey blocks have no value, and hatched blocks lie
+    at a surface. Blocks at a surface do not set the scale.
 
     Parameters
     ----------
@@ -101,7 +103,13 @@ class Map(Figure):
     @property
     def caption(self) -> str:
         """With the variant."""
-        return f"Fabric by place, variant {self.variant}."
+        text = f"Fabric by place, variant {self.variant}."
+        last = self.frames[-1]
+        if all(row.get("at_surface") for row in last):
+            text += " All blocks lie at the surface, which biases their α."
+        elif not self.is_profile and any(_at_surface(last)):
+            text += " Hatched blocks lie at the surface, which biases their α."
+        return text
 
     def draw(self, ax: Axes) -> None:
         """One quantity: its profile, or its values in the plane normal to the second axis."""
@@ -145,7 +153,9 @@ class Map(Figure):
         looks = FRAME_LOOKS[-len(self.frames) :]
         for rows, look in zip(self.frames, looks, strict=True):
             place, label = _places(rows)
-            value = one.factor * column_of(rows, one.column)
+            every = one.factor * column_of(rows, one.column)
+            outer = _at_surface(rows)
+            value = np.where(outer, np.nan, every)
             error = column_of(rows, f"{one.column}_se")
             if one.errors == "total":
                 error = np.array([total_error(row, one.column) for row in rows], np.float64)
@@ -155,9 +165,10 @@ class Map(Figure):
             name += "" if strain is None else f", strain {strain:.3g}"
             line = {key: look[key] for key in ("color", "marker", "ls")}
             axes.plot(place, value, label=name, **line)
-            outer = _at_surface(rows)
-            hollow = {"ls": "", "marker": look["marker"], "mfc": "white", "mec": look["color"]}
-            axes.plot(place[outer], value[outer], **hollow)
+            # the surface takes segments from these blocks, so they must not set the scale
+            grey = {"ls": "", "marker": look["marker"], "color": "0.75", "scaley": False}
+            legend = SURFACE if rows is self.frames[-1] and outer.any() else None
+            axes.plot(place[outer], every[outer], label=legend, zorder=0, **grey)
             axes.set(xlabel=label, ylabel=one.label)
         if one.errors == "total":
             axes.axhline(0, color="0.6", lw=0.6, zorder=0)
@@ -172,6 +183,8 @@ class Map(Figure):
         across, up = (other for other in range(3) if other != axis)
         columns, lines = number[chosen, across], number[chosen, up]
         picture = np.full((lines.max() + 1, columns.max() + 1), np.nan)
+        outer = _at_surface(rows)
+        values = np.where(outer, np.nan, values)
         picture[lines, columns] = values[chosen]
         # corners of the blocks: half a step about their middles
         at_column, at_line = np.meshgrid(*(np.arange(n + 1) - 0.5 for n in picture.T.shape))
@@ -187,7 +200,7 @@ class Map(Figure):
             vmin=low,
             vmax=high,
         )
-        outer = _at_surface(rows)[chosen]
+        outer = outer[chosen]
         hatched: Any = {"facecolor": "none", "edgecolor": "0.35", "hatch": "////", "lw": 0}
         for line, column in zip(lines[outer], columns[outer], strict=True):
             around = [line, line, line + 1, line + 1], [column, column + 1, column + 1, column]
@@ -219,7 +232,9 @@ def _middles(rows: Sequence[Any]) -> FloatArray:
 
 
 def _at_surface(rows: Sequence[Any]) -> Any:
-    return np.array([bool(row.get("at_surface")) for row in rows])
+    """Which blocks lie at a surface; none if all do, so that there is something to draw."""
+    outer = np.array([bool(row.get("at_surface")) for row in rows])
+    return outer & ~outer.all()
 
 
 def _places(rows: Sequence[Any]) -> tuple[FloatArray, str]:

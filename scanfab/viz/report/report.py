@@ -26,11 +26,12 @@ from scanfab.table.compare import compare_tables
 from scanfab.table.curves import spelt_strain, strain_column
 from scanfab.table.formats import read_rows
 from scanfab.table.row import numbers_of
-from scanfab.table.selection import choose_rows
+from scanfab.table.selection import MAP, choose_rows
 from scanfab.viz.figures.page import make_figures
 from scanfab.viz.report.caveats import caveats_of
 from scanfab.viz.report.page import Picture, check_page_file, picture_of, render_page, view_data
 from scanfab.viz.report.tables import (
+    block_table,
     frame_table,
     input_table,
     overview,
@@ -55,6 +56,11 @@ class Input(NamedTuple):
     manifest: dict[str, Any] | None
     cutoff: float | None
     """The cut-off whose rows were chosen from several."""
+
+    @property
+    def is_map(self) -> bool:
+        """Whether it is a table of a map."""
+        return bool(self.rows) and MAP in self.rows[0]
 
 
 @dataclass(frozen=True)
@@ -112,7 +118,7 @@ def make_report(
     today: date | None = None,
 ) -> Report:
     """
-    The report on fabric tables as one HTML page that needs nothing else.
+    The report on fabric tables and maps as one HTML page that needs nothing else.
 
     Parameters
     ----------
@@ -159,22 +165,26 @@ def make_report(
     told: Told = {ScanfabWarning: [], ScanfabNote: []}
     with _listening(told) as caught:
         inputs = read_inputs([Path(one) for one in named], cutoff, labels)
-        rows = [row for one in inputs for row in one.rows]
+        rows = [row for one in inputs if not one.is_map for row in one.rows]
+        maps = [one.rows for one in inputs if one.is_map]
         comparison = compare_tables(rows)
-        pictures: list[Picture] = []
+        figures = []
         with suppress(SettingsError):  # there are no figures without a void fabric
-            pictures = [
-                picture_of(one, "svg") for one in make_figures(rows, "table", comparison=comparison)
-            ]
+            figures += make_figures(rows, "table", comparison=comparison)
+        for blocks in maps:
+            with suppress(SettingsError):
+                figures += make_figures(blocks, "map")
+        pictures = [picture_of(one, "svg") for one in figures]
     for one in caught:
         warnings.warn(one.message, one.category, stacklevel=2)
     sections = [_section(one, told) for one in inputs]
     for section in sections:
         pictures += section["shown"]["pictures"] if section["shown"] else []
+    every = [row for one in inputs for row in one.rows]
     asked = [one.manifest["settings"] for one in inputs if one.manifest is not None]
     doubts = [*told[ScanfabWarning], *map(as_options, caveats_of(rows, asked))]
     page = render_page(
-        title=title or _usual_title(rows),
+        title=title or _usual_title(every),
         author=author,
         date=(today or datetime.now(UTC).astimezone().date()).isoformat(),
         summary=[overview(one.path, one.rows) for one in inputs],
@@ -183,9 +193,9 @@ def make_report(
         warnings=list(dict.fromkeys(doubts)),
         notes=list(dict.fromkeys(told[ScanfabNote])),
         sections=sections,
-        frames=frame_table(rows),
+        frames=[*([frame_table(rows)] if rows else []), *map(block_table, maps)],
     )
-    return Report(page, any(row["alpha_vs_axial"] is not None for row in rows))
+    return Report(page, any(row["alpha_vs_axial"] is not None for row in every))
 
 
 @contextmanager
@@ -211,17 +221,19 @@ def read_inputs(
     Raises
     ------
     ScanfabError
-        If one cannot be read or is no fabric table, or if no table has a row.
+        If one cannot be read or is neither a fabric table nor a map, or if no table has a row.
     """
     # tables may lack the columns of source and strain
     read = [
         (path, [{"source": path.stem, "strain": None, **row} for row in read_rows(path)])
         for path in tables
     ]
-    chosen = choose_rows(read, cutoff, labels)
+    is_map = [bool(rows) and MAP in rows[0] for _, rows in read]
+    kept = [one for one, of_map in zip(read, is_map, strict=True) if not of_map]
+    chosen = iter(choose_rows(kept, cutoff, labels))
     inputs = [
-        Input(path, rows, read_manifest(path), cutoff)
-        for path, rows in zip(tables, chosen, strict=True)
+        Input(path, rows if of_map else next(chosen), read_manifest(path), cutoff)
+        for (path, rows), of_map in zip(read, is_map, strict=True)
     ]
     if not any(one.rows for one in inputs):
         raise SettingsError(
@@ -296,7 +308,7 @@ def show_frames(one: Input) -> dict[str, Any]:
         "view": view_data(look.scene, look.axis),
         "view_title": ", ".join(filter(None, [source, f"frame {look.number}", strain])),
         "facts": _facts(look),
-        "pictures": _pictures(rows, series, settings) if filled else [],
+        "pictures": _pictures(rows, series, settings) if filled and not one.is_map else [],
     }
 
 

@@ -18,7 +18,8 @@ Row = Mapping[str, Any]
 
 # The table shows at most about so many frames of a source and variant.
 MOST_FRAMES = 12
-MOST_INPUTS = 20
+MOST_INPUTS, MOST_BLOCKS = 20, 200
+PLACES = ("x", "y", "z", "r_inner", "r_outer")
 VOID, CONTACT = "alpha_vs_axial", "alpha_c_axial"
 
 TURNED = (
@@ -202,6 +203,36 @@ def frame_table(rows: Sequence[Row]) -> Part:
     columns = [name for name in table[0] if any(line[name] != "-" for line in table)]
     note = "" if len(shown) == len(numbers) else f"{len(shown)} of {len(numbers)} frames are shown."
     return Part(columns, [[line[name] for name in columns] for line in table], note)
+
+
+def block_table(rows: Sequence[Row]) -> Part:
+    """A table of the blocks of a map in its last frame."""
+    last = [row for row in rows if (row["source"], row["frame"]) == _of_frame(rows[-1])]
+    table = [
+        {
+            "block": str(row["block"]),
+            "variant": variant_of(row),
+            **{name: _spell(number_of(row, name)) for name in PLACES},
+            "grains": _spell(row.get("grains")),
+            "α_vs": _value(row, VOID).partition(" ±")[0],
+            "± total": _error({"total": total_error(row, VOID)}, "total"),
+            "α_c": _value(row, CONTACT).partition(" ±")[0],
+            "± of α_c": _error(row, f"{CONTACT}_sample_se"),
+            "solid fraction": _spell(number_of(row, "solid_fraction")),
+            "coordination": _spell(number_of(row, "coordination")),
+            "at a surface": "yes" if row["at_surface"] else "-",
+        }
+        for row in last[:MOST_BLOCKS]
+    ]
+    columns = [name for name in table[0] if any(line[name] != "-" for line in table)]
+    note = f"Blocks in frame {last[0]['frame']} of {last[0]['source'] or 'the sample'}."
+    if len(last) > MOST_BLOCKS:
+        note += f" The first {MOST_BLOCKS} of {len(last)} are shown."
+    return Part(columns, [[line[name] for name in columns] for line in table], note)
+
+
+def _of_frame(row: Row) -> tuple[Any, Any]:
+    return row["source"], row["frame"]
 
 
 def _frame_line(row: Row, column: str, several: bool, turned: bool) -> dict[str, str]:
