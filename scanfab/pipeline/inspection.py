@@ -49,6 +49,7 @@ class FrameReport(Record):
     rv_shape: Annotated[str | None, "shape and size of the RV in words"]
     clumps: Annotated[int, "number of grains that are bodies of several spheres"]
     spheres: Annotated[int, "number of spheres that the grains consist of"]
+    grains_in_rv: Annotated[int | None, "number of grains whose centre lies in the RV"]
 
 
 def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
@@ -151,4 +152,7 @@ def _report(
         rv_shape=None if window is None else str(window.shape),
         clumps=sample.clumps,
         spheres=int(grains.sum()),
+        grains_in_rv=None
+        if window is None
+        else sample.number(sample.counted(VARIANTS["c"], window)),
     )
