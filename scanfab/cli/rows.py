@@ -66,6 +66,8 @@ def write_table(sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Set
                 dask = scanfab.dask_executor(outputs.scheduler, scheduler_file=file)
                 executor = stack.enter_context(dask)
             vtk, resume = outputs.vtk, outputs.resume
+            drawn = [] if outputs.plot is None else [outputs.plot]
+            drawn += [] if vtk is None else [*vtk.rglob("*.vtp"), *vtk.rglob("*.pvd")]
             job = Job(
                 series,
                 settings,
@@ -73,7 +75,7 @@ def write_table(sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Set
                 excerpt,
                 resume=resume,
                 manifest_path=outputs.manifest,
-                drawn=[] if outputs.plot is None else [outputs.plot],
+                drawn=drawn,
                 more={"settings_file": listed} if (listed := as_listed(ctx)) else {},
                 observers=vtk_folders(vtk, len(series), settings, resume) if vtk else (),
                 told=ctx.obj,

@@ -81,7 +81,7 @@ class Job:
     more: Mapping[str, Any] = field(default_factory=dict)
     """Further entries of the manifest."""
     drawn: Sequence[Path] = ()
-    """Figures that are drawn of the table."""
+    """Figures and other files that are made besides, for the check that no input is replaced."""
     observers: Sequence[Observer] = ()
     """One function for each series, called with the result of each frame that is computed now."""
     told: Told = field(default_factory=Told)
