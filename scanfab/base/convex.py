@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scanfab.base.space import on_circle, on_sphere
 from scanfab.base.typing import BoolArray, FloatArray
 
 # STEPS: most steps of the walk to the point of a region that is nearest to a sphere.
@@ -23,22 +24,6 @@ from scanfab.base.typing import BoolArray, FloatArray
 STEPS, ROUNDING = 200, 1e-12
 # a polyhedron and its copy share nothing unless a ball of this size, relative to both, fits in
 SLIVER = 1e-9
-# number of points on a sphere and on a circle
-POINTS, POINTS_OF_A_RIM = 2000, 128
-
-
-def on_sphere() -> FloatArray:
-    """Points of the unit sphere along a spiral; each stands for nearly the same area."""
-    z = 1.0 - (2.0 * np.arange(POINTS) + 1.0) / POINTS
-    turn = np.arange(POINTS) * np.pi * (3.0 - np.sqrt(5.0))
-    across = np.sqrt(1.0 - z**2)
-    return np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
-
-
-def on_circle() -> FloatArray:
-    """Points of the circle of radius 1 about z."""
-    turn = np.arange(POINTS_OF_A_RIM) * 2.0 * np.pi / POINTS_OF_A_RIM
-    return np.column_stack([np.cos(turn), np.sin(turn), np.zeros(POINTS_OF_A_RIM)])
 
 
 @dataclass(eq=False)
@@ -350,7 +335,18 @@ class Convex:
         return scale * shared, scale * slope
 
     def meets_itself(self, shift: FloatArray) -> bool:
-        """Whether the region overlaps a copy that is moved by a vector, in dump's length unit."""
+        """
+        Whether the region overlaps a copy of itself that is moved.
+
+        Parameters
+        ----------
+        shift : ndarray, shape (3,)
+            The vector by which the copy is moved, dump's length unit.
+
+        Returns
+        -------
+        bool
+        """
         if self.body.is_symmetric:
             # two copies of a symmetric body meet if the point halfway between their centres does
             return bool(self.contains(0.5 * shift[None])[0])

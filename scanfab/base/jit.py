@@ -148,7 +148,8 @@ def when_compiling(tell: Callable[[], object]) -> None:
 def kernel_files() -> list[Path]:
     """The files of all kernels, and this one, which says how they are compiled."""
     package = Path(__file__).parents[1]
-    return sorted([Path(__file__), *package.glob("*/kernels.py"), *package.glob("*/kernels/*.py")])
+    # packing/search.py finds contacts, scan/kernels/ scans
+    return sorted([Path(__file__), *package.glob("*/search.py"), *package.glob("*/kernels/*.py")])
 
 
 @cache

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.convex import Body, Convex, Quadric, image_of, on_circle, on_sphere
+from scanfab.base.convex import Body, Convex, Quadric, image_of
 from scanfab.base.errors import SettingsError
 from scanfab.base.option import number
-from scanfab.base.space import SPACE, Space
+from scanfab.base.space import SPACE, Space, on_circle, on_sphere
 from scanfab.base.typing import FloatArray, IntArray
 
 # Relative rounding of coordinates in STL files, which hold 4-byte numbers: points that are closer
@@ -288,7 +288,7 @@ def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatAr
     while len(left):
         kept.append(left[0].copy())  # a view would keep the whole array in memory
         apart = np.abs(left - left[0]) / [1.0, 1.0, 1.0, extent]
-        left = left[apart.max(axis=1) > TOLERANCE]
+        left = left[apart.max(axis=1) > max(TOLERANCE, tolerance / extent)]
     planes = np.array(kept)
     if len(planes) > MOST_FACES:
         raise SettingsError(

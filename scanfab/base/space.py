@@ -9,6 +9,9 @@ import numpy as np
 
 from scanfab.base.typing import FloatArray
 
+# number of points on a sphere and on a circle
+POINTS, POINTS_OF_A_RIM = 2000, 128
+
 
 class Space:
     """
@@ -97,3 +100,17 @@ class Space:
 
 
 SPACE = Space()
+
+
+def on_sphere() -> FloatArray:
+    """Points of the unit sphere along a spiral; each stands for nearly the same area."""
+    z = 1.0 - (2.0 * np.arange(POINTS) + 1.0) / POINTS
+    turn = np.arange(POINTS) * np.pi * (3.0 - np.sqrt(5.0))
+    across = np.sqrt(1.0 - z**2)
+    return np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
+
+
+def on_circle() -> FloatArray:
+    """Points of the circle of radius 1 about z."""
+    turn = np.arange(POINTS_OF_A_RIM) * 2.0 * np.pi / POINTS_OF_A_RIM
+    return np.column_stack([np.cos(turn), np.sin(turn), np.zeros(POINTS_OF_A_RIM)])

@@ -101,7 +101,7 @@ def test_a_list_that_cannot_say_which_image_it_means_is_refused():
 
 
 def test_a_list_of_a_grain_and_itself_is_refused():
-    with pytest.raises(PackingError, match=r"itself.*does not say which one.*`contacts="):
+    with pytest.raises(PackingError, match=r"itself; find contacts with own images.*`contacts="):
         Packing([[0.5, 5, 5]], 1.1, cell=Cell([2.0, 10, 10]), contacts=[[0, 0]])
 
 

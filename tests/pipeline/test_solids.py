@@ -62,7 +62,7 @@ def test_a_scan_by_hand_is_that_of_compute(periodic, variants, lines):
 
 def test_a_window_wider_than_the_cell_is_refused():
     sample = Sample(packing(periodic=True), np.zeros(COUNT**3, bool))
-    with pytest.raises(SettingsError, match="wider than the cell"):
+    with pytest.raises(SettingsError, match="overlaps its own image"):
         scanfab.solids_of(sample, Window([3.0, 3.0, 3.0], scanfab.sphere(3.1)))
 
 

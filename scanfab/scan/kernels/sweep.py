@@ -28,15 +28,13 @@ the cut-off::
     start   L >= c      L e/2                 e/2
     ends    I >= c      (I - c) + c e/2       e/2
 
-The mean length is the ratio of the two sums. That of ``ends`` is c + Σ (I - c) / Σ e/2, written as
-one ratio. docs/details/edges.md says why the last two have no bias.
+The mean length is the ratio of the sums; of ``ends`` it is c + Σ (I - c) / Σ e/2, as one ratio.
 
-By ``start`` only chords that reach into the window change the state of a line. Of the others, and
-of those that begin before the window, a line keeps where the last solid before it ends and where
-the first one behind it begins, in whatever order they come: there its first segment begins and its
-last one ends. The place before the window is kept with a minus: on the line as seen from behind, it
-is the least place, too. Solids are listed as far as a margin beyond the window. A line that has met
-none there keeps the margin's end, and is followed (:mod:`scanfab.scan.kernels.resolve`).
+By ``start`` only chords that reach into the window change a line. Of all others it keeps where the
+last solid before the window ends and where the first one behind it begins, in any order: there its
+first segment begins and its last one ends. The place before the window is kept with a minus: seen
+from behind, it is the least. Solids are listed as far as a margin beyond the window. A line that
+met none there keeps the margin's end, and is followed (:mod:`scanfab.scan.kernels.resolve`).
 """
 
 from __future__ import annotations

@@ -140,9 +140,9 @@ def test_without_a_manifest_it_says_so(table):
         ({"sources": ["-"]}, "The view is left out: the frames came by standard input"),
         (
             {"boundary": [{"text": "mask"}]},
-            "The view is left out: --boundary: expected COLUMN=VALUE",
+            "cannot be used: boundary: expected COLUMN=VALUE",
         ),
-        ({"rv": 0.0}, "The view is left out: --rv: expected a fraction above 0"),
+        ({"rv": 0.0}, "cannot be used: rv: expected a fraction above 0"),
         ({"inputs": [{"path": "README.md", "size": 1}]}, "README.md has changed since the table"),
     ],
 )
