@@ -30,8 +30,8 @@ LONGEST_NAME = 32
 LARGEST = 1e100
 # The contact fabric counts as anisotropic if its intensity exceeds CERTAIN standard errors (noise
 # alone gives about 1). It counts as turned if its anisotropy along the loading axis is less than
-# ALONG times its intensity.
-CERTAIN, ALONG = 5.0, 0.5
+# ALONG times its intensity: of a fabric about another axis, across the loading axis, it is half.
+CERTAIN, ALONG = 5.0, 0.6
 
 
 @dataclass(frozen=True, eq=False)

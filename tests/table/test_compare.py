@@ -94,7 +94,7 @@ def test_under_three_frames_the_slope_is_empty(count):
         assert row.final == VOID[count - 1]
 
 
-@pytest.mark.filterwarnings("error")
+@pytest.mark.filterwarnings("error", "ignore:slope_se is empty")
 @pytest.mark.parametrize(
     ("beyond", "largest", "frames"),
     [(0.0, 0.02, 3), (0.0, 0.03, 4), (2e-6, 0.03, 4), (2e-5, 0.03, 3)],

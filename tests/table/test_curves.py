@@ -36,7 +36,7 @@ def changed(source="one", frame=None, **values):
 ROUNDED = [{**row, "strain": 0.25 + 1e-12 * row["frame"]} for row in curve("one")]
 SMALL = [{**row, "strain": 1e-6 * row["frame"]} for row in curve("one")]
 SHEARED_TOO = [{**row, "shear_strain": row["strain"]} for row in curve("one")]
-FRAME, SHEAR = "the frame number is used in place of", "shear_strain is used in place of"
+FRAME, SHEAR = "the number of the frame is used in place of", "shear_strain is used in place of"
 
 
 @pytest.mark.parametrize(

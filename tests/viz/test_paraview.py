@@ -78,7 +78,7 @@ def test_the_surface_gives_back_the_tensor(computed, variant):
 
 
 @pytest.mark.filterwarnings(
-    "ignore:frame .* above the tolerance:scanfab.base.errors.ScanfabWarning"
+    "ignore:frames? .* above the tolerance:scanfab.base.errors.ScanfabWarning"
 )
 def test_the_surface_has_the_moment_of_the_table(tmp_path):
     packing = scanfab.find_contacts(scanfab.Packing(*shaken_cubic(np.random.default_rng(0), 6)))

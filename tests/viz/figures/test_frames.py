@@ -323,7 +323,7 @@ def test_cut_offs_have_the_values_and_errors_of_the_table(scanned, computed):
     assert "bands: one total standard error" in ax.get_legend().get_title().get_text()
 
 
-@pytest.mark.filterwarnings("ignore:frame .* above the tolerance:scanfab.ScanfabWarning")
+@pytest.mark.filterwarnings("ignore:frames? .* above the tolerance:scanfab.ScanfabWarning")
 def test_figures_have_the_moment_of_the_table(series):
     """The mean of the squares over the mean is far more anisotropic than the mean."""
     words = {**WORDS, "moment": 2, "variants": "c"}

@@ -1,0 +1,98 @@
+"""No command writes over a file that it reads, by whatever name or link."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+
+from tests.helpers.dumps import cubic_rows, dump_text, write
+
+FAST = ("--directions", "9", "--spacing", "0.5rmin", "--variants", "a", "--quiet")
+
+
+@pytest.fixture
+def files(tmp_path, monkeypatch, ask):
+    """A packing as CSV with a link to it, and its table."""
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "dump.1", dump_text(cubic_rows(), box=((0, 4),) * 3))
+    ask("convert", "dump.1", "g.csv", "--quiet")
+    (tmp_path / "link.csv").symlink_to("g.csv")
+    ask("compute", "g.csv", *FAST, "-o", "t.csv")
+    return {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("compute", "g.csv", *FAST, "-o", "g.csv"),
+        ("compute", "g.csv", *FAST, "-o", "link.csv"),
+        ("compute", "link.csv", *FAST, "-o", "./g.csv"),
+        ("compute", "g.csv", *FAST, "-o", "u.csv", "--manifest", "g.csv"),
+        ("map", "g.csv", "--slices", "1", *FAST, "-o", "g.csv"),
+        ("calibrate", "g.csv", "-o", "g.csv"),
+        ("compare", "t.csv", "-o", "t.csv"),
+        ("merge", "t.csv", "-o", "t.csv"),
+        ("convert", "g.csv", "g.csv", "--frames", "0:0"),
+        ("convert", "g.csv", "g.csv", "--columns", "radius=radius"),
+        ("compute", "dump.1", "--strain", "t.csv", *FAST, "-o", "t.csv"),
+    ],
+)
+def test_an_output_that_is_an_input_is_refused(files, tmp_path, ask, command):
+    answer = ask(*command, code=2)
+    assert "input" in answer.told or "chooses none" in answer.told
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == files
+
+
+def test_a_whole_series_may_be_rewritten_and_a_device_takes_a_table(files, tmp_path, ask):
+    ask("convert", "g.csv", "g.csv", "--quiet")
+    assert (tmp_path / "g.csv").read_bytes() == files["g.csv"]
+    ask("compute", "g.csv", *FAST, "-o", "/dev/null")
+    # an old table beside the dumps is no input
+    shutil.rmtree(tmp_path / "dumps", ignore_errors=True)
+    (tmp_path / "dumps").mkdir()
+    shutil.copy("dump.1", "dumps")
+    for _ in range(2):
+        ask("compute", "dumps", *FAST, "-o", "dumps/t.csv")
+
+
+def test_damaged_tables_and_settings_are_one_message(files, tmp_path, ask):
+    text = (tmp_path / "t.csv").read_text()
+    head, row = text.splitlines()
+    cells = row.split(",")
+    cells[head.split(",").index("mean_length")] = "nan"
+    (tmp_path / "t.csv").write_text(f"{head}\n{','.join(cells)}\n")
+    assert "found nan in the column mean_length" in ask("merge", "t.csv", code=1).told
+    manifest = tmp_path / "t.csv.manifest.json"
+    manifest.write_text(manifest.read_text().replace('"seed": 0', f'"seed": {"9" * 5000}'))
+    assert "expected a manifest" in ask("merge", "t.csv", code=1).told
+    (tmp_path / "scanfab.toml").write_text(f"[compute]\nrv = {'[' * 20_000}{']' * 20_000}")
+    assert "scanfab.toml" in ask("inspect", "g.csv", code=2).told
+
+
+def test_files_named_one_by_one_are_one_series(files, tmp_path, ask):
+    for name in ("rcp.csv", "rcp20.csv", "rcp3.csv"):
+        shutil.copy("g.csv", name)
+    answer = ask("inspect", "rcp20.csv", "rcp.csv", "rcp3.csv", "--json")
+    assert answer.out.count('"frame"') == 3
+    table = ask("compute", "rcp20.csv", "rcp.csv", "rcp3.csv", *FAST).rows
+    assert [row["frame"] for row in table] == ["0", "1", "2"]
+
+
+def test_maps_in_report_and_compare(files, tmp_path, ask):
+    ask("map", "g.csv", "--slices", "2", "--frame", "-1", *FAST, "-o", "m.csv", code=0)
+    told = ask("compare", "m.csv", code=1).told
+    assert "a table of scanfab map, which scanfab report shows" in told
+    ask("report", "m.csv", "t.csv", "-o", "r.html", "--quiet")
+    page = (tmp_path / "r.html").read_text()
+    assert "Blocks in frame 0" in page
+    ask("map", "g.csv", "--slices", "2", "--frame", "0", "--frames", "0", code=2)
+
+
+def test_inspect_says_once_what_all_frames_share(files, ask):
+    one = ask("inspect", "g.csv").out
+    assert "  radius_min " in one
+    shutil.copy("g.csv", "g2.csv")
+    two = ask("inspect", "g.csv", "g2.csv").out
+    assert two.count("  radius_min ") == 1
+    assert two.count("grains") <= 3

@@ -1,0 +1,135 @@
+"""The reference frame, from which L0, the RV, the radii and the blocks of a map come."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import Packing, ReadError, Settings, SettingsError
+from scanfab.base.errors import NoReferenceError, ScanfabNote
+from scanfab.pipeline.frames import Frames
+from scanfab.pipeline.inspection import inspect_series
+from tests.helpers.dumps import dump_text, write
+from tests.helpers.lattices import shaken_cubic
+
+SCAN = {"directions": 9, "spacing": "0.5rmin", "variants": "ac"}
+BOX = ((0, 30),) * 3
+
+
+def rows_of(frame: int) -> list[tuple[object, ...]]:
+    """A bed that sinks and is squeezed, of grains that grow by 2 % a frame; nothing in frame 0."""
+    if frame == 0:
+        return []
+    position, radius = shaken_cubic(np.random.default_rng(1), 5)
+    position = position * [1, 1, 1 - 0.03 * frame] + [5, 5, 20 - 4 * frame]
+    numbers = zip(position.tolist(), (radius * 1.02**frame).tolist(), strict=True)
+    return [(row, 1, *place, size) for row, (place, size) in enumerate(numbers, start=1)]
+
+
+@pytest.fixture
+def bed(tmp_path):
+    """A folder of four frames."""
+    folder = tmp_path / "bed"
+    folder.mkdir()
+    for frame in range(4):
+        text = dump_text(rows_of(frame), step=100 * frame, box=BOX)
+        write(folder / f"dump_{100 * frame}.txt", text)
+    return folder
+
+
+def numbers(row):
+    """What a row says of the sample, whichever frame it is."""
+    return {name: value for name, value in row.items() if name not in ("source", "frame", "step")}
+
+
+@pytest.mark.parametrize("reference", [3, -1])
+def test_lengths_come_from_the_reference_frame(bed, tmp_path, reference):
+    shutil.copy(bed / "dump_300.txt", tmp_path / "alone.txt")
+    (whole, inner) = scanfab.compute(scanfab.read_series(tmp_path / "alone.txt"), **SCAN)
+    series = scanfab.read_series(bed)
+    found = scanfab.compute(series, reference=reference, frames=-1, **SCAN)
+    assert [numbers(row) for row in found] == [numbers(whole), numbers(inner)]
+    # a part of the series has the same reference
+    part = scanfab.compute(series[2:], reference=reference, strain="grains", **SCAN)
+    assert part.select(frame=3)[0].strain == 0
+    assert part.select(frame=2)[0].strain == pytest.approx(1 - 0.94 / 0.91, rel=0.01)
+    # by default the RV lies where the bed was in frame 1, and r_min is that of frame 1
+    with pytest.warns(ScanfabNote, match="frame 3: the RV .* holds no centre"):
+        usual = scanfab.compute(series, frames=-1, **SCAN)
+    assert usual[1].grains == 0
+    assert usual[0].cutoff == pytest.approx(whole.cutoff / 1.02**2)
+
+
+def test_a_job_array_has_the_rows_of_one_run(bed, tmp_path):
+    series, names = scanfab.read_series(bed), []
+    for job in (0, 1):
+        names.append(tmp_path / f"part_{job}.csv")
+        scanfab.compute_file(series, names[-1], reference=-1, frames=f"{job}::2", **SCAN)
+    whole = scanfab.compute(series, reference=-1, **SCAN)
+    assert scanfab.merge_tables(names) == whole
+    asked = json.loads((tmp_path / "part_0.csv.manifest.json").read_text())["settings"]
+    assert asked["reference"] == 3
+    # a longer series has another last frame
+    write(bed / "dump_400.txt", dump_text(rows_of(3), step=400, box=BOX))
+    with pytest.raises(SettingsError, match=r"other settings \(reference\)"):
+        scanfab.compute_file(
+            scanfab.read_series(bed), names[0], reference=-1, frames="0::2", resume=True, **SCAN
+        )
+
+
+@pytest.mark.parametrize(
+    ("reference", "error", "words"),
+    [
+        (4, NoReferenceError, "reference: there is no frame 4: .*bed has 4 frames"),
+        (-5, NoReferenceError, "reference: there is no frame -5"),
+        (0, NoReferenceError, "reference: frame 0 of .*bed has no grains"),
+        (2, ReadError, "dump_200.txt"),
+        ("last", SettingsError, "reference: expected the number of a frame, .*found 'last'"),
+    ],
+)
+def test_a_frame_that_cannot_be_the_reference_is_an_error(bed, reference, error, words):
+    (bed / "dump_200.txt").write_text((bed / "dump_200.txt").read_text()[:-40])
+    with pytest.raises(error, match=words):
+        scanfab.compute(scanfab.read_series(bed), reference=reference, on_error="skip", **SCAN)
+
+
+def test_streams_wait_for_their_reference():
+    packings = [Packing(*shaken_cubic(np.random.default_rng(k), 4)) for k in range(3)]
+    empty = Packing(np.zeros((0, 3)), np.zeros(0))
+    table = scanfab.compute(iter([empty, *packings]), reference=1, contact_tolerance=0.1, **SCAN)
+    assert table == scanfab.compute(iter([empty, *packings]), contact_tolerance=0.1, **SCAN)
+    with pytest.raises(NoReferenceError, match="expected 1, found 2"):
+        scanfab.compute(iter([empty, *packings]), reference=2, **SCAN)
+    with pytest.raises(NoReferenceError, match="counts from the end"):
+        scanfab.compute(iter(packings), reference=-1, **SCAN)
+    with pytest.raises(NoReferenceError, match="there is no frame 7"):
+        scanfab.compute(iter([empty]), reference=7, **SCAN)
+
+
+def test_a_followed_series_knows_no_end(bed):
+    followed = scanfab.follow_series(bed, seconds=0.1)
+    with pytest.raises(NoReferenceError, match="counts from the end"):
+        Frames(followed, Settings(reference=-1))
+
+
+def test_the_plane_is_that_of_the_reference(tmp_path):
+    """The first frame is a layer of spheres, as a bed begins that is poured."""
+    flat = [(k, 1, k % 5, k // 5, 0.0, 0.4) for k in range(20)]
+    for step, rows in ((0, flat), (1, rows_of(1))):
+        write(tmp_path / f"dump_{step}.txt", dump_text(rows, step=step, box=BOX))
+    (whole, _) = scanfab.compute(scanfab.read_series(tmp_path), reference=1, frames=1, **SCAN)
+    assert whole.gvs_zz > 0.2
+
+
+def test_calibrate_map_and_inspect_take_it(bed):
+    series = scanfab.read_series(bed)
+    options = {"reference": -1, "directions": 9, "spacing": "0.5rmin"}
+    table = scanfab.fabric_map(series, slices=2, frames=-1, **options)
+    assert sum(table["grains"]) == 125
+    reports = list(inspect_series(series, Settings(reference=-1)))
+    assert reports[3].grains_in_rv > 0
+    assert reports[1].rv_center == reports[3].rv_center
