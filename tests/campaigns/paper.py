@@ -72,13 +72,17 @@ class Measure(NamedTuple):
 
 # the lines of the paper: 16 replicates of 43 axes, in total at a distance of r_min/10
 PAPER = ("--spacing", "0.1rmin", "--directions", "lebedev:15", "--cutoff", "1rmin", "--rv", "0.7")
+# what the stored tables were computed to
+EXACT = ("--tolerance", "1e-4")
 # a hundredth of the signal: what the sweeps need to be told apart
 SWEEP = ("--spacing", "0.4rmin", "--directions", "lebedev:15")
 MEASURES = {
     "paper": Measure(PAPER, (*CURVES, *TENSORS, *OCTANTS)),
-    "default": Measure((), (*CURVES, *TENSORS, *OCTANTS)),
-    "start": Measure(("--edge", "start", "--variants", "cd"), (*CURVES, "left_out", *OCTANTS)),
-    "ends": Measure(("--edge", "ends")),
+    "default": Measure(EXACT, (*CURVES, *TENSORS, *OCTANTS)),
+    "start": Measure(
+        ("--edge", "start", "--variants", "cd", *EXACT), (*CURVES, "left_out", *OCTANTS)
+    ),
+    "ends": Measure(("--edge", "ends", *EXACT)),
     "cutoffs": Measure(
         ("--cutoffs", "0,0.1rmin,0.3rmin,0.5rmin,0.75rmin,1rmin,1.5rmin,2rmin,3rmin", *SWEEP),
         (*CURVES, "cutoff", "alpha_vs_axial_contacts", *OCTANTS),
@@ -98,7 +102,8 @@ MEASURES = {
         (*CURVES, "gvs_xz", *OCTANTS),
     ),
     "harmonics": Measure(
-        ("--with", "harmonics", "--variants", "ac"), ("frame", "strain", "variant", *HARMONICS)
+        ("--with", "harmonics", "--variants", "ac", *EXACT),
+        ("frame", "strain", "variant", *HARMONICS),
     ),
     # a rough scan: here only what is counted matters
     "counts": Measure(
