@@ -120,7 +120,7 @@ def test_of_a_scan():
         ({"boundary": ["type=2", "id>7"]}, "Settings(boundary=['type=2', 'id>7'])"),
         ({"frames": slice(2, None)}, "Settings(frames='2:')"),
         ({"directions": 25}, "Settings(directions='lebedev:11')"),
-        ({"rv": 0.7, "tolerance": 1e-4}, "Settings()"),
+        ({"rv": 0.7, "tolerance": "auto"}, "Settings()"),
         ({"workers": 77}, "Settings(workers=77)"),
         ({"cutoffs": "0,1rmin"}, "Settings(cutoffs=[0.0, '1rmin'])"),
         ({"axis": (0, 3, 4)}, "Settings(axis=(0.0, 0.6, 0.8))"),

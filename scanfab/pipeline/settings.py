@@ -316,7 +316,18 @@ class Settings:
         return Axis(*(part / math.hypot(*flat) for part in flat))
 
     def aim(self, sample_error: float | None = None) -> float:
-        """The error that the scan of a row aims at, given the row's error due to the sample."""
+        """
+        The standard error of ``alpha_vs_axial`` that the scan of a row aims at.
+
+        Parameters
+        ----------
+        sample_error : float, optional
+            The row's error due to the sample, dimensionless.
+
+        Returns
+        -------
+        float
+        """
         if self.tolerance is not None:
             return self.tolerance
         return max(LEAST_TOLERANCE, OF_SAMPLE * (sample_error or 0.0))

@@ -99,4 +99,4 @@ def test_without_a_place_it_says_the_sentence_alone():
 
 def test_a_frame_that_was_left_out_is_a_warning_of_its_kind():
     with pytest.warns(SkippedFrameWarning, match="frame 1 skipped: dump: no grains"):
-        tell([Note(SKIPPED, "dump: no grains")], "frame 1")
+        tell([Note(SKIPPED, "dump: no grains", kind=SkippedFrameWarning)], "frame 1")

@@ -61,7 +61,7 @@ def test_results_go_to_standard_output_and_words_to_standard_error() -> None:
 def test_cell_takes_three_or_six_numbers(ask, tmp_path: Path) -> None:
     dump = tmp_path / "spheres.csv"
     dump.write_text("x,y,z,radius\n1,1,1,1\n3,3,3,1\n")
-    words = ("--variants", "c", *FAST[:4])
+    words = ("--variants", "a", *FAST[:4])
     tables = [
         ask("compute", "--cell", *cell, dump, *words).out
         for cell in ("444", ["4 4 4"], "444100", ["4,4,4,1,0,0"])

@@ -42,7 +42,7 @@ def test_the_help_has_examples_short_defaults_and_80_columns():
     for one in ("A folder:", "Several files:", "A pipe:"):
         assert re.search(rf"^  {one} +.*scanfab compute", text, re.M)
     assert max(map(len, text.splitlines())) <= 80
-    for default in ("0.7", "0.0001", "1e10", "0", "1rmin", "abcd", "17"):
+    for default in ("0.7", "auto", "0", "1rmin", "abcd", "17"):
         assert f"[default: {default}]" in " ".join(text.split())
 
 

@@ -74,7 +74,7 @@ def test_what_is_no_file_is_refused(folder, ask, words, code, message):
 def test_pipes_in_a_folder_are_passed_over_and_a_link_is_what_it_leads_to(folder, ask, source):
     if source == ".":
         os.remove("linked_dump")
-    assert "frame 0" in ask("inspect", source).out
+    assert "frame         0" in ask("inspect", source).out
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")

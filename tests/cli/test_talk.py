@@ -44,7 +44,7 @@ def test_quiet_leaves_out_notes_but_no_warning_and_no_error(said):
     quiet_result, quiet = said("compute", *words, "--quiet")
     result, lines = said("compute", *words)
     assert result == quiet_result
-    assert len(notes(lines)) == 1
+    assert len(notes(lines)) > 1
     assert [line for line in lines if line not in notes(lines)] == quiet
     assert any("an isotropic sample would get alpha = " in line for line in quiet)
     _, lines = said("compute", "--quiet", "--boundary", "type=9", code=1)

@@ -108,6 +108,7 @@ def test_bodies_that_change_are_told(tmp_path, bodies, leave, grains, told):
         warnings.simplefilter("always")
         table = scanfab.compute(series, variants="a", **SCAN)
     texts = [str(one.message) for one in caught if issubclass(one.category, ScanfabWarning)]
+    texts = [text for text in texts if "frames" not in text[:6] and "reach through" not in text]
     assert len(texts) == len(told)
     assert all(one in text for one, text in zip(told, texts, strict=True))
     assert table["grains"].tolist() == grains

@@ -170,8 +170,8 @@ def test_what_another_process_is_told_is_heard_here(tmp_path, processes):
     with pytest.warns(ScanfabWarning) as told:
         scanfab.compute(series, **words)
     texts = [str(one.message) for one in told]
-    for number in (0, 1):
-        about = f"frame {number}, variants c, d: no void segment reaches the cut-off 50"
+    for frames in ("frame 0", "frames 0 to 1"):
+        about = f"{frames}, variants c, d: no void segment reaches the cut-off 50"
         assert sum(text.startswith(about) for text in texts) == 1
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import Cell, Packing, ScanfabWarning, SettingsError, compute, fabric_map
+from scanfab import Cell, Packing, ScanfabNote, SettingsError, compute, fabric_map
 from tests.helpers.lattices import shaken_cubic, simple_cubic
 
 LINES = {"directions": "lebedev:11", "spacing": 0.1}
@@ -161,7 +161,7 @@ def test_the_median_block_meets_the_tolerance(packing):
     assert np.median(table["alpha_vs_axial_se"]) <= 4e-3
     assert table["alpha_vs_axial_se"].max() > 4e-3 / 3
     _, told = mapped(packing, grid=(3, 3, 3), **{**words, "tolerance": 1e-5}, max_chords=1e6)
-    assert any("before the tolerance 1e-05 was met" in one for one in told)
+    assert any("the tolerance is 1e-05: the scan stopped" in one for one in told)
 
 
 @pytest.mark.parametrize(
@@ -235,7 +235,7 @@ def test_blocks_without_segments_are_empty_and_said():
 def test_threads_and_the_same_seed_give_the_same_bytes(packing):
     one, two = (mapped(packing, grid=(2, 2, 1), workers=n)[0] for n in (1, 2))
     assert one == two
-    with pytest.warns(ScanfabWarning):
+    with pytest.warns(ScanfabNote):
         other = fabric_map(packing, grid=(2, 2, 1), seed=1, **LINES)
     assert other["alpha_vs_axial"][0] != one["alpha_vs_axial"][0]
 

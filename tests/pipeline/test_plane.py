@@ -104,7 +104,6 @@ def test_the_period_across_the_plane_is_ignored(discs):
             "directions: lebedev:11 is a rule for three dim.*such as 16",
         ),
         ({"rv_center": (7, 7, 3)}, "rv_center: lies outside the plane x-y.*z = 0, found 3"),
-        ({"rv_center": (70, 7, 0)}, "holds no grain"),
     ],
 )
 def test_what_has_no_meaning_in_a_plane_is_an_error(discs, options, message):

@@ -110,7 +110,9 @@ def test_each_goes_on_with_what_the_other_has_left(
         assert computed == [(3, 4), (4, 4)]
     from_python(whole, short_series, **excerpt)
     assert output.read_bytes() == whole.read_bytes()
-    assert manifest_of(output) == manifest_of(whole)
+    # what is said of the series at its end knows only the frames of its own run
+    found, expected = (json.loads(manifest_of(one)) for one in (output, whole))
+    assert found | {"notes": []} == expected | {"notes": []}
     assert {path.name for path in tmp_path.iterdir()} == {name, f"{name}.manifest.json", "whole"}
 
 
