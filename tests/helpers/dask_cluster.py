@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 import subprocess
@@ -10,10 +9,10 @@ import sys
 import time
 from pathlib import Path
 
-# without the usual process that starts a worker again
+# without the process that starts a worker again; both end by themselves if the test is killed
 KINDS = {
-    "scheduler": ("dask_scheduler", "--port", "0", "--host", "127.0.0.1"),
-    "worker": ("dask_worker", "--nthreads", "1", "--no-nanny"),
+    "scheduler": ("dask_scheduler", "--port", "0", "--host", "127.0.0.1", "--idle-timeout", "600"),
+    "worker": ("dask_worker", "--nthreads", "1", "--no-nanny", "--death-timeout", "60"),
 }
 ROOT = str(Path(__file__).parents[2])
 
@@ -76,11 +75,8 @@ class DaskCluster:
         module, *words = KINDS[kind]
         words += ["--no-dashboard", "--scheduler-file", str(self.file)]
         with open(self.folder / f"{kind}.log", "ab") as log:
-            # a process of the cluster ends with the one that runs the test, however that ends
-            dies = (lambda: ctypes.CDLL(None).prctl(1, 9)) if sys.platform == "linux" else None
             return subprocess.Popen(
-                preexec_fn=dies,
-                args=[sys.executable, "-m", f"distributed.cli.{module}", *words],
+                [sys.executable, "-m", f"distributed.cli.{module}", *words],
                 cwd=self.folder,
                 stdout=log,
                 stderr=log,
