@@ -232,7 +232,9 @@ class Curves(Figure):
             # a single frame gives no scale
             axes.set_xlim(known[0] - 1, known[0] + 1)
         if label in ("frame", "time step"):
-            axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+            # steps have many digits
+            most: Any = 4 if label == "time step" else "auto"
+            axes.xaxis.set_major_locator(MaxNLocator(most, integer=True))
 
 
 class Evolution(Curves):

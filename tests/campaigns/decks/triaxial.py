@@ -49,7 +49,6 @@ def save():
     saver.exportInteractions(what={"fn": "i.phys.normalForce.norm()"})
 
 
-save()
 while True:
     O.run(1000, True)
     if unbalancedForce() < 0.01 and abs(triax.meanStress + PRESSURE) < 0.001 * PRESSURE:
