@@ -41,4 +41,9 @@ def map(sources: tuple[str, ...], frame: int | None, **chosen: Any) -> int:
         if chosen["frames"] is not None:
             raise click.UsageError("--frame and --frames choose frames in two ways: name one")
         chosen["frames"] = str(frame)
+        asked = {name: chosen[name] for name in chosen.keys() - vars(Output())}
+        for series in open_series(sources, checked(asked, MapSettings)[0]):
+            if not -len(series) <= frame < len(series):
+                has = f"{series.name} has {len(series)}, counted from 0"
+                raise click.UsageError(f"--frame: there is no frame {frame}: {has}")
     return write_table(sources, chosen, MapSettings)

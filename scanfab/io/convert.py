@@ -115,7 +115,7 @@ def convert(
         if path in written:
             both = f"{written[path]} and {number}"
             raise SettingsError(f"{path}: the frames {both} have the same step: choose by `frames`")
-        refuse_inputs([path], inputs)
+        refuse_inputs([path, *(companion_there(path, kind) for kind in HEADS)], inputs)
         path.parent.mkdir(exist_ok=True)
         save_packing(packing, path, writer)
         written[path] = number

@@ -340,7 +340,7 @@ def _refuse_outside(position: FloatArray, space: Space) -> None:
     elsewhere = position[position[:, space.across] != position[0, space.across]]
     if len(elsewhere):
         raise PackingError(
-            f"the first frame of the series has discs in {space}, but here centres lie at "
+            f"the reference frame of the series has discs in {space}, but here centres lie at "
             f"{spelt_plane(position, space)} and at {spelt_plane(elsewhere, space)}: `dim=3` reads "
             f"all frames as spheres"
         )

@@ -32,6 +32,7 @@ from scanfab.pipeline.record import (
     asked_for,
     input_entry,
     named_files,
+    part_of,
     read_table,
     write_manifest,
 )
@@ -116,9 +117,13 @@ class Job:
         reading = take_reading(dict(self.series[0].reading))
         self.asked = asked_for(sources, reading, self.settings, self.excerpt)
         references = {number_of_reference(one, self.settings) for one in self.series}
+        # counted from the start, so that a longer series has another reference
         if len(references) == 1:
-            # counted from the start, so that a longer series has another reference
             self.asked["reference"] = references.pop()
+        else:
+            self.asked["references"] = [
+                number_of_reference(one, self.settings) for one in self.series
+            ]
         self.notes = [SeriesNotes(self.settings) for _ in self.series]
         if self.manifest_path is not None:
             check_folder(self.manifest_path)
@@ -126,7 +131,7 @@ class Job:
         if self.output is not None:
             check_output(self.output)
             self._part = PartFile(self.output)
-            outputs.append(manifest_of(self.output))
+            outputs += [manifest_of(self.output), part_of(self.output)]
         inputs = [path for one in self.series for path in one.files()]
         if listed := self.more.get("settings_file"):
             inputs.append(Path(listed["path"]))

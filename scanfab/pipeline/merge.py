@@ -75,7 +75,7 @@ def merge_tables(
     chosen = parse_frames("frames", frames)
     if output is not None:
         check_output(Path(output))
-        refuse_inputs([Path(output)], paths)
+        refuse_inputs([Path(output)], [*paths, *map(manifest_of, paths)])
     records = [_read(path) for path in paths]
     manifest = _joined_manifest(records, chosen)
     rows = [

@@ -56,6 +56,8 @@ APART = ("rv_center", "rv_size", "cell")
 # a file is read by so many bytes at a time
 PIECE = 1 << 20
 # errors that a damaged JSON file causes
+# entries of the settings that are no options
+HIDDEN = ("scanfab", "sources", "references")
 DAMAGED = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
 
 FrameRows = dict[tuple[str, int], list[Row]]
@@ -187,7 +189,7 @@ def repeat_command(
 
 def given_settings(asked: Mapping[str, Any]) -> dict[str, Any]:
     """The settings of a manifest that have a value, as users write them."""
-    named = {name: asked[name] for name in asked if name not in ("scanfab", "sources")}
+    named = {name: asked[name] for name in asked if name not in HIDDEN}
     return {name: value for name, value in named.items() if value not in (None, [], {})}
 
 

@@ -132,7 +132,7 @@ def in_sample(rv: RV, sample: Sample) -> RV:
         )
         escaped = packing.id[sample.escaped.grains]
         if escaped.size and not sample.escaped.are_many:
-            lack += f", which leaves out {spelt_some(escaped)} that flew away"
+            lack += f"; its extents leave out {spelt_some(escaped)} that flew away"
     return rv._replace(lack=lack)
 
 

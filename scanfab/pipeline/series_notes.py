@@ -96,7 +96,12 @@ class SeriesNotes:
                 spelt = ", ".join(
                     f"{run[0]} to {run[-1]}" if run[1:] else f"{run[0]}" for run in runs
                 )
-                yield note._replace(text=note.text.split(": ")[0]), f"frames {spelt}"
+                yield (
+                    note._replace(
+                        text=f"as in frame {self._frames[places[0]]}, {note.text.split(': ')[0]}"
+                    ),
+                    f"frames {spelt}",
+                )
 
     def end(self, reference: tuple[int, float] | None) -> None:
         """
@@ -111,11 +116,13 @@ class SeriesNotes:
     def _of_series(self, reference: tuple[int, float] | None) -> Iterator[Note]:
         """Notes that only all frames together show."""
         smallest = np.array([facts.smallest for facts in self._facts])
+        ends = dict.fromkeys(f"{f(smallest):.4g}" for f in (np.min, np.max) if len(smallest))
+        spelt = " to ".join(ends)
         if reference is not None and np.any(np.abs(smallest / reference[1] - 1.0) > GROWTH):
             yield Note(
                 "radii_change",
-                f"the smallest radius lies between {smallest.min():.4g} and {smallest.max():.4g}, "
-                f"but 1rmin is {reference[1]:.4g} in all frames, as in frame {reference[0]}: "
+                f"the smallest radius is {spelt}, but 1rmin is {reference[1]:.4g} in all frames, "
+                f"as in frame {reference[0]}: "
                 f"`reference` chooses another frame for the lengths of the series",
                 kind=ScanfabNote,
             )

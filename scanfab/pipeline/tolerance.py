@@ -280,7 +280,7 @@ class _AutoScan:
         """A note for each variant that missed its tolerance: what it reached, why, what to do."""
         steps, work = float(self.sums.steps.sum()), float(self.sums.work.sum())
         for name, errors in self.errors.items():
-            if (missing := self._missing(name)) <= 1.0:
+            if (missing := self._missing(name)) <= 1.0 or errors.reported <= self.aims[name]:
                 continue
             text = "there is no void fabric yet"
             if math.isfinite(errors.reported):

@@ -48,11 +48,11 @@ def test_who_says_that_each_sphere_is_a_grain_is_told_of_no_clumps(ask):
 @pytest.mark.parametrize(
     ("frames", "words"),
     [
-        ((FLAT, GRID), "dump.1: the first frame of the series has discs in the plane x-y"),
+        ((FLAT, GRID), "dump.1: the reference frame of the series has discs in the plane x-y"),
         ((GRID, FLAT), "all its centres lie in the plane x-y"),
         (
             (FLAT, FLAT[:, [0, 2, 1]]),
-            "dump.1: the first frame of the series has discs in the plane x-y",
+            "dump.1: the reference frame of the series has discs in the plane x-y",
         ),
     ],
 )

@@ -36,7 +36,7 @@ def test_a_warning_comes_once_and_its_frames_in_the_end():
     _, found = told([dense, gas, gas, dense, gas], boundary=(), frames="1:")
     words = [one for one in found if "no contact at all" in one]
     assert [one.partition(":")[0] for one in words] == ["frame 1", "frames 1 to 2, 4"]
-    assert words[1] == "frames 1 to 2, 4: no contact at all by geometry"
+    assert words[1] == "frames 1 to 2, 4: as in frame 1, no contact at all by geometry"
     # nothing is said of a frame that nobody asked for
     _, found = told([gas, dense, dense], frames="1:")
     assert not any("no contact" in one for one in found)
@@ -49,7 +49,9 @@ def test_the_frames_are_told_too_if_the_run_is_stopped():
         next(rows)
         next(rows)
         rows.close()
-    assert "frames 0 to 1: no contact at all by geometry" in [str(one.message) for one in caught]
+    assert "frames 0 to 1: as in frame 0, no contact at all by geometry" in [
+        str(one.message) for one in caught
+    ]
 
 
 @pytest.mark.parametrize("grow", [1.005, 1.02])
