@@ -116,14 +116,12 @@ class Job:
         sources = [source for one in self.series for source in one.sources or (one.name,)]
         reading = take_reading(dict(self.series[0].reading))
         self.asked = asked_for(sources, reading, self.settings, self.excerpt)
-        references = {number_of_reference(one, self.settings) for one in self.series}
         # counted from the start, so that a longer series has another reference
-        if len(references) == 1:
-            self.asked["reference"] = references.pop()
+        references = [number_of_reference(one, self.settings) for one in self.series]
+        if len(set(references)) == 1:
+            self.asked["reference"] = references[0]
         else:
-            self.asked["references"] = [
-                number_of_reference(one, self.settings) for one in self.series
-            ]
+            self.asked["references"] = references
         self.notes = [SeriesNotes(self.settings) for _ in self.series]
         if self.manifest_path is not None:
             check_folder(self.manifest_path)
@@ -258,14 +256,8 @@ class Job:
         for place, one in enumerate(self.series):
             done = {frame for source, frame in self.finished if source == one.name}
             observe = self.observers[place] if self.observers else None
-            computed = compute_frames(
-                one,
-                self.settings,
-                done=done,
-                observe=observe,
-                executor=self.executor,
-                notes=self.notes[place],
-            )
+            words: Any = {"done": done, "observe": observe, "notes": self.notes[place]}
+            computed = compute_frames(one, self.settings, executor=self.executor, **words)
             try:
                 for rows in computed:
                     yield one, rows
