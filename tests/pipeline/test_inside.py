@@ -18,73 +18,103 @@ import pytest
 import scanfab
 from tests.helpers.truth import SAMPLE_DATA
 
+DOCS = Path(__file__).parents[2] / "docs" / "howto"
 YADE = shutil.which("yade")
 OWN_PYTHON = f"python3.{sys.version_info.minor}"
-# a packing of overlapping spheres, whose interactions exist after one step
-SCENE = """
-import random, sys
+# packings of overlapping spheres, whose interactions exist after a few steps
+SCENES = """
+import random
 import numpy as np
 import scanfab
 from scanfab.testing import differences
 
-kind, saved = sys.argv[1:]
-random.seed(1)
-if kind == "periodic":
-    O.periodic = True
-    O.cell.hSize = Matrix3(7, 1, 0, 0, 8, 2, 0, 0, 9)
-elif kind == "walls":
-    O.bodies.append([wall(0, axis=2), *geom.facetBox((4, 4, 4), (4, 4, 4))])
-for number in range(150):
-    place = [random.uniform(-2, 9) for _ in "xyz"]
-    O.bodies.append(sphere(place if kind != "discs" else (*place[:2], 1.5), 0.7, mask=number % 3 + 1))
-if kind != "discs":
-    O.bodies.appendClumped([sphere((6.8, 4, 4), 0.8), sphere((7.3, 4, 4), 0.8)])
-O.bodies.erase(40)
-shapes = [Bo1_Sphere_Aabb(), Bo1_Facet_Aabb(), Bo1_Wall_Aabb()]
-geometries = [Ig2_Sphere_Sphere_ScGeom(), Ig2_Facet_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()]
-laws = [Law2_ScGeom_FrictPhys_CundallStrack()]
-O.engines = [
-    ForceResetter(),
-    InsertionSortCollider(shapes),
-    InteractionLoop(geometries, [Ip2_FrictMat_FrictMat_FrictPhys()], laws),
-    NewtonIntegrator(),
-]
-O.dt = 1e-9
-O.run(3, True)
-live = scanfab.from_yade()
-O.save(saved)
-file = scanfab.read(saved)
-assert live.step == 3 and len(live) == (149 if kind == "discs" else 151), live
-assert len(live.contacts) > 50 and live.contacts.force is not None
-assert differences(file, live) == [], differences(file, live)
-assert (live.wall_forces is not None) == (kind == "walls")
-if kind == "walls":
-    assert live.wall_contacts.sum() == len(live.wall_forces.row) > 10
-    for one, two in zip(live.wall_forces, file.wall_forces):
-        np.testing.assert_array_equal(one, two)
-assert live.is_periodic == (kind == "periodic") and live.space.is_plane == (kind == "discs")
-options = dict(variants="ab", directions=12, spacing=0.3)
-for one, two in zip(scanfab.compute(live, **options), scanfab.compute(file, **options)):
-    assert dict(one) == dict(two) and one.alpha_vs is not None
+def live_and_saved(kind):
+    O.reset()
+    random.seed(1)
+    if kind == "periodic":
+        O.periodic = True
+        O.cell.hSize = Matrix3(7, 1, 0, 0, 8, 2, 0, 0, 9)
+    elif kind == "walls":
+        O.bodies.append([wall(0, axis=2), box((4, 4, 8.5), (4, 4, 0.5))])
+        O.bodies.append(geom.facetBox((4, 4, 4), (4, 4, 4), wallMask=15))
+    for number in range(150):
+        place = [random.uniform(-2, 9) for _ in "xyz"]
+        place[2] = 1.5 if kind == "discs" else place[2]
+        O.bodies.append(sphere(place, 0.7, mask=number % 3 + 1))
+    if kind != "discs":
+        O.bodies.appendClumped([sphere((6.8, 4, 4), 0.8), sphere((7.3, 4, 4), 0.8)])
+    O.bodies.erase(40)
+    shapes = [Bo1_Sphere_Aabb(), Bo1_Facet_Aabb(), Bo1_Wall_Aabb(), Bo1_Box_Aabb()]
+    geometries = [
+        Ig2_Sphere_Sphere_ScGeom(), Ig2_Facet_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom(),
+        Ig2_Box_Sphere_ScGeom(),
+    ]
+    laws = [Law2_ScGeom_FrictPhys_CundallStrack()]
+    O.engines = [
+        ForceResetter(),
+        InsertionSortCollider(shapes),
+        InteractionLoop(geometries, [Ip2_FrictMat_FrictMat_FrictPhys()], laws),
+        NewtonIntegrator(),
+    ]
+    O.dt = 1e-9
+    O.run(3, True)
+    O.save(kind + ".xml")
+    return scanfab.from_yade(), scanfab.read(kind + ".xml")
+
+for kind in ("periodic", "walls", "discs"):
+    live, file = live_and_saved(kind)
+    assert live.step == 3 and len(live) == (149 if kind == "discs" else 151), live
+    assert len(live.contacts) > 50 and live.contacts.force is not None
+    assert differences(file, live) == [], differences(file, live)
+    assert (live.wall_forces is not None) == (kind == "walls")
+    if kind == "walls":
+        assert live.wall_contacts.sum() == len(live.wall_forces.row) > 10
+        for one, two in zip(live.wall_forces, file.wall_forces):
+            np.testing.assert_array_equal(one, two)
+    assert live.is_periodic == (kind == "periodic")
+    assert live.space.is_plane == (kind == "discs")
+    options = dict(variants="ab", directions=12, spacing=0.3)
+    for one, two in zip(scanfab.compute(live, **options), scanfab.compute(file, **options)):
+        assert dict(one) == dict(two) and one.alpha_vs is not None
+O.reset()
+assert len(scanfab.from_yade()) == 0
+print("all three are the same")
 """
 
 
-@pytest.mark.skipif(YADE is None, reason="YADE is not installed")
-@pytest.mark.parametrize("kind", ["periodic", "walls", "discs"])
-def test_the_scene_of_yade_is_what_it_saves(kind: str, tmp_path: Path) -> None:
-    assert YADE is not None
+def page_script(name: str) -> str:
+    """The Python of a page, as one script."""
+    text = (DOCS / f"{name}.md").read_text(encoding="utf-8")
+    return "\n".join(re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL))
+
+
+def in_yade(script: str, folder: Path) -> str:
+    """What a script prints that YADE runs with the packages of this environment."""
+    if YADE is None:
+        pytest.skip("YADE is not installed")
     head = Path(YADE).read_bytes()[:100].decode("utf-8", "replace").splitlines()[0]
     if OWN_PYTHON not in head:
         pytest.skip(f"YADE does not run in {OWN_PYTHON}: {head}")
-    (tmp_path / "scene.py").write_text(SCENE)
+    (folder / "script.py").write_text(script)
     packages = [path for path in sys.path if path.endswith("site-packages")]
     path = os.pathsep.join([str(Path(scanfab.__file__).parents[1]), *packages])
-    words = [YADE, "-n", "-x", "scene.py", kind, str(tmp_path / "saved.xml")]
     done = subprocess.run(
-        words, cwd=tmp_path, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True,
-        stdin=subprocess.DEVNULL, timeout=300, check=False,
+        [YADE, "-n", "-x", "script.py"], cwd=folder, env={**os.environ, "PYTHONPATH": path},
+        capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=300, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_the_scene_of_yade_is_what_it_saves(tmp_path: Path) -> None:
+    assert "all three are the same" in in_yade(SCENES, tmp_path)
+
+
+def test_the_page_on_yade_runs(tmp_path: Path) -> None:
+    told = in_yade(f"{page_script('inside-yade')}\nprint(len(packings), plot.data)", tmp_path)
+    assert re.search(r"\b\d+ \{'i': \[", told)
+    rows = scanfab.load(tmp_path / "fabric.csv")
+    assert rows["strain"].tolist() == pytest.approx([0, 0.021, 0.042, 0.063], abs=2e-3)
 
 
 @pytest.mark.skipif(find_spec("yade") is not None, reason="this Python runs inside YADE")
@@ -222,6 +252,17 @@ def test_the_modifier_adds_what_compute_gives() -> None:
     assert {"scanfab.c RV 0.5.alpha_c", "scanfab.a.contacts_from"} < {*attributes}
     odd = [name for name in attributes if re.search(r"strain|tensor4|_without_|frame$", name)]
     assert odd == []
+
+
+def test_the_page_on_ovito_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("ovito", reason="OVITO is not installed")
+    (tmp_path / "sample_data").symlink_to(SAMPLE_DATA)
+    monkeypatch.chdir(tmp_path)
+    found: dict[str, object] = {}
+    exec(compile(page_script("inside-ovito"), "inside-ovito.md", "exec"), found)
+    lines = (tmp_path / "fabric.txt").read_text().splitlines()
+    assert len(lines) == 6
+    assert float(lines[1].split()[1]) == found["data"].attributes["scanfab.a.alpha_vs_axial"]
 
 
 def test_wrong_options_are_refused_when_the_modifier_is_made() -> None:
