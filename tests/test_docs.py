@@ -168,11 +168,10 @@ def python_blocks() -> list[tuple[str, str]]:
 @pytest.mark.parametrize(("page", "block"), python_blocks())
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 def test_python_in_the_pages_runs(
-    page: str, block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    page: str, block: str
 ) -> None:
-    (tmp_path / "sample_data").symlink_to(ROOT / "sample_data")
-    monkeypatch.chdir(tmp_path)
-    exec(compile(block, page, "exec"), {"__name__": "docs"})
+    with figures.workplace():
+        exec(compile(block, page, "exec"), {"__name__": "docs"})
 
 
 def test_the_commands_of_the_pages_draw_their_figures(
