@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from scanfab.pipeline.inside import from_ovito as from_ovito
     from scanfab.pipeline.inside import from_yade as from_yade
     from scanfab.pipeline.inside import ovito_modifier as ovito_modifier
+    from scanfab.pipeline.inspection import inspect as inspect
     from scanfab.pipeline.maps.fabric_map import fabric_map as fabric_map
     from scanfab.pipeline.measurement import solids_of as solids_of
     from scanfab.pipeline.merge import merge_tables as merge_tables
@@ -69,6 +70,7 @@ if TYPE_CHECKING:
     from scanfab.viz.compute_file import compute_file as compute_file
     from scanfab.viz.report.report import Report as Report
     from scanfab.viz.report.report import make_report as make_report
+    from scanfab.viz.report.report import report as report
     from scanfab.viz.scanned_frames import ScannedFrames as ScannedFrames
     from scanfab.viz.scanned_frames import scan_frames as scan_frames
 
@@ -106,6 +108,7 @@ _NAMES = {
     "pipeline.compute": ["compute"],
     "pipeline.frames": ["samples"],
     "pipeline.inside": ["from_ovito", "from_yade", "ovito_modifier"],
+    "pipeline.inspection": ["inspect"],
     "pipeline.maps.fabric_map": ["fabric_map"],
     "pipeline.measurement": ["solids_of"],
     "pipeline.merge": ["merge_tables"],
@@ -119,7 +122,7 @@ _NAMES = {
     "table.row": ["Row"],
     "table.table": ["Table", "load"],
     "viz.compute_file": ["compute_file"],
-    "viz.report.report": ["Report", "make_report"],
+    "viz.report.report": ["Report", "make_report", "report"],
     "viz.scanned_frames": ["ScannedFrames", "scan_frames"],
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}

@@ -27,8 +27,6 @@ def inspect(sources: tuple[str, ...], as_json: bool, **chosen: Any) -> int:
 
     No fabric is computed. Contacts are found by geometry if no file lists them.
     """
-    from scanfab.pipeline.inspection import inspect_series
-
     reading, settings = checked(chosen, scanfab.Settings)
     all_series = open_series(sources, reading)
     announce(all_series, settings.workers)
@@ -39,7 +37,7 @@ def inspect(sources: tuple[str, ...], as_json: bool, **chosen: Any) -> int:
     with working(frames, prints=True) as advance:
         for series in all_series:
             reports = []
-            for found in inspect_series(series, settings):
+            for found in scanfab.inspect(series, **chosen):
                 report = asdict(found)
                 report["warnings"] = [as_options(text) for text in found.warnings]
                 if as_json:

@@ -39,7 +39,7 @@ def report(tables: tuple[Path, ...], output: Path, author: str | None, **chosen:
     announce()
     author = _full_name() if author is None else author
     with working():
-        made = scanfab.make_report(tables, author=author, **chosen)
+        made = scanfab.report(tables, author=author, **chosen)
     made.save(output)
     if not made.has_void_fabric:
         click.echo("scanfab: warning: no row of the tables has a void fabric", err=True)

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 from scanfab.base.column import LENGTH
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote, note, tell
@@ -50,6 +50,45 @@ class FrameReport(Record):
     clumps: Annotated[int, "number of grains that are bodies of several spheres"]
     spheres: Annotated[int, "number of spheres that the grains consist of"]
     grains_in_rv: Annotated[int | None, "number of grains whose centre lies in the RV"]
+
+
+def inspect(series: Series, **options: Any) -> Iterator[FrameReport]:
+    """
+    Report what a reader finds in each frame of a series, without computing the fabric.
+
+    Parameters
+    ----------
+    series : Series
+        The frames, as :func:`scanfab.read_series` returns them.
+    **options
+        Options of :func:`scanfab.compute`. Used are those that choose frames, the boundary, the
+        rule for rattlers, contacts by geometry, and the RV.
+
+    Yields
+    ------
+    FrameReport
+        One for each chosen frame. Its attributes are the columns of ``scanfab inspect --json``,
+        among them ``grains``, ``contacts``, ``rattlers``, ``cell`` and ``warnings``, and the box
+        around the grains. Lengths are in the dump's unit.
+
+    Raises
+    ------
+    ScanfabError
+        If an option has a value that cannot be used, a frame cannot be read, or no frame has
+        boundary particles although they are named.
+    TypeError
+        If there is no such option; the message suggests the most similar name.
+
+    Examples
+    --------
+    >>> import scanfab
+    >>> series = scanfab.read_series("sample_data/yade_triaxial/triaxial-spheres-*.vtk.gz")
+    >>> for frame in scanfab.inspect(series, boundary="mask=3", frames="-2:"):
+    ...     print(frame.step, frame.grains, frame.boundary, frame.contacts, frame.rattlers)
+    5 800 1000 2179 88
+    6 800 1000 2167 95
+    """
+    return inspect_series(series, Settings(**options))
 
 
 def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:

@@ -16,7 +16,7 @@ from tests.helpers.truth import SAMPLE_DATA
 
 def reports(folder, texts, **options):
     write(folder / "dump.txt", "".join(texts))
-    return list(inspect_series(scanfab.read_series(folder), Settings(**options)))
+    return list(scanfab.inspect(scanfab.read_series(folder), **options))
 
 
 def test_grains_contacts_and_rattlers_are_counted(tmp_path):
@@ -87,3 +87,11 @@ def test_a_part_of_a_series_is_reported_as_its_frames_among_all(tmp_path):
     assert list(inspect_series(series, Settings(frames="1:4:2"))) == every[1::2]
     assert list(inspect_series(series[1:3], Settings())) == every[1:3]
     assert list(inspect_series(series[1:], Settings(frames="-1"))) == every[3:]
+
+
+def test_options_that_do_not_exist_or_fit_are_refused_at_once():
+    series = scanfab.read_series(SAMPLE_DATA / "liggghts_periodic" / "dump_*.txt.gz")
+    with pytest.raises(TypeError, match="min_contacts"):
+        scanfab.inspect(series, min_contact=3)
+    with pytest.raises(scanfab.SettingsError, match="boundary"):
+        scanfab.inspect(series, boundary="mask")

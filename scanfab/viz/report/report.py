@@ -198,6 +198,10 @@ def make_report(
     return Report(page, any(row["alpha_vs_axial"] is not None for row in every))
 
 
+# the name of the command
+report = make_report
+
+
 @contextmanager
 def _listening(told: Told) -> Iterator[list[Any]]:
     """Collect the messages of a block in ``told``; gives back the warnings themselves."""
