@@ -164,7 +164,8 @@ def _completed(
     named = [before + word for word in words if word not in before.split(",")]
     items = [CompletionItem(word) for word in named if word.startswith(text)]
     takes_files = option.also.startswith(("FILE", "PATH"))
-    return [*items, CompletionItem(text, type="file")] if takes_files else items
+    # files come first: bash forgets the words that it got before them
+    return [CompletionItem(text, type="file"), *items] if takes_files else items
 
 
 def _output(ctx: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
