@@ -22,6 +22,7 @@ from scanfab.base.errors import (
     tell,
 )
 from scanfab.base.option import options_of, takes_options, unusable
+from scanfab.base.spelling import spelt_time
 from scanfab.io.frame import Frame
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.cluster import DaskExecutor, DeadWorkersError
@@ -247,7 +248,8 @@ class _Job:
             found = compute_frame(frame, plan, number=self.number, source=self.source)
         seconds, sample = time.perf_counter() - begun, found.sample
         grains = sample.number(sample.grains)
-        LOGGER.info("%s: frame %d: %d grains in %.2g s", self.source, self.number, grains, seconds)
+        spent = spelt_time(seconds)
+        LOGGER.info("%s: frame %d: %d grains in %s", self.source, self.number, grains, spent)
         if self.observe is not None:
             self.observe(found)
         doubts = doubts_of_frame(self.frame, sample, plan.settings)
