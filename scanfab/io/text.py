@@ -37,11 +37,9 @@ IN_MEMORY = 6.0
 SHOWN = 80
 # a process that was forked after polars was imported lacks the threads of polars, and polars would
 # wait for them forever; such a process lets the worker, a new process, read its tables
-_forked_behind_polars: list[bool] = []
+_had_polars: list[bool] = []
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(
-        after_in_child=lambda: _forked_behind_polars.append("polars" in sys.modules)
-    )
+    os.register_at_fork(after_in_child=lambda: _had_polars.append("polars" in sys.modules))
 
 
 class CutError(ReadError):
@@ -141,7 +139,7 @@ def read_rows(
     if not rows:
         kinds = {name: np.int64 if name in layout.whole else np.float64 for name in layout.names}
         return {name: np.zeros(0, kind) for name, kind in kinds.items()}
-    if any(_forked_behind_polars):
+    if any(_had_polars):
         columns = fenced(columns_of, snapshot.path, rows, layout)
     else:
         columns = columns_of("", rows, layout)

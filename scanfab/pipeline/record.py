@@ -29,9 +29,8 @@ from itertools import count
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
-from scanfab.base.ending import undone_at_end
 from scanfab.base.errors import ReadError, SettingsError, note
-from scanfab.base.files import locked, named_errors, whole_file
+from scanfab.base.files import locked, named_errors, undone_at_end, whole_file
 from scanfab.base.option import flag_of, options_of
 from scanfab.base.spelling import counted, shortest
 from scanfab.io.files import without_temporary
