@@ -24,6 +24,7 @@ from scanfab.pipeline.frames import (
     number_of_reference,
     of_whole,
 )
+from scanfab.pipeline.options import Told
 from scanfab.pipeline.record import (
     FREE,
     FrameRows,
@@ -38,7 +39,6 @@ from scanfab.pipeline.record import (
 )
 from scanfab.pipeline.series_notes import SeriesNotes
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.told import Told
 from scanfab.pipeline.values import as_written
 from scanfab.table.formats import read_rows
 from scanfab.table.row import Row

@@ -22,10 +22,16 @@ from scanfab.fabric.void import BlockFabrics, block_fabrics
 from scanfab.packing.sample import VARIANTS, Sample, Variant
 from scanfab.packing.window import Window
 from scanfab.pipeline.maps.blocks import near_surface, volumes_inside
-from scanfab.pipeline.measurement import coarse_spacing, gap_scan, solids_of
+from scanfab.pipeline.measurement import (
+    coarse_spacing,
+    doubts_of_lines,
+    edge_of,
+    gap_scan,
+    left_out_of,
+    solids_of,
+)
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.tolerance import Errors, scan_to_tolerance
-from scanfab.pipeline.variant_columns import doubts_of_lines, edge_of, left_out_of
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import design_of
 from scanfab.scan.edges import CLIP, ENDS, START
