@@ -143,9 +143,9 @@ def scan_to_tolerance(
     """
     if not plan.auto:
         return scan(solids, plan, range(plan.replicates), MAX_CHORDS), plan, []
-    auto_scan = _AutoScan(solids, _within_budget(plan, solids), aims, scan, errors_of)
-    notes = auto_scan.run(where)
-    return auto_scan.sums, auto_scan.plan, notes
+    auto = _AutoScan(solids, _within_budget(plan, solids), aims, scan, errors_of)
+    notes = auto.run(where)
+    return auto.sums, auto.plan, notes
 
 
 @dataclass
@@ -181,11 +181,10 @@ class _AutoScan:
                 reached, tolerance = spelt_apart(self.errors[worst].reported, self.aims[worst])
                 LOGGER.info("%s: error %s of %s, about %s", where, reached, tolerance, seconds)
             # a better plan is of no use if lines already had to be wider than planned
-            if start == 0 and self.plan.spacing <= planned:
-                better = self._better_plan(missing, counted)
-                if better is not None:
-                    self.plan, planned = better, better.spacing
-                    continue
+            is_first = start == 0 and self.plan.spacing <= planned
+            if is_first and (better := self._better_plan(missing, counted)) is not None:
+                self.plan, planned = better, better.spacing
+                continue
             more = math.ceil(max(min(missing, GROWTH), SMALLEST_ROUND) * stop)
             more = int(min(more, MAX_REPLICATES, stop + self.left))
             if missing <= 1.0 or self.plan.auto == "directions" or more <= stop:
