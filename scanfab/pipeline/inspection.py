@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from typing import Annotated
 
 from scanfab.base.column import LENGTH
-from scanfab.base.errors import (
-    Note,
-    PackingError,
-    ReadError,
-    ScanfabNote,
-    collected,
-    note,
-    tell,
-)
+from scanfab.base.errors import Note, PackingError, ReadError, ScanfabNote, collected, note, tell
 from scanfab.io.frame import Frame
 from scanfab.io.series import Series
 from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
@@ -81,14 +73,15 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
     if settings.reference is not None and (reference := frames.reference()) is not None:
         window = _rv(frames, reference[2])
     for number, frame in enumerate(series.whole):
-        if number in frames.chosen:
-            any_chosen = True
-            sample, doubts = _read(frames, frame)
-            window = window or _rv(frames, sample)
+        is_chosen = number in frames.chosen
+        any_chosen |= is_chosen
+        # a frame before the chosen ones is read only for the RV, so it may be damaged
+        with nullcontext() if is_chosen else suppress(PackingError, ReadError):
+            if is_chosen or window is None:
+                sample, doubts = _read(frames, frame)
+                window = window or _rv(frames, sample)
+        if is_chosen:
             yield _report(series.name, number, frame, sample, doubts, window)
-        elif window is None:
-            with suppress(PackingError, ReadError):
-                window = _rv(frames, _read(frames, frame)[0])
         if number >= frames.chosen.stop - 1:
             break
     if not any_chosen:

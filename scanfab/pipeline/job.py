@@ -18,12 +18,7 @@ from scanfab.io.follow import FollowedSeries
 from scanfab.io.options import take_reading
 from scanfab.io.series import Series
 from scanfab.pipeline.compute import Observer, compute_frames
-from scanfab.pipeline.frames import (
-    NoChosenFrameError,
-    chosen_frames,
-    number_of_reference,
-    of_whole,
-)
+from scanfab.pipeline.frames import NoChosenFrameError, chosen_frames, number_of_reference, of_whole
 from scanfab.pipeline.options import Told
 from scanfab.pipeline.record import (
     FREE,

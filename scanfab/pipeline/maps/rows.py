@@ -341,7 +341,8 @@ class VariantMap:
                 f"{lacking} of {counted(len(self.blocks), 'block')} have no void fabric: {bare} "
                 f"hold no centre of a grain, {empty} have no void segment, "
                 f"{lacking - bare - empty} have none in over 5 % of the directions: choose fewer "
-                f"blocks, closer lines (`spacing`) or a shorter `cutoff`"
+                f"blocks, closer lines (`spacing`), a shorter `cutoff`, or another frame for their "
+                f"place (such as `reference=-1`)"
             )
         notes = [Note(code, text, (variant.name,)) for code, text in texts.items()]
         return iter([*notes, self._homogeneity()])
