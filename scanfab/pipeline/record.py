@@ -54,9 +54,9 @@ LISTS = ("inputs", "warnings", "notes")
 APART = ("rv_center", "rv_size", "cell")
 # a file is read by so many bytes at a time
 PIECE = 1 << 20
-# errors that a damaged JSON file causes
 # entries of the settings that are no options
 HIDDEN = ("scanfab", "sources", "references")
+# errors that a damaged JSON file causes
 DAMAGED = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
 
 FrameRows = dict[tuple[str, int], list[Row]]

@@ -177,7 +177,7 @@ def _curve_of(frame: ScannedFrame) -> CutoffCurve:
     """The lines of the table at other cut-offs, and at its own."""
     # loaded here, as other figures do without compiled kernels
     from scanfab.packing.sample import VARIANTS
-    from scanfab.pipeline.variant_columns import VariantColumns
+    from scanfab.pipeline.frame import VariantColumns
 
     smallest, chosen = frame.smallest, frame.measurement.plan.cutoff
     lengths = {*(cutoff * smallest for cutoff in CUTOFFS), chosen}
