@@ -48,6 +48,9 @@ if TYPE_CHECKING:
     from scanfab.pipeline.compute import compute as compute
     from scanfab.pipeline.compute import fabric_map as fabric_map
     from scanfab.pipeline.frames import samples as samples
+    from scanfab.pipeline.inside import from_ovito as from_ovito
+    from scanfab.pipeline.inside import from_yade as from_yade
+    from scanfab.pipeline.inside import ovito_modifier as ovito_modifier
     from scanfab.pipeline.measurement import solids_of as solids_of
     from scanfab.pipeline.merge import merge_tables as merge_tables
     from scanfab.pipeline.settings import Settings as Settings
@@ -102,6 +105,7 @@ _NAMES = {
     "pipeline.cluster": ["dask_executor"],
     "pipeline.compute": ["compute", "fabric_map"],
     "pipeline.frames": ["samples"],
+    "pipeline.inside": ["from_ovito", "from_yade", "ovito_modifier"],
     "pipeline.measurement": ["solids_of"],
     "pipeline.merge": ["merge_tables"],
     "pipeline.settings": ["Settings"],

@@ -7,6 +7,7 @@ import re
 import shlex
 import shutil
 import tempfile
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,12 +21,26 @@ FIGURES = DOCS / "figures"
 PAGES = ("gallery.md", "validation.md")
 
 
+def shipped_samples() -> list[Path]:
+    """The files below sample_data/ that a wheel holds, by the rules of pyproject.toml."""
+    root = DOCS.parent
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
+    wheel = project["tool"]["hatch"]["build"]["targets"]["wheel"]
+    left_out = {path for rule in wheel["exclude"] for path in root.glob(rule)}
+    included = [root / name for name in wheel["only-include"] if name.startswith("sample_data")]
+    paths = [path for one in included for path in (one, *one.rglob("*")) if path.is_file()]
+    return [path for path in paths if left_out.isdisjoint([path, *path.parents])]
+
+
 @contextmanager
 def workplace() -> Iterator[Path]:
-    """A new folder with the sample data, as the current folder."""
+    """A new folder with the samples that a wheel holds, as the current folder."""
     before = Path.cwd()
     with tempfile.TemporaryDirectory() as folder:
-        shutil.copytree(DOCS.parent / "sample_data", Path(folder) / "sample_data")
+        for sample in shipped_samples():
+            target = Path(folder) / sample.relative_to(DOCS.parent)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(sample, target)
         os.chdir(folder)
         try:
             yield Path(folder)

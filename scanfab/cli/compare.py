@@ -45,6 +45,9 @@ MOST_BARS = 15
     "--differences", is_flag=True, help="One row per frame and pair of variants: their difference."
 )
 @options("strain_max")
+@options(
+    "variants", default=None, help="Which variants to compare, as letters (default: all of them)."
+)
 @options("cutoff", **OF_SEVERAL)
 @options("labels", "output", "EXCERPT", "plot")
 @options(
@@ -52,7 +55,19 @@ MOST_BARS = 15
     help="Figure to draw: evolution, normalised, correlation or columns:NAME,NAME (default: all on "
     "one page).",
 )
-def compare(tables: tuple[str, ...], summary: bool, differences: bool, **chosen: Any) -> int:
+@click.option(
+    "--no-paper-line",
+    is_flag=True,
+    help="Leave the dotted line with the slope of the 2017 paper out of the figure correlation.",
+)
+def compare(
+    tables: tuple[str, ...],
+    summary: bool,
+    differences: bool,
+    variants: str | None,
+    no_paper_line: bool,
+    **chosen: Any,
+) -> int:
     """
     Set the variants of fabric tables side by side.
 
@@ -62,17 +77,23 @@ def compare(tables: tuple[str, ...], summary: bool, differences: bool, **chosen:
     fabric on contact fabric. A terminal shows both tables.
     """
     from scanfab.base.files import refuse_inputs
+    from scanfab.pipeline.values import parse_variants
     from scanfab.table.selection import choose_rows
     from scanfab.table.writing import ALL, write_rows
 
     outputs = take_output(chosen, "table")
     if summary and differences:
         raise click.UsageError("--summary and --differences print different tables: choose one")
+    if no_paper_line and outputs.plot is None:
+        raise click.UsageError("--no-paper-line goes with --plot FILE")
     check_labels(chosen["labels"], tables)
     with usage_errors():
+        variants = variants and parse_variants("variants", variants)
         refuse_inputs([outputs.output, outputs.plot], map(Path, tables))
     read = [(table, scanfab.read_rows(table)) for table in tables]
     rows = [row for table in choose_rows(read, chosen["cutoff"], chosen["labels"]) for row in table]
+    if variants is not None:
+        rows = _of_variants(rows, variants)
     comparison = scanfab.compare_tables(rows, strain_max=chosen["strain_max"])
     shown = comparison.frames
     if summary or differences:
@@ -87,8 +108,17 @@ def compare(tables: tuple[str, ...], summary: bool, differences: bool, **chosen:
         print_comparison(comparison)
     else:
         print_csv(shown, excerpt, shown.columns)
-    draw(outputs, rows, "table", comparison=comparison)
+    draw(outputs, rows, "table", comparison=comparison, paper_line=not no_paper_line)
     return 0 if any(row.alpha_vs_axial is not None for row in comparison.frames) else 1
+
+
+def _of_variants(rows: list[dict[str, Any]], variants: str) -> list[dict[str, Any]]:
+    """The rows of some variants; SettingsError if the tables lack one of them."""
+    found = sorted({row["variant"] for row in rows})
+    if not set(variants) <= set(found):
+        words = f"expected variants of the tables, {', '.join(found)}, found {variants!r}"
+        raise scanfab.SettingsError(f"variants: {words}")
+    return [row for row in rows if row["variant"] in variants]
 
 
 def print_comparison(comparison: Comparison) -> None:

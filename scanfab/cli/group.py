@@ -7,7 +7,8 @@ from importlib import import_module
 
 import click
 
-# each command is a module of this name; it is imported when the command runs: --help stays fast
+# each command is a module of this name, with _ for -, which is imported when the command runs:
+# --help stays fast
 COMMANDS = {
     "compute": "the fabric table: one row per frame and variant",
     "merge": "join the parts of a job array into one table",
@@ -18,6 +19,7 @@ COMMANDS = {
     "view": "a frame in 3D",
     "map": "fabric by place: blocks in a grid, slices or shells",
     "convert": "one frame or a series in another format, with contacts, cell and forces",
+    "sample-data": "small real series to try the examples on",
     "formats": "every reader and writer, its extensions, and the package it comes from",
 }
 
@@ -39,7 +41,8 @@ class LazyGroup(click.Group):
             near = get_close_matches(cmd_name, COMMANDS, n=1)
             hint = f"Did you mean {near[0]!r}?" if near else f"Choose from {', '.join(COMMANDS)}."
             raise click.UsageError(f"No such command {cmd_name!r}. {hint}", ctx)
-        command: click.Command = getattr(import_module(f"scanfab.cli.{cmd_name}"), cmd_name)
+        name = cmd_name.replace("-", "_")
+        command: click.Command = getattr(import_module(f"scanfab.cli.{name}"), name)
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -82,6 +82,26 @@ def test_the_rows_of_one_cutoff_are_chosen(compare, table):
     assert "expected a cut-off of the table: 0, 0.5, 1" in told
 
 
+def test_variants_are_chosen(compare, table, tmp_path):
+    given = table([row for variant in "acd" for row in curve(variant=variant)])
+    alone = table([row for variant in "ad" for row in curve(variant=variant)], "alone.jsonl")
+    for words in ([], ["--summary"], ["--differences"]):
+        assert compare(given, "--variants", "da", *words).out == compare(alone, *words).out
+    told = compare(given, "--variants", "ab", code=1).told
+    assert "--variants: expected variants of the tables, a, c, d, found 'ab'" in told
+    told = compare(given, "--variants", "x", code=2).told
+    assert "--variants: expected letters out of abcd, found 'x'" in told
+
+
+def test_the_line_of_the_paper_can_be_left_out(compare, table, tmp_path):
+    given, plot = table(curve()), tmp_path / "plot.svg"
+    draw = ["--figure", "correlation", "--plot", plot]
+    for words, is_drawn in ([], True), (["--no-paper-line"], False):
+        compare(given, *draw, *words)
+        assert ("2017 paper: 0.096" in plot.read_text(encoding="utf-8")) == is_drawn
+    assert "goes with --plot FILE" in compare(given, "--no-paper-line", code=2).err
+
+
 def test_a_dash_is_standard_input(compare, table, monkeypatch):
     data = table(curve()).read_bytes()
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data)))

@@ -39,6 +39,8 @@ class Correlation(Figure):
     comparison : Comparison, optional
         Of the same table, with the lines to draw: ``table.compare(strain_max=0.05)``. By default
         all frames are fitted.
+    paper_line : bool, optional
+        Whether to draw the slope of the 2017 paper as a dotted line.
 
     Raises
     ------
@@ -49,8 +51,11 @@ class Correlation(Figure):
     order = 3
     columns = ("variant", "alpha_vs_axial", "strain", "alpha_c_axial")
 
-    def __init__(self, data: Table, comparison: Comparison | None = None) -> None:
+    def __init__(
+        self, data: Table, comparison: Comparison | None = None, paper_line: bool = True
+    ) -> None:
         super().__init__(data)
+        self.paper_line = paper_line
         self.groups = groups_of(data)
         self.turned = is_turned(data)
         self.in_plane = any(
@@ -136,7 +141,9 @@ class Correlation(Figure):
         return (line, points), f"{one.name}:\n{fit.slope:.3f}{error}{r2}"
 
     def _reach(self, drawn: Sequence[Drawn]) -> float:
-        """The largest contact anisotropy of the fitted frames of some curves."""
+        """The end of the paper's line: the largest contact anisotropy that is fitted, or 0."""
+        if not self.paper_line:
+            return 0.0
         fits = [self.fits[one.place] for one in drawn]
         return max((frames[:, 0].max() for fit, frames in fits if fit.slope is not None), default=0)
 

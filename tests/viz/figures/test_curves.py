@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure as Page
 
 import scanfab
 from scanfab.base.errors import ScanfabNote, SettingsError
@@ -167,6 +168,9 @@ def test_captions_say_what_is_drawn():
         "Void against contact anisotropy along the loading axis, with fitted lines and the "
         "paper's slope."
     )
+    plain = Correlation(Table(with_samples(curve())), paper_line=False)
+    assert plain.caption.endswith("along the loading axis, with fitted lines.")
+    assert ":" not in {line.get_linestyle() for line in plain.on(Page()).axes[0].lines}
     evolution, normalised, correlation = captions(with_samples(sheared()))
     assert evolution == (
         "Intensity of void and contact anisotropy, and the angle between their major axes, over "

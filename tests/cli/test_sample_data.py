@@ -1,0 +1,116 @@
+"""The samples that `scanfab sample-data` copies: from a checkout, and from a wheel."""
+
+from __future__ import annotations
+
+import compileall
+import os
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import scanfab
+from tests.cli.conftest import Answer
+from tests.helpers.truth import SAMPLE_DATA
+
+Ask = Callable[..., Answer]
+ROOT = SAMPLE_DATA.parent
+sys.path.append(str(ROOT / "docs" / "make"))
+figures = import_module("figures")
+
+
+def files_in(folder: Path) -> dict[str, bytes]:
+    """The content of each file below a folder by its name in there."""
+    paths = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel of this checkout."""
+    build = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["build-system"]
+    for name in build["requires"]:
+        module = re.split(r"\W", name.replace("-", "_"))[0]
+        pytest.importorskip(module, reason=f"{name} is not installed, which builds the wheel")
+    folder = tmp_path_factory.mktemp("wheel")
+    words = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    (path,) = folder.glob("*.whl")
+    return path
+
+
+def test_a_wheel_holds_the_package_and_the_samples_of_the_examples(wheel: Path) -> None:
+    shipped = {path.relative_to(SAMPLE_DATA).as_posix(): path for path in figures.shipped_samples()}
+    assert sum(path.stat().st_size for path in shipped.values()) <= 3_000_000
+    with zipfile.ZipFile(wheel) as archive:
+        names = {name for name in archive.namelist() if ".dist-info/" not in name}
+    samples = {name for name in names if name.startswith("scanfab/_samples/")}
+    assert samples == {f"scanfab/_samples/{name}" for name in shipped}
+    package = {
+        f"scanfab/{name}" for name in files_in(ROOT / "scanfab") if "__pycache__" not in name
+    }
+    assert names - samples == package
+
+
+def test_an_installed_wheel_copies_its_samples(wheel: Path, tmp_path: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path / "site")
+    compileall.compile_dir(tmp_path / "site" / "scanfab" / "_samples", quiet=1)  # as pip does
+    run = "import scanfab; from scanfab.cli.main import main; print(scanfab.__file__); main()"
+    done = subprocess.run(
+        [sys.executable, "-c", run, "sample-data", "sample_data"], cwd=tmp_path, text=True,
+        env={**os.environ, "PYTHONPATH": str(tmp_path / "site")}, capture_output=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(str(tmp_path / "site"))
+    copied = files_in(tmp_path / "sample_data")
+    shipped = figures.shipped_samples()
+    assert copied == {
+        path.relative_to(SAMPLE_DATA).as_posix(): path.read_bytes() for path in shipped
+    }
+
+
+def test_a_checkout_copies_all_its_samples(ask: Ask, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    for name in ("new", "empty"):
+        answer = ask("sample-data", tmp_path / name)
+        assert answer.out == ""
+        assert f"try scanfab compute {tmp_path / name}/yade_triaxial --boundary" in answer.told
+    assert files_in(tmp_path / "new") == files_in(tmp_path / "empty") == files_in(SAMPLE_DATA)
+    assert ask("sample-data", tmp_path / "quiet", "--quiet").err == ""
+    assert len(scanfab.read_series(tmp_path / "quiet" / "liggghts_periodic")) == 5
+
+
+def test_a_folder_that_cannot_be_filled_is_refused_and_kept(
+    ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine.txt").write_text("mine")
+    for folder, words in (
+        (tmp_path, "is not empty: name a new or an empty folder"),
+        (tmp_path / "mine.txt", "is a file: name a new or an empty folder"),
+        (tmp_path / "none" / "new", f"there is no folder {tmp_path / 'none'} to write to"),
+    ):
+        told = ask("sample-data", folder, code=2).told
+        assert told.endswith(f"Error: {folder}: {words}")
+    assert "Missing argument 'DIR'" in ask("sample-data", code=2).told
+    (tmp_path / "empty").mkdir()
+    monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
+    for name, locked in (("new", tmp_path), ("empty", tmp_path / "empty")):
+        told = ask("sample-data", tmp_path / name, code=2).told
+        assert told.endswith(f"the folder {locked} cannot be written to")
+    assert {path.name for path in tmp_path.iterdir()} == {"mine.txt", "empty"}
+
+
+def test_an_installation_without_samples_says_so(
+    ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(scanfab, "__file__", str(tmp_path / "scanfab" / "__init__.py"))
+    told = ask("sample-data", tmp_path / "new", code=1).told
+    assert told.endswith("the samples are missing: install scanfab again")
