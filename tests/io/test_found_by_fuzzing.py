@@ -110,6 +110,11 @@ def test_a_column_without_name_and_numbers_that_the_user_names(tmp_path, rows):
     refuses(grains, contacts=pairs, contact_columns=named, match="contacts")
 
 
+def test_a_row_too_short_for_the_columns_of_contacts_that_the_user_names(tmp_path):
+    pairs = write(tmp_path / "p1.txt", "id\tx\t\tz\tr\n1\n")
+    refuses(pairs, contact_columns="id1=id,id2=r", match="p1.txt")
+
+
 @pytest.mark.filterwarnings("ignore:.*packing.nfo")
 def test_doubles_that_begin_as_an_archive_does(tmp_path):
     rows = np.column_stack([np.arange(12.0), np.zeros((12, 2)), np.ones(12)]).astype("<f8")

@@ -163,7 +163,8 @@ class TableReader:
         if self.options.contact_columns and has_ids:
             # any table may have columns of these numbers: check that they hold whole numbers
             places = [head.layout.names.index(pairs[end]) for end in ("id1", "id2")]
-            if all("".join(row[k].strip() for k in places).isdigit() for row in head.rows):
+            ids = [row[k : k + 1] for row in head.rows for k in places]
+            if all(word and word[0].strip().isdigit() for word in ids):
                 return "contacts"
         if _are_grains(grains) or has_ids:
             return "grains" if _are_grains(grains) else "contacts"
