@@ -30,6 +30,7 @@ class OnePanel(FrameFigure):
         """One panel; its legend moves from the panel to the page above it."""
         (axes,) = super().panels(part)
         inside = axes.get_legend()
+        assert inside is not None
         part.legend(loc="outside upper left", title=inside.get_title().get_text())
         inside.remove()
         return [axes]
