@@ -46,12 +46,12 @@ if TYPE_CHECKING:
     from scanfab.pipeline.calibration import calibrate as calibrate
     from scanfab.pipeline.cluster import dask_executor as dask_executor
     from scanfab.pipeline.compute import compute as compute
+    from scanfab.pipeline.compute import fabric_map as fabric_map
     from scanfab.pipeline.frames import samples as samples
     from scanfab.pipeline.inside import from_ovito as from_ovito
     from scanfab.pipeline.inside import from_yade as from_yade
     from scanfab.pipeline.inside import ovito_modifier as ovito_modifier
     from scanfab.pipeline.inspection import inspect as inspect
-    from scanfab.pipeline.maps.fabric_map import fabric_map as fabric_map
     from scanfab.pipeline.measurement import solids_of as solids_of
     from scanfab.pipeline.merge import merge_tables as merge_tables
     from scanfab.pipeline.settings import Settings as Settings
@@ -105,11 +105,10 @@ _NAMES = {
     "packing.window": ["Window"],
     "pipeline.calibration": ["Calibration", "calibrate"],
     "pipeline.cluster": ["dask_executor"],
-    "pipeline.compute": ["compute"],
+    "pipeline.compute": ["compute", "fabric_map"],
     "pipeline.frames": ["samples"],
     "pipeline.inside": ["from_ovito", "from_yade", "ovito_modifier"],
     "pipeline.inspection": ["inspect"],
-    "pipeline.maps.fabric_map": ["fabric_map"],
     "pipeline.measurement": ["solids_of"],
     "pipeline.merge": ["merge_tables"],
     "pipeline.settings": ["Settings"],

@@ -167,9 +167,7 @@ def python_blocks() -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize(("page", "block"), python_blocks())
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
-def test_python_in_the_pages_runs(
-    page: str, block: str
-) -> None:
+def test_python_in_the_pages_runs(page: str, block: str) -> None:
     with figures.workplace():
         exec(compile(block, page, "exec"), {"__name__": "docs"})
 

@@ -41,8 +41,6 @@ class Body:
     volume: float
     form: FloatArray = field(default_factory=lambda: np.zeros(3))
     """The diagonal of M in x·M x < 1, which bounds its curved face; 0 if there is none."""
-    is_symmetric: bool = False
-    """Whether it contains -x with each x."""
     is_flat: bool = False
     """Whether it lies in a plane."""
 
@@ -60,32 +58,23 @@ class Body:
 
         The slope is the projected area of the shared part along the shift, times its length.
         """
+        from scipy.optimize import linprog
         from scipy.spatial import ConvexHull, HalfspaceIntersection
 
         shared, slope = np.zeros((2, len(shift)))
+        normals, distance = self.planes[:, :3], self.planes[:, 3]
+        depth = np.column_stack([normals, np.ones(len(normals))])
         for k, vector in enumerate(shift):
-            room, ball = self.shared_with(length * vector)
-            if ball[3] > SLIVER * self.reach(np.eye(3)):
-                bounds = np.column_stack([self.planes[:, :3], -room])
-                part = ConvexHull(HalfspaceIntersection(bounds, ball[:3]).intersections)
+            # the planes of the shared part, and the centre and radius of its largest ball
+            room = distance + np.minimum(normals @ (length * vector), 0.0)
+            *inside, radius = linprog([0, 0, 0, -1], depth, room, bounds=[(None, None)] * 4).x
+            if radius > SLIVER * self.reach(np.eye(3)):
+                bounds = np.column_stack([normals, -room])
+                part = ConvexHull(HalfspaceIntersection(bounds, np.array(inside)).intersections)
                 a, b, c = np.moveaxis(part.points[part.simplices], 1, 0)
                 shared[k] = part.volume
                 slope[k] = 0.25 * np.abs(np.cross(b - a, c - a) @ vector).sum()
         return shared, slope
-
-    def shared_with(self, shift: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """
-        The part that a polyhedron shares with a copy that is moved by a vector.
-
-        It is returned as the distance of each plane from the origin, shape (P,), and as centre and
-        radius (four numbers) of its largest ball; if there is no such part, the radius is negative.
-        """
-        from scipy.optimize import linprog
-
-        normals, distance = self.planes[:, :3], self.planes[:, 3]
-        room = distance + np.minimum(normals @ shift, 0.0)
-        depth = np.column_stack([normals, np.ones(len(normals))])
-        return room, linprog([0, 0, 0, -1], depth, room, bounds=[(None, None)] * 4).x
 
 
 class Quadric(NamedTuple):
@@ -347,11 +336,7 @@ class Convex:
         -------
         bool
         """
-        if self.body.is_symmetric:
-            # two copies of a symmetric body meet if the point halfway between their centres does
-            return bool(self.contains(0.5 * shift[None])[0])
-        _, ball = self.body.shared_with(np.asarray(np.linalg.solve(self.frame, shift)))
-        return bool(ball[3] > SLIVER * self.body.reach(np.eye(3)))
+        return bool(self.overlap(shift[None], 1.0)[0][0] > 0.0)
 
     def deformed(self, gradient: FloatArray) -> Convex:
         """

@@ -1,22 +1,23 @@
 """
 Files: the kind of a path, files that are written completely or not at all, and locks.
 
-The memory left for the process is found here too, because it limits how much can be read.
+The steps that clean up before the process ends, also if a signal ends it, are kept here, and so is
+the memory left for the process, because it limits how much can be read.
 """
 
 from __future__ import annotations
 
+import atexit
 import os
 import re
 import stat
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import IO
 
-from scanfab.base.ending import undone_at_end
 from scanfab.base.errors import ReadError, ScanfabError, SettingsError
 
 # kinds of paths that are not read as files, because reading them may wait for ever
@@ -28,6 +29,9 @@ INHERITED = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")
 FAR = 1 << 40
 # holds the memory limit of the container
 CONTAINER = Path("/sys/fs/cgroup/memory.max")
+
+Step = Callable[[], object]
+_steps: list[Step] = []
 
 
 def kind_of(path: Path) -> str | None:
@@ -169,3 +173,34 @@ def address_space() -> int | None:
         return None
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     return None if limit == resource.RLIM_INFINITY else limit - pages * resource.getpagesize()
+
+
+def at_end(step: Step) -> None:
+    """Call a function at the end of the process."""
+    if util := sys.modules.get("multiprocessing.util"):
+        # a forked worker process ends without calling the functions of atexit
+        util.Finalize(None, finish, exitpriority=0)
+    _steps.append(step)
+
+
+@contextmanager
+def undone_at_end(step: Step) -> Iterator[None]:
+    """Within the block, call a function if the process ends."""
+    _steps.append(step)
+    try:
+        yield
+    finally:
+        _steps.remove(step)
+
+
+if hasattr(os, "register_at_fork"):
+    # the parent process runs its own steps, so a forked child forgets them
+    os.register_at_fork(after_in_child=_steps.clear)
+
+
+@atexit.register
+def finish() -> None:
+    """Run all remaining steps, the newest first."""
+    while _steps:
+        with suppress(OSError):
+            _steps.pop()()

@@ -215,15 +215,20 @@ def numbers(expected: str, holds: Callable[[Floats], bool]) -> Callable[[str, An
     return parse
 
 
-def one_of(*words: str) -> Parse:
-    """A parser that accepts one of the given words."""
+def accepted(expected: str, holds: Callable[[Any], bool]) -> Parse:
+    """A parser that returns a value as it is, if a condition holds for it."""
 
-    def parse(name: str, value: Any) -> str:
-        if value not in words:
-            raise unusable(name, f"{', '.join(words[:-1])} or {words[-1]}", value)
-        return str(value)
+    def parse(name: str, value: Any) -> Any:
+        if not holds(value):
+            raise unusable(name, expected, value)
+        return value
 
     return parse
+
+
+def one_of(*words: str) -> Parse:
+    """A parser that accepts one of the given words."""
+    return accepted(f"{', '.join(words[:-1])} or {words[-1]}", lambda value: value in words)
 
 
 def optional(parse: Parse) -> Parse:

@@ -41,7 +41,7 @@ class Product(Body):
             outline = np.concatenate([outline + axis, outline[::-1] - axis])
         volume = VOLUME_OF_BALL[is_round] * 2.0**edges
         form = np.repeat([1.0, 0.0], [is_round, 3 - is_round])
-        super().__init__(outline, planes, volume, form, is_symmetric=True, is_flat=size == 2)
+        super().__init__(outline, planes, volume, form, is_flat=size == 2)
         self.is_round, self.size = is_round, size
 
     def support(self, along: FloatArray) -> FloatArray:

@@ -21,8 +21,7 @@ from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.errors import ScanfabNote
 from scanfab.base.spelling import spelt_time
 from scanfab.io.files import without_temporary
-from scanfab.pipeline.options import as_options
-from scanfab.pipeline.told import listening
+from scanfab.pipeline.options import as_options, listening
 
 if TYPE_CHECKING:
     from rich.progress import Progress

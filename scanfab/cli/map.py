@@ -6,8 +6,8 @@ from typing import Any
 
 import click
 
-from scanfab.cli.options import SourceCommand, checked, in_order, open_series, options
-from scanfab.pipeline.options import MAP_OPTIONS, Output
+from scanfab.cli.options import SourceCommand, in_order, options
+from scanfab.pipeline.options import MAP_OPTIONS
 
 
 @click.command(cls=SourceCommand)
@@ -28,22 +28,10 @@ def map(sources: tuple[str, ...], frame: int | None, **chosen: Any) -> int:
     its blocks scatter more than their errors explain.
     """
     from scanfab.cli.rows import write_table
-    from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings
+    from scanfab.pipeline.maps.settings import MapSettings
 
-    if all(chosen[name] is None for name in BLOCK_OPTIONS):
-        # discs have no map, so do not ask for blocks first
-        asked = {name: chosen[name] for name in chosen.keys() - vars(Output())}
-        reading, _ = checked({**asked, "slices": 1}, MapSettings)
-        for series in open_series(sources, reading):
-            if len(series) and (space := series[0].read().space).is_plane:
-                raise click.UsageError(f"a map needs spheres, but all grains are discs in {space}")
     if frame is not None:
         if chosen["frames"] is not None:
             raise click.UsageError("--frame and --frames choose frames in two ways: name one")
         chosen["frames"] = str(frame)
-        asked = {name: chosen[name] for name in chosen.keys() - vars(Output())}
-        for series in open_series(sources, checked(asked, MapSettings)[0]):
-            if not -len(series) <= frame < len(series):
-                has = f"{series.name} has {len(series)}, counted from 0"
-                raise click.UsageError(f"--frame: there is no frame {frame}: {has}")
-    return write_table(sources, chosen, MapSettings)
+    return write_table(sources, chosen, MapSettings, frame)

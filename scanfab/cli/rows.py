@@ -23,11 +23,14 @@ if TYPE_CHECKING:
     from scanfab.table.writing import Excerpt
 
 
-def write_table(sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Settings]) -> int:
+def write_table(
+    sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Settings], frame: int | None = None
+) -> int:
     """
     Compute a table with the options of a command, write it, draw it, and return the exit code.
 
-    ``kind`` is the class of the table's settings.
+    ``kind`` is the class of the table's settings. If a ``frame`` is given, every series must have
+    it.
     """
     from scanfab.pipeline.job import Job
     from scanfab.viz.paraview import vtk_folders
@@ -54,6 +57,10 @@ def write_table(sources: tuple[str, ...], chosen: dict[str, Any], kind: type[Set
         series: list[Series] = [followed]
     else:
         series = open_series(sources, reading)
+    for one in series if frame is not None else ():
+        if frame not in range(-len(one), len(one)):
+            has = f"{one.name} has {len(one)}, counted from 0"
+            raise click.UsageError(f"--frame: there is no frame {frame}: {has}")
     drawing = _Drawing(outputs, figures)
     if drawing.kind == "frames" and len(series) > 1:
         raise click.UsageError(f"--figure {outputs.figure} draws one series: name one source")

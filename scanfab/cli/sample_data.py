@@ -39,7 +39,9 @@ def sample_data(folder: Path) -> int:
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, target)
     names = ", ".join(sorted(path.name for path in folder.iterdir()))
-    note(f"copied {names} to {folder}: try scanfab compute {folder}/yade_triaxial --boundary mask=3")
+    note(
+        f"copied {names} to {folder}: try scanfab compute {folder}/yade_triaxial --boundary mask=3"
+    )
     return 0
 
 

@@ -71,7 +71,9 @@ def _read(path: Path) -> dict[str, Any]:
 
     try:
         content = tomllib.loads(path.read_text("utf-8"))
-    except (ValueError, RecursionError) as error:
+    except RecursionError:
+        raise click.UsageError(f"{path}: its lists are nested too deeply") from None
+    except ValueError as error:
         advice = 'text needs quotes, as in boundary = "type=2"'
         raise click.UsageError(f"{path}: {error}: {advice}") from None
     for name, value in content.items():

@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import NoReturn
 
-from scanfab.base.ending import finish
+from scanfab.base.files import finish
 
 ENDED: dict[int, str] = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 # clear the progress bar, and show the cursor that it hides

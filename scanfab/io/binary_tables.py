@@ -27,6 +27,7 @@ NFO = re.compile(
     r"(?im)^\s*(dimensions|final porosity|theoretical porosity)\s*:?"
     r"((?:[ \t]+[-+]?[0-9]+\.?[0-9]*(?:e[-+]?[0-9]+)?(?![^\s,;]))+)"
 )
+POROSITIES = ("final porosity", "theoretical porosity")
 # names of arrays in an NPZ file that hold centres, and names of arrays that hold pairs
 POSITIONS = ("position", "positions", "pos", "points", "centers", "centres")
 PAIRS = ("pairs", "contacts", "ids")
@@ -154,9 +155,7 @@ def _read_xyzd(path: Path) -> Columns:
     if info is None:
         warn(f"{path}: diameters are not scaled, since there is no packing.nfo beside the file")
     else:
-        final, theory = (
-            1.0 - info.get(f"{k} porosity", [1.0])[0] for k in ("final", "theoretical")
-        )
+        final, theory = (1.0 - info.get(name, [1.0])[0] for name in POROSITIES)
         factor = (final / theory) ** (1 / 3) if min(final, theory) > 0 else np.nan
         if not 0.5 < factor < 2.0:
             expected = "theoretical and final porosities between 0 and 1 to scale the diameters"

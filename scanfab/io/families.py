@@ -282,9 +282,7 @@ def without_tables(
     frames = [family for family in [*families, *chosen] if family.kind in ("grains", "index")]
     dumps = [family for family in frames if not family.is_table]
     tables = [family for family in frames if family.is_table]
-    with_names = [
-        table for table in tables if table.reader and table.reader.recognises(table.largest)
-    ]
+    with_names = [one for one in tables if one.reader and one.reader.recognises(one.largest)]
     stems = set[str | None]().union(*(family.stems for family in [*dumps, *chosen]))
 
     def counts(family: Family) -> bool:
@@ -313,9 +311,7 @@ def contacts_beside(
     families = without_tables(_families_beside(grains, groups, options), (), grains)
     frames = [family for family in families if family.kind in ("grains", grains.kind)]
     rivals = [family for family in frames if _words(family) != _words(grains)]
-    candidates = [
-        family for family in families if family.kind == "contacts" and family.clash is None
-    ]
+    candidates = [one for one in families if one.kind == "contacts" and one.clash is None]
 
     def nearest_rival(contacts: Family) -> tuple[int, bool]:
         return max((_kinship(rival, contacts) for rival in rivals), default=(-1, False))
@@ -326,17 +322,14 @@ def contacts_beside(
         near = [family for family in free if _kinship(grains, family) > nearest_rival(family)]
         most = max((_kinship(grains, family)[0] for family in near), default=0)
         own = [family for family in near if _kinship(grains, family)[0] == most]
-    doubtful = [
-        Path(family.pattern).name
-        for family in candidates
-        if _kinship(grains, family) >= nearest_rival(family)
-    ]
+    doubtful = [one for one in candidates if _kinship(grains, one) >= nearest_rival(one)]
     if own:
         patterns = ", ".join(family.pattern for family in own)
         note(f"contacts are read from {patterns}, beside the grains")
     elif doubtful:
+        names = some([Path(family.pattern).name for family in doubtful])
         doubt = f"neither step nor name shows that these contacts belong to {grains.pattern}"
-        note(f"skipped {some(doubtful)}: {doubt}; if they do, name the files with `contacts`")
+        note(f"skipped {names}: {doubt}; if they do, name the files with `contacts`")
     return families, own
 
 

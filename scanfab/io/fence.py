@@ -19,9 +19,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
-from scanfab.base.ending import at_end
 from scanfab.base.errors import ReadError
-from scanfab.base.files import free_memory
+from scanfab.base.files import at_end, free_memory
 from scanfab.io.files import check_memory, plain
 
 Answer = TypeVar("Answer")

@@ -158,15 +158,15 @@ class Frame:
             advice = "lists contacts with walls only: those between grains are found by geometry"
             warn(f"{named}: {advice}, unless `contacts` names their file")
         # a contacts file of `convert` lists no walls; the grain file counts contacts with walls
-        if grains.wall_contacts is not None and (
-            takes_own or any(companion_kind(file) == "contacts" for file in files)
-        ):
+        is_own = takes_own or any(companion_kind(file) == "contacts" for file in files)
+        if grains.wall_contacts is not None and is_own:
             parts.append(JoinedContacts(None, grains.wall_contacts, grains.wall_forces))
         none = np.zeros(len(grains.radius), np.int64)
         # forces of walls are known if all files that list contacts with walls have them
         walls = [part.wall_forces for part in parts if part.wall_contacts.any()]
-        forces = [part for part in walls if part is not None]
-        are_known = bool(forces) and len(forces) == len(walls)
+        known = [part for part in walls if part is not None]
+        joined = [*zip(*known, strict=True)] if len(known) == len(walls) else []
+        wall_forces = ListedWallForces(*map(np.concatenate, joined)) if joined else None
         return Packing(
             grains.position,
             grains.radius,
@@ -175,9 +175,7 @@ class Frame:
             bodies=body_numbers(path, grains, series.options.bodies),
             contacts=lists[0] if lists else None,
             wall_contacts=sum((part.wall_contacts for part in parts), none) if parts else None,
-            wall_forces=ListedWallForces(*map(np.concatenate, zip(*forces, strict=True)))
-            if are_known
-            else None,
+            wall_forces=wall_forces,
             cell=grains.cell,
             step=self.step,
             time=self.snapshot.time,

@@ -10,33 +10,40 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.option import number, numbers, optional, options_of, reading, unusable, whole
+from scanfab.base.option import (
+    accepted,
+    number,
+    numbers,
+    optional,
+    options_of,
+    reading,
+    unusable,
+    whole,
+)
 from scanfab.io.reader import installed_readers, reader_named
 
 parse_positive = optional(number("a number above 0", lambda value: 0 < value < math.inf))
 parse_skip = whole("how many lines to skip, 0 or more", lambda value: 0 <= value < 2**31)
 
 
-def parse_text(name: str, value: Any) -> str | None:
-    """A text; its content is checked where it is used."""
-    if not isinstance(value, str | None):
-        raise unusable(name, "text", value)
-    return value
+# texts and paths are checked further where they are used
+parse_text = optional(accepted("text", lambda value: isinstance(value, str)))
+parse_contacts = accepted(
+    "auto, file, geometric or a path", lambda value: isinstance(value, str | PathLike)
+)
+parse_periodic = optional(
+    accepted(
+        "letters out of xyz",
+        lambda value: isinstance(value, str) and len(value) <= 3 and set(value) <= set("xyz"),
+    )
+)
 
 
 def parse_format(name: str, value: Any) -> str | None:
     """The name of an installed reader."""
-    given = parse_text(name, value)
-    if given is not None:
+    if (given := parse_text(name, value)) is not None:
         reader_named(given)
-    return given
-
-
-def parse_contacts(name: str, value: Any) -> str | PathLike[str]:
-    """A keyword or a path; the files are looked for when the series is opened."""
-    if not isinstance(value, str | PathLike):
-        raise unusable(name, "auto, file, geometric or a path", value)
-    return value
+    return given  # type: ignore[no-any-return]
 
 
 def parse_columns(name: str, value: Any) -> dict[str, str] | None:
@@ -81,13 +88,6 @@ def parse_frames(name: str, value: str | int | slice | None) -> slice:
         if len(parts) <= 3 and parts[2:] != [0]:
             return slice(*parts)
     raise unusable(name, "a slice such as 0:10:2, :5 or -1:", value)
-
-
-def parse_periodic(name: str, value: Any) -> str | None:
-    """Some of the letters x, y and z."""
-    if value is None or (isinstance(value, str) and len(value) <= 3 and set(value) <= set("xyz")):
-        return value
-    raise unusable(name, "letters out of xyz", value)
 
 
 def parse_dim(name: str, value: Any) -> str | int:

@@ -197,11 +197,8 @@ class Series:
             first = next(filter(len, before), position)
             if not len(first):
                 return SPACE
-            first_space = (
-                flat_space(first, id if first is position else None)
-                if self.dim == 2
-                else space_of(first)
-            )
+            own_id = id if first is position else None
+            first_space = flat_space(first, own_id) if self.dim == 2 else space_of(first)
             if first_space.is_plane and self.dim == "auto":
                 advice = "they are read as discs, in 2D; `dim=3` reads them as spheres"
                 where = spelt_plane(first, first_space)

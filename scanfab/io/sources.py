@@ -307,13 +307,9 @@ def _choose_contacts(
         return own, "beside" if is_beside else "auto"
     # an unreadable file becomes an error if its name and number fit the contact file of the grains
     damaged = [
-        replace(
-            family, kind="contacts", files=dict.fromkeys(grains.files, family.largest), clash=None
-        )
-        for family in families
-        if family.problem is not None
-        and len(family.files) == len(grains.files)
-        and sorting.are_tied(grains, family)
+        replace(one, kind="contacts", files=dict.fromkeys(grains.files, one.largest), clash=None)
+        for one in families
+        if one.problem and len(one.files) == len(grains.files) and sorting.are_tied(grains, one)
     ]
     if options.contact_columns and not (damaged or in_grains):
         missing = "no contact file has these columns"

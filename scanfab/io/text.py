@@ -37,11 +37,9 @@ IN_MEMORY = 6.0
 SHOWN = 80
 # a process that was forked after polars was imported lacks the threads of polars, and polars would
 # wait for them forever; such a process lets the worker, a new process, read its tables
-_forked_behind_polars: list[bool] = []
+_had_polars: list[bool] = []
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(
-        after_in_child=lambda: _forked_behind_polars.append("polars" in sys.modules)
-    )
+    os.register_at_fork(after_in_child=lambda: _had_polars.append("polars" in sys.modules))
 
 
 class CutError(ReadError):
@@ -123,7 +121,8 @@ def read_rows(
     """
     # if tabs separate words, tabs at the edges stand for empty words: keep them
     edge = None if layout.separator == " " else b" \n"
-    rows = rows.replace(b"\r\n", b"\n")
+    if b"\r" in rows:  # to look first is faster than to replace nothing
+        rows = rows.replace(b"\r\n", b"\n")
     body = rows.lstrip(edge)
     layout = layout._replace(line=layout.line + rows.count(b"\n", 0, len(rows) - len(body)))
     has_end = not body or body.rstrip(b" \t").endswith(b"\n")
@@ -140,7 +139,7 @@ def read_rows(
     if not rows:
         kinds = {name: np.int64 if name in layout.whole else np.float64 for name in layout.names}
         return {name: np.zeros(0, kind) for name, kind in kinds.items()}
-    if any(_forked_behind_polars):
+    if any(_had_polars):
         columns = fenced(columns_of, snapshot.path, rows, layout)
     else:
         columns = columns_of("", rows, layout)
@@ -159,33 +158,25 @@ def columns_of(_path: str, rows: bytes, layout: Layout) -> Columns | None:
     # polars would skip a carriage return inside a line, and decompress bytes that look compressed
     if b"\r" in rows or rows.startswith(LIKE_COMPRESSED):
         return None
-    rows = _regular(rows, layout)
+    first = rows[: rows.find(b"\n")]
+    is_spaced = layout.separator == " "
+    if is_spaced and b"\t" in first:
+        rows, first = rows.replace(b"\t", b" "), first.replace(b"\t", b" ")
+    if is_spaced and (b"  " in first or first[:1] == b" "):
+        rows = _single_blanks(rows)
     # with decimal commas, a point may separate thousands: only a check of the words finds that
     columns = None if layout.comma else _parsed(rows, layout, by_words=False)
     if columns is not None:
         return columns
-    return _parsed(_stripped(rows) if layout.separator == " " else rows, layout, by_words=True)
+    return _parsed(_single_blanks(rows) if is_spaced else rows, layout, by_words=True)
 
 
-def _regular(rows: bytes, layout: Layout) -> bytes:
-    """The rows with single separators between words, and without separators around rows."""
-    first = rows[: rows.find(b"\n")]
-    if layout.separator != " ":
-        words = words_of(first.decode("utf-8", "replace"), layout.separator)
-        is_behind = len(words) == len(layout.names) + 1 and not words[-1]
-        return rows.replace(layout.separator.encode() + b"\n", b"\n") if is_behind else rows
-    if b"  " in rows or b"\t" in rows:
-        text = np.frombuffer(rows.replace(b"\t", b" "), np.uint8)
-        kept: npt.NDArray[np.bool_] = text != ord(" ")
-        kept[1:] |= kept[:-1].copy()
-        return _stripped(text[kept].tobytes())
-    # blanks around the first row show whether rows have any; checking all rows would be slow
-    return rows if first == first.strip() else _stripped(rows)
-
-
-def _stripped(rows: bytes) -> bytes:
-    """The rows without the single blank before or after each."""
-    return rows.replace(b" \n", b"\n").replace(b"\n ", b"\n").lstrip(b" ")
+def _single_blanks(rows: bytes) -> bytes:
+    """The rows with one blank between words and none around rows."""
+    text = np.frombuffer(rows.replace(b"\t", b" "), np.uint8)
+    kept: npt.NDArray[np.bool_] = text != ord(" ")
+    kept[1:] |= kept[:-1].copy()
+    return text[kept].tobytes().replace(b" \n", b"\n").replace(b"\n ", b"\n").lstrip(b" ")
 
 
 def _parsed(rows: bytes, layout: Layout, by_words: bool) -> Columns | None:
@@ -198,23 +189,30 @@ def _parsed(rows: bytes, layout: Layout, by_words: bool) -> Columns | None:
 
     kinds: dict[str, Any] = dict.fromkeys(layout.whole, polars.Int64)
     kinds |= dict.fromkeys(layout.names if by_words else layout.text, polars.String)
-    places = enumerate(layout.names)
+    schema = {f"{k}": kinds.get(name, polars.Float64) for k, name in enumerate(layout.names)}
+    first = rows[: rows.find(b"\n")].decode("utf-8", "replace")
+    words = first.split(" ") if layout.separator == " " else words_of(first, layout.separator)
+    is_behind = len(words) == len(layout.names) + 1 and not words[-1]
+    if is_behind:  # a separator behind the last word
+        schema["behind"] = polars.String
     try:
         frame = polars.read_csv(
             rows,
             has_header=False,
             separator=layout.separator,
             quote_char='"' if layout.separator != " " and b'"' in rows else None,
-            schema={f"{place}": kinds.get(name, polars.Float64) for place, name in places},
+            schema=schema,
             encoding="utf8-lossy",
         )
     except (polars.exceptions.PolarsError, OSError):
+        return None
+    if is_behind and frame.drop_in_place("behind").null_count() < frame.height:
         return None
     if any(frame.null_count().row(0)):
         # polars reads a missing word as an empty word: count the separators
         bare = re.sub(rb'"[^"\n]*"', b"", rows) if b'"' in rows else rows
         signs = bare.count(layout.separator.encode())
-        if layout.separator == " " or signs != frame.height * (frame.width - 1):
+        if layout.separator == " " or signs != frame.height * (len(schema) - 1):
             return None
     columns: Columns = {}
     for column, name in zip(frame, layout.names, strict=True):

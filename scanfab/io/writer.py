@@ -230,6 +230,5 @@ def cell_of(path: Path, arrays: Mapping[str, Any]) -> Cell | None:
 
 def contacts_of(pairs: AnyArray, arrays: Mapping[str, Any]) -> ContactList:
     """The contacts in the arrays of a file; Packing checks them later."""
-    return ContactList(
-        pairs, arrays.get("image"), arrays.get("force"), force_n=arrays.get("force_n")
-    )
+    image, force, force_n = map(arrays.get, ("image", "force", "force_n"))
+    return ContactList(pairs, image, force, force_n=force_n)

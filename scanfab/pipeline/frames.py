@@ -46,9 +46,9 @@ class _Stream:
     name = ""
 
     def __init__(self, packings: Iterable[Packing]) -> None:
-        self._coming = iter(packings)
+        self._coming, self._taken = iter(packings), 0
+        # itertools.tee would keep some that are taken
         self._kept: deque[Packing] = deque()
-        self._taken = 0
 
     def __iter__(self) -> Iterator[Packing]:
         """The packings that are not taken yet; they are kept until they are taken."""
@@ -96,15 +96,15 @@ class Frames:
     """
 
     def __init__(self, source: Source, settings: Settings) -> None:
-        source = [source] if isinstance(source, Packing) else source
-        if isinstance(source, str) or not isinstance(source, Iterable):
+        if isinstance(source, str) or not isinstance(source, Iterable | Packing):
             expected = "a Packing, a Series or an iterable of packings"
             raise SettingsError(f"expected {expected}, found {source!r}")
         self.source: Series | _Stream
+        self.settings = settings
         if isinstance(source, Series):
             self.source, self.settings = of_whole(source, settings)
         else:
-            self.source, self.settings = _Stream(source), settings
+            self.source = _Stream([source] if isinstance(source, Packing) else source)
         if isinstance(self.source, FollowedSeries) and _counts_from_end(self.settings.frames):
             what = f"{as_written(self.settings.frames)} counts from the end of the series"
             raise SettingsError(f"frames: {what}, which nobody knows while it is followed")
@@ -143,16 +143,16 @@ class Frames:
         every: Iterable[Unread | None] = self.source
         if isinstance(self.source, _Stream | FollowedSeries):
             every = self.source.as_they_come()
-        chosen, found, number = self.chosen, False, 0
+        found, number = False, 0
         for frame in every:
             if frame is None:
                 yield None
                 continue
-            if number in chosen:
+            if number in self.chosen:
                 found = True
                 yield number, frame
             number += 1
-            if number >= chosen.stop:
+            if number >= self.chosen.stop:
                 break
         if not found:
             raise self.no_such_frames()
@@ -263,12 +263,10 @@ def number_of_reference(source: Series | _Stream, settings: Settings) -> int | N
     NoReferenceError
         If the series has no such frame, or if it counts from an end that nobody knows yet.
     """
-    named = settings.reference
-    if named is None or (named >= 0 and not isinstance(source, Series)):
+    named, still_come = settings.reference, isinstance(source, FollowedSeries | _Stream)
+    if named is None or (named >= 0 and still_come):
         return named
-    if isinstance(source, FollowedSeries | _Stream):
-        if named >= 0:
-            return named
+    if still_come:
         what = f"{named} counts from the end, which nobody knows while frames are still to come"
         raise NoReferenceError(f"reference: {what}: name a frame from the beginning")
     count = len(source)

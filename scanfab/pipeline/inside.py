@@ -198,7 +198,7 @@ def from_yade() -> Packing:
     >>> table = scanfab.compute(packings)  # doctest: +SKIP
     """
     try:
-        from yade import O  # type: ignore[import-not-found]  # noqa: N811
+        from yade import O  # type: ignore[import-not-found]
     except ImportError:
         advice = "run the script by `yade script.py`"
         raise ScanfabError(f"from_yade: this Python does not run inside YADE: {advice}") from None

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 from scanfab.base.column import LENGTH
-from scanfab.base.errors import PackingError, ReadError, ScanfabNote, note, tell
+from scanfab.base.errors import Note, PackingError, ReadError, ScanfabNote, collected, note, tell
 from scanfab.io.frame import Frame
 from scanfab.io.series import Series
 from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
@@ -113,14 +112,15 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
     if settings.reference is not None and (reference := frames.reference()) is not None:
         window = _rv(frames, reference[2])
     for number, frame in enumerate(series.whole):
-        if number in frames.chosen:
-            any_chosen = True
-            sample, doubts = _read(frames, frame)
-            window = window or _rv(frames, sample)
+        is_chosen = number in frames.chosen
+        any_chosen |= is_chosen
+        # a frame before the chosen ones is read only for the RV, so it may be damaged
+        with nullcontext() if is_chosen else suppress(PackingError, ReadError):
+            if is_chosen or window is None:
+                sample, doubts = _read(frames, frame)
+                window = window or _rv(frames, sample)
+        if is_chosen:
             yield _report(series.name, number, frame, sample, doubts, window)
-        elif window is None:
-            with suppress(PackingError, ReadError):
-                window = _rv(frames, _read(frames, frame)[0])
         if number >= frames.chosen.stop - 1:
             break
     if not any_chosen:
@@ -129,27 +129,21 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
 
 def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
     """Read a frame and collect doubts, including errors that would prevent a measurement."""
-    doubts = []
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with collected() as told:
         sample = frames.read(frame)
-    for warning in caught:
-        if issubclass(warning.category, ScanfabNote):
-            warnings.warn(warning.message, stacklevel=2)
-        else:
-            doubts.append(str(warning.message))
-    notes = boundary_hints(sample, frames.settings) if len(sample.packing) else []
-    doubts += [doubt.text for doubt in notes]
+    tell(note for note in told if note.kind is ScanfabNote)
+    doubts = [note for note in told if note.kind is not ScanfabNote]
+    doubts += boundary_hints(sample, frames.settings) if len(sample.packing) else []
     try:
         refuse_impossible(sample)
     except PackingError as error:
-        doubts.append(str(error))
-    doubts += [doubt.text for doubt in doubts_of(sample, **frame.named)]
+        doubts.append(Note("impossible", str(error)))
+    doubts += doubts_of(sample, **frame.named)
     if no_cell := cell_doubt(sample, frame.carries):
-        doubts.append(no_cell)
+        doubts.append(Note("no_cell", no_cell))
     elif hint := cell_hint(sample, frame.carries):
         note(hint)
-    return sample, [*doubts, *(doubt.text for doubt in sample.doubts_of_escaped())]
+    return sample, [doubt.text for doubt in (*doubts, *sample.doubts_of_escaped())]
 
 
 def _rv(frames: Frames, sample: Sample) -> Window | None:
@@ -166,6 +160,7 @@ def _report(
     packing, grains, cell = sample.packing, sample.grains, sample.packing.cell
     radius = packing.radius[grains]
     box = SurfaceBox.of(packing, sample.gathered) if grains.any() else None
+    in_rv = None if window is None else sample.number(sample.counted(VARIANTS["c"], window))
     return FrameReport(
         source=source,
         frame=number,
@@ -191,7 +186,5 @@ def _report(
         rv_shape=None if window is None else str(window.shape),
         clumps=sample.clumps,
         spheres=int(grains.sum()),
-        grains_in_rv=None
-        if window is None
-        else sample.number(sample.counted(VARIANTS["c"], window)),
+        grains_in_rv=in_rv,
     )

@@ -18,12 +18,8 @@ from scanfab.io.follow import FollowedSeries
 from scanfab.io.options import take_reading
 from scanfab.io.series import Series
 from scanfab.pipeline.compute import Observer, compute_frames
-from scanfab.pipeline.frames import (
-    NoChosenFrameError,
-    chosen_frames,
-    number_of_reference,
-    of_whole,
-)
+from scanfab.pipeline.frames import NoChosenFrameError, chosen_frames, number_of_reference, of_whole
+from scanfab.pipeline.options import Told
 from scanfab.pipeline.record import (
     FREE,
     FrameRows,
@@ -38,7 +34,6 @@ from scanfab.pipeline.record import (
 )
 from scanfab.pipeline.series_notes import SeriesNotes
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.told import Told
 from scanfab.pipeline.values import as_written
 from scanfab.table.formats import read_rows
 from scanfab.table.row import Row

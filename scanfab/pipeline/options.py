@@ -1,13 +1,17 @@
-"""All declared options, and how the command line spells them in messages."""
+"""All declared options, and warnings and notes as the command line spells them."""
 
 from __future__ import annotations
 
 import re
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from scanfab.base.column import DEFAULT_DIGITS
-from scanfab.base.errors import SettingsError
+from scanfab.base.errors import ScanfabNote, ScanfabWarning, SettingsError, SkippedFrameWarning
 from scanfab.base.option import option, options_of, reading, running
 from scanfab.io.files import without_temporary
 from scanfab.io.options import READING_OPTIONS
@@ -146,3 +150,52 @@ def _as_words(match: re.Match[str]) -> str:
 
 MEANINGS = {name: as_options(option.help) for name, option in OPTIONS.items() if option.decides}
 """For the report: the help of each option that decides a result, by name."""
+
+
+class Told:
+    """Warnings and notes as manifests list them: each text once, spelt as on the command line."""
+
+    def __init__(self) -> None:
+        self.warnings: list[str] = []
+        self.notes: list[str] = []
+        self.skipped = 0
+        """Number of frames that were skipped."""
+
+    def add(self, message: Warning) -> bool:
+        """Keep a warning or note; returns whether its text is new."""
+        self.skipped += isinstance(message, SkippedFrameWarning)
+        known = self.notes if isinstance(message, ScanfabNote) else self.warnings
+        text = as_options(str(message))
+        is_new = text not in known
+        if is_new:
+            known.append(text)
+        return is_new
+
+
+@contextmanager
+def listening(show: Callable[[Warning], object] | None = None) -> Iterator[Told]:
+    """
+    Keep the warnings and notes of scanfab inside the block, whatever the filters of the caller say.
+
+    Each new text is shown at once by ``show``. Without ``show`` the texts are issued again after
+    the block, as warnings at the line that calls the function of the block; there the filters of
+    the caller show them, hide them or raise them. Warnings of other packages pass unchanged.
+    """
+    told, later = Told(), list[Warning]()
+    try:
+        with warnings.catch_warnings():
+            others: Any = warnings.showwarning
+
+            def hear(message: Any, category: type[Warning], *place: Any, **more: Any) -> None:
+                if not issubclass(category, ScanfabWarning | ScanfabNote):
+                    others(message, category, *place, **more)
+                elif told.add(message):
+                    (show or later.append)(message)
+
+            for kind in (ScanfabWarning, ScanfabNote):
+                warnings.simplefilter("always", kind)
+            warnings.showwarning = hear
+            yield told
+    finally:
+        for message in later:
+            warnings.warn(message, stacklevel=4)

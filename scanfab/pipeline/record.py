@@ -29,9 +29,8 @@ from itertools import count
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
-from scanfab.base.ending import undone_at_end
 from scanfab.base.errors import ReadError, SettingsError, note
-from scanfab.base.files import locked, named_errors, whole_file
+from scanfab.base.files import locked, named_errors, undone_at_end, whole_file
 from scanfab.base.option import flag_of, options_of
 from scanfab.base.spelling import counted, shortest
 from scanfab.io.files import without_temporary
@@ -55,9 +54,9 @@ LISTS = ("inputs", "warnings", "notes")
 APART = ("rv_center", "rv_size", "cell")
 # a file is read by so many bytes at a time
 PIECE = 1 << 20
-# errors that a damaged JSON file causes
 # entries of the settings that are no options
 HIDDEN = ("scanfab", "sources", "references")
+# errors that a damaged JSON file causes
 DAMAGED = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
 
 FrameRows = dict[tuple[str, int], list[Row]]

@@ -44,7 +44,7 @@ GROWTH, SMALLEST_ROUND = 4.0, 1.1
 MARGIN, SIGMAS = 1.1, 2.5
 # in smallest radii: a direction that is empty at this spacing stays empty with closer lines
 CLOSEST = 0.05
-# lines are set closer if a larger fraction of the directions of a replicate keeps no segment
+# lines are set closer if a larger fraction of the axes of a replicate keeps no segment
 MOST_EMPTY = 0.005
 # without rattlers, what is left of a sample with a larger fraction of them is hardly a packing
 MOST_REMOVED = 0.9
@@ -63,11 +63,6 @@ class Errors(NamedTuple):
     def over(self, aim: float) -> Errors:
         """The errors relative to the error that a scan aims at."""
         return Errors(self.reported / aim, self.expected / aim, self.empty)
-
-    @property
-    def is_patchy(self) -> bool:
-        """Whether some axes keep segments, but too many axes keep none."""
-        return MOST_EMPTY < self.empty < 1.0
 
 
 def scan_variants(
@@ -143,9 +138,9 @@ def scan_to_tolerance(
     """
     if not plan.auto:
         return scan(solids, plan, range(plan.replicates), MAX_CHORDS), plan, []
-    auto_scan = _AutoScan(solids, _within_budget(plan, solids), aims, scan, errors_of)
-    notes = auto_scan.run(where)
-    return auto_scan.sums, auto_scan.plan, notes
+    auto = _AutoScan(solids, _within_budget(plan, solids), aims, scan, errors_of)
+    notes = auto.run(where)
+    return auto.sums, auto.plan, notes
 
 
 @dataclass
@@ -181,11 +176,10 @@ class _AutoScan:
                 reached, tolerance = spelt_apart(self.errors[worst].reported, self.aims[worst])
                 LOGGER.info("%s: error %s of %s, about %s", where, reached, tolerance, seconds)
             # a better plan is of no use if lines already had to be wider than planned
-            if start == 0 and self.plan.spacing <= planned:
-                better = self._better_plan(missing, counted)
-                if better is not None:
-                    self.plan, planned = better, better.spacing
-                    continue
+            is_first = start == 0 and self.plan.spacing <= planned
+            if is_first and (better := self._better_plan(missing, counted)) is not None:
+                self.plan, planned = better, better.spacing
+                continue
             more = math.ceil(max(min(missing, GROWTH), SMALLEST_ROUND) * stop)
             more = int(min(more, MAX_REPLICATES, stop + self.left))
             if missing <= 1.0 or self.plan.auto == "directions" or more <= stop:
@@ -253,7 +247,7 @@ class _AutoScan:
         """A better plan to start again with after the first round; None if it does not pay."""
         plan = better = self.plan
         space, radius = plan.space, self.solids.grain_radius
-        is_patchy = any(self.errors[name].is_patchy for name in counted)
+        is_patchy = any(MOST_EMPTY < self.errors[name].empty < 1.0 for name in counted)
         if plan.auto == "directions":
             if missing > 1.0 and len(plan.rule) < MAX_DIRECTIONS:
                 axes = math.ceil(min(missing, GROWTH) * len(plan.rule))
@@ -286,9 +280,11 @@ class _AutoScan:
             if math.isfinite(errors.reported):
                 reached, tolerance = spelt_apart(errors.reported, self.aims[name])
                 text = f"alpha_vs_axial_se is {reached}, where the tolerance is {tolerance}"
+            # not 6.9e+02 but 690
+            times = f"{float(f'{missing:.2g}'):g} times"
             text += (
-                f": the scan stopped after {self.spent:.2g} chords, and about {missing:.2g} times "
-                f"as many lines would be needed: choose a larger `tolerance` or `max_chords`"
+                f": the scan stopped after {self.spent:.2g} chords, and about {times} as many "
+                f"lines would be needed: choose a larger `tolerance` or `max_chords`"
             )
             if 2 * steps > work:
                 text += (

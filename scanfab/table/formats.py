@@ -254,9 +254,8 @@ def format_of(path: Path) -> TableFormat:
     """
     suffix = path.suffix.lower()
     # other packages are asked only if needed, because looking for them is slow
-    table_format = {form.suffix: form for form in OWN_FORMATS}.get(suffix) or known_formats().get(
-        suffix
-    )
+    own = {form.suffix: form for form in OWN_FORMATS}
+    table_format = own.get(suffix) or known_formats().get(suffix)
     if table_format is None:
         raise SettingsError(
             f"{path}: results can be written as {', '.join(known_formats())}, "

@@ -17,8 +17,8 @@ from scanfab.io.series import Series
 from scanfab.io.sources import READING, open_sources
 from scanfab.pipeline.job import Job
 from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
+from scanfab.pipeline.options import listening
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.told import listening
 from scanfab.table.table import Table, load
 from scanfab.table.writing import Excerpt
 from scanfab.viz.paraview import vtk_folders

@@ -53,7 +53,9 @@ def test_a_wheel_holds_the_package_and_the_samples_of_the_examples(wheel: Path) 
         names = {name for name in archive.namelist() if ".dist-info/" not in name}
     samples = {name for name in names if name.startswith("scanfab/_samples/")}
     assert samples == {f"scanfab/_samples/{name}" for name in shipped}
-    package = {f"scanfab/{name}" for name in files_in(ROOT / "scanfab") if "__pycache__" not in name}
+    package = {
+        f"scanfab/{name}" for name in files_in(ROOT / "scanfab") if "__pycache__" not in name
+    }
     assert names - samples == package
 
 

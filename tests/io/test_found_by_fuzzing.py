@@ -112,7 +112,7 @@ def test_a_column_without_name_and_numbers_that_the_user_names(tmp_path, rows):
 
 def test_a_row_too_short_for_the_columns_of_contacts_that_the_user_names(tmp_path):
     pairs = write(tmp_path / "p1.txt", "id\tx\t\tz\tr\n1\n")
-    refuses(pairs, contact_columns="id1=id,id2=r", match="p1.txt")
+    refuses(pairs, format="table", contact_columns="id1=id,id2=r", match="p1.txt")
 
 
 @pytest.mark.filterwarnings("ignore:.*packing.nfo")

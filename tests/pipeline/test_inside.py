@@ -7,7 +7,6 @@ import re
 import shutil
 import subprocess
 import sys
-import textwrap
 import warnings
 from importlib.util import find_spec
 from pathlib import Path

@@ -7,7 +7,7 @@ import warnings
 import pytest
 
 from scanfab.base.errors import ScanfabNote, ScanfabWarning, SkippedFrameWarning
-from scanfab.pipeline.told import listening
+from scanfab.pipeline.options import listening
 
 ALL = ["choose another `rv`", "a note", "frame 1 skipped", "frame 2 skipped"]
 

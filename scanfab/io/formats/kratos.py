@@ -90,9 +90,8 @@ class KratosReader(GrainsOnly):
         lost = {id for part in parts["Elements"] for id in part["id"].tolist()} - {*ids}
         lost |= {*ids} - place.keys()
         if lost:
-            raise ReadError(
-                f"{path}: no place or RADIUS for {len(lost)} nodes, such as {min(lost)}"
-            )
+            nodes_lost = f"{len(lost)} nodes, such as {min(lost)}"
+            raise ReadError(f"{path}: no place or RADIUS for {nodes_lost}")
         rows = np.array([place[id] for id in ids], dtype=int)
         places = {axis: nodes[axis][rows] for axis in "xyz"}
         return {"id": radii["id"], **places, "radius": radii["radius"]}, None

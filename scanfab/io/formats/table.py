@@ -124,9 +124,8 @@ class TableReader:
         roles = self.told(options)._pairs(path, head)
         if not {"id1", "id2"} <= roles.keys():
             problem = f"expected two columns of ids, id1 and id2, found {', '.join(head.own)}"
-            raise ReadError(
-                f'{path}: {problem}: name them with `contact_columns="id1=...,id2=..."`'
-            )
+            advice = 'name them with `contact_columns="id1=...,id2=..."`'
+            raise ReadError(f"{path}: {problem}: {advice}")
         table_names.check_units(path, roles, contacts=True)
         columns = _read(path, head, roles)
         return join_table(path, grains, {what: columns[name] for what, name in roles.items()})

@@ -134,10 +134,8 @@ class VtkReader(GrainsOnly):
             note(f"contact arrays that are not read: {', '.join(names)}: only a vector `force` is")
         if contacts.force is None:
             return contacts
-        force = np.asarray(contacts.force, np.float64)
-        return contacts._replace(
-            force=proved_force(path, grains, np.asarray(contacts.pairs), force)
-        )
+        pairs, force = np.asarray(contacts.pairs), np.asarray(contacts.force, np.float64)
+        return contacts._replace(force=proved_force(path, grains, pairs, force))
 
     def carries(self, path: Path) -> Carries:
         """Files of scanfab have a cell, LIGGGHTS writes a box file; VTK has no cell."""
@@ -182,10 +180,6 @@ class VtkReader(GrainsOnly):
             if other is not path:
                 both = f"{other.name} and {path.name}"
                 raise ReadError(f"{index}: {both} have the same timestep, part and group")
-        names = {kind: name for (name, _, _), kind in kinds.items()}
-        if {"grains", "points"} <= names.keys():
-            points = f"points without a radius ({names['points']}) beside {names['grains']}"
-            raise ReadError(f"{index}: lists {points}: take them out, or name the files")
         found = []
         for word, parts in frames.items():
             time = None if word is None else numbers(f"{index}: timestep", word.encode(), 1)[0]

@@ -24,7 +24,7 @@ PERIODIC_HEAD = b"##PERIODIC::"
 TEXT_HEADS = (b"#format ", PERIODIC_HEAD)
 # the array that marks the interactions of VTKRecorder
 RECORDED = b'Name="forceN"'
-COMMENT = re.compile(rb"^[ \t]*#[^\n]*", re.MULTILINE)
+COMMENT = re.compile(rb"#[^\n]*")
 
 
 class TextExport(GrainsOnly):

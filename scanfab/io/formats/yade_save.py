@@ -94,12 +94,7 @@ def _read_save(path: Path, options: ReadOptions) -> GrainTable:
                 if element.find("iterMadeReal") is not None:
                     row = [_number(element, name) for name in CONTACT]
                     for vector in (next(element.iter(name), None) for name in VECTORS):
-                        missing = [np.nan] * 3
-                        row += (
-                            [_number(vector, axis) for axis in "xyz"]
-                            if vector is not None
-                            else missing
-                        )
+                        row += [np.nan if vector is None else _number(vector, a) for a in "xyz"]
                     contacts.append(row)
                 elif element.find("id") is not None and element.find("state") is not None:
                     ids.append(_number(element, "id"))

@@ -22,10 +22,16 @@ from scanfab.fabric.void import BlockFabrics, block_fabrics
 from scanfab.packing.sample import VARIANTS, Sample, Variant
 from scanfab.packing.window import Window
 from scanfab.pipeline.maps.blocks import near_surface, volumes_inside
-from scanfab.pipeline.measurement import coarse_spacing, gap_scan, solids_of
+from scanfab.pipeline.measurement import (
+    coarse_spacing,
+    doubts_of_lines,
+    edge_of,
+    gap_scan,
+    left_out_of,
+    solids_of,
+)
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.tolerance import Errors, scan_to_tolerance
-from scanfab.pipeline.variant_columns import doubts_of_lines, edge_of, left_out_of
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import design_of
 from scanfab.scan.edges import CLIP, ENDS, START
@@ -335,7 +341,8 @@ class VariantMap:
                 f"{lacking} of {counted(len(self.blocks), 'block')} have no void fabric: {bare} "
                 f"hold no centre of a grain, {empty} have no void segment, "
                 f"{lacking - bare - empty} have none in over 5 % of the directions: choose fewer "
-                f"blocks, closer lines (`spacing`) or a shorter `cutoff`"
+                f"blocks, closer lines (`spacing`), a shorter `cutoff`, or another frame for their "
+                f"place (such as `reference=-1`)"
             )
         notes = [Note(code, text, (variant.name,)) for code, text in texts.items()]
         return iter([*notes, self._homogeneity()])

@@ -46,7 +46,6 @@ class Ladders(Figure):
 
     kind = "calibration"
     order = 8
-    lettered = True
     size = (WIDTH, 5.2)
 
     def __init__(self, data: Sequence[Any], ladder: str = "spacing") -> None:

@@ -50,7 +50,6 @@ class Correlation(Figure):
 
     order = 3
     columns = ("variant", "alpha_vs_axial", "strain", "alpha_c_axial")
-    lettered = True
 
     def __init__(
         self, data: Table, comparison: Comparison | None = None, paper_line: bool = True

@@ -143,7 +143,6 @@ class Curves(Figure):
     and its first quantity.
     """
 
-    lettered = True
     across: ClassVar[int] = 3
     """Panels in a row at most."""
     share: ClassVar[bool] = False

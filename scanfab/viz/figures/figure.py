@@ -54,8 +54,9 @@ class Figure:
     """Figures on a page and in lists are sorted by this number, then by name."""
     columns: ClassVar[tuple[str, ...]] = ()
     """The columns that the table must have."""
-    lettered: ClassVar[bool] = False
-    """Whether its panels have letters, (a), (b) ..., also if it is the only figure of a page."""
+    lettered: ClassVar[bool] = True
+    """Whether several panels have letters, (a), (b) ...; on a page of several figures they always
+    have."""
     slow: ClassVar[bool] = False
     """Whether it scans along further lines, which takes too long for a report."""
     projection: ClassVar[str | None] = None
@@ -178,8 +179,6 @@ class DirectionalFigure(FrameFigure):
     of : str, optional
         ``"voids"`` or ``"contacts"``, to draw only these. On one Axes the default is voids.
     """
-
-    lettered = True
 
     def __init__(
         self, data: ScannedFrames, frame: int | None = None, of: str | None = None

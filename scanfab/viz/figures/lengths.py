@@ -24,27 +24,15 @@ CUTOFFS = (0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0)
 
 
 class OnePanel(FrameFigure):
-    """A figure of frames in one panel, which needs ``paint``; on a page its legend is above it."""
-
-    @property
-    def note(self) -> str:
-        """What stands above the legend."""
-        return ""
-
-    def paint(self, ax: Axes) -> None:
-        """Draw on one Axes, without the legend."""
-        raise NotImplementedError
-
-    def draw(self, ax: Axes) -> None:
-        """With the legend in the panel."""
-        self.paint(ax)
-        ax.legend(title=self.note or None)
+    """A figure of frames in one panel."""
 
     def panels(self, part: FigureBase) -> list[Axes]:
-        """One panel, with the legend above it."""
-        axes = part.subplots()
-        self.paint(axes)
-        part.legend(loc="outside upper left", title=self.note or None)
+        """One panel; its legend moves from the panel to the page above it."""
+        (axes,) = super().panels(part)
+        inside = axes.get_legend()
+        assert inside is not None
+        part.legend(loc="outside upper left", title=inside.get_title().get_text())
+        inside.remove()
         return [axes]
 
 
@@ -74,8 +62,8 @@ class Histogram(OnePanel):
         """Lengths of void segments of each frame, in units of its smallest radius."""
         return [_lengths_of(one) for one in self.chosen(self.data.frames)]
 
-    def paint(self, ax: Axes) -> None:
-        """Density of the lengths; lengths below the cut-off are on grey."""
+    def draw(self, ax: Axes) -> None:
+        """Draw the density of the lengths; lengths below the cut-off are on grey."""
         longest = max(float(np.quantile(length, 0.999)) for length in self.lengths)
         edges, frames = np.linspace(0, longest, 41), self.chosen(self.data.frames)
         for frame, length, look in zip(frames, self.lengths, FRAME_LOOKS, strict=False):
@@ -88,6 +76,7 @@ class Histogram(OnePanel):
         ax.axvline(cutoff, color="k", lw=0.9, ls=":", label="cut-off")
         ax.set(yscale="log", xlim=(0, longest), ylabel="probability density")
         ax.set(xlabel=r"void segment length / $r_{min}$")
+        ax.legend()
 
 
 def _lengths_of(frame: ScannedFrame) -> FloatArray:
@@ -151,15 +140,8 @@ class Cutoffs(OnePanel):
         """What is drawn of each frame."""
         return [_curve_of(one) for one in self.chosen(self.data.with_lines_of_table)]
 
-    @property
-    def note(self) -> str:
-        """What bands and bars are."""
-        hole = any((np.isfinite(one.alpha) & ~np.isfinite(one.total)).any() for one in self.curves)
-        without = "\n(none where either is not known)" if hole else ""
-        return f"bands: one total standard error, scan and sample{without}\nbars: the scan's part"
-
-    def paint(self, ax: Axes) -> None:
-        """A curve for each frame, and the cut-off of the table."""
+    def draw(self, ax: Axes) -> None:
+        """Draw a curve for each frame, and the cut-off of the table."""
         for one, look in zip(self.curves, FRAME_LOOKS, strict=False):
             band(ax, one.cutoff, 1e3 * one.alpha, 1e3 * one.total, look)
             error = 1e3 * np.nan_to_num(one.error)
@@ -171,13 +153,17 @@ class Cutoffs(OnePanel):
         ax.axhline(0, color="0.6", lw=0.6, zorder=0)
         ax.set(xlabel=r"cut-off / $r_{min}$", ylabel=LABELS["alpha_vs_axial"])
         widen(ax, 1.0)
+        hole = any((np.isfinite(one.alpha) & ~np.isfinite(one.total)).any() for one in self.curves)
+        without = "\n(none where either is not known)" if hole else ""
+        note = f"bands: one total standard error, scan and sample{without}\nbars: the scan's part"
+        ax.legend(title=note)
 
 
 def _curve_of(frame: ScannedFrame) -> CutoffCurve:
     """The lines of the table at other cut-offs, and at its own."""
     # loaded here, as other figures do without compiled kernels
     from scanfab.packing.sample import VARIANTS
-    from scanfab.pipeline.variant_columns import VariantColumns
+    from scanfab.pipeline.frame import VariantColumns
 
     smallest, chosen = frame.smallest, frame.measurement.plan.cutoff
     lengths = {*(cutoff * smallest for cutoff in CUTOFFS), chosen}

@@ -57,7 +57,7 @@ class Map(Figure):
         If there is nothing to draw.
     """
 
-    kind, order = "map", 9
+    kind, order, lettered = "map", 9, False
     columns = ("block", "x", "y", "z", "variant", "alpha_vs_axial")
 
     def __init__(self, data: Any, variant: str | None = None, quantity: str | None = None) -> None:

@@ -123,16 +123,12 @@ def save_figures(path: Path, figures: Sequence[Figure], dpi: int = DPI) -> None:
 @contextmanager
 def drawn_page(figures: Sequence[Figure]) -> Iterator[Page]:
     """Figures below one another, lettered through, in the style of the package."""
-    sizes = [one.size for one in figures]
-    widths, heights = zip(*sizes, strict=True)
+    widths, heights = zip(*(one.size for one in figures), strict=True)
     with new_figure(max(widths), sum(heights)) as page:
         parts: Any = [page]
         if len(figures) > 1:
             parts = page.subfigures(len(figures), 1, height_ratios=heights)
-        lettered = 0
-        for part, one in zip(parts, figures, strict=True):
-            panels = one.panels(part)
-            if one.lettered or len(figures) > 1:
-                letter(panels, lettered)
-                lettered += len(panels)
+        every = [one.panels(part) for part, one in zip(parts, figures, strict=True)]
+        if len(figures) > 1 or figures[0].lettered:
+            letter([axes for panels in every for axes in panels])
         yield page

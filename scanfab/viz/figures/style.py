@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
+from string import ascii_lowercase
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -145,11 +146,11 @@ def widen(axes: Axes, smallest: float) -> None:
         axes.set_ylim(middle - 0.5 * smallest, middle + 0.5 * smallest)
 
 
-def letter(panels: Iterable[Axes], first: int = 0) -> None:
-    """(a), (b) ... above the panels, before their titles; ``first`` panels have letters already."""
-    for place, axes in enumerate(panels, start=first):
-        title = axes.get_title(loc="left")
-        axes.set_title(f"({chr(ord('a') + place)}) {title}".rstrip(), loc="left")
+def letter(panels: Sequence[Axes]) -> None:
+    """Write (a), (b) ... above the panels, before their titles; a lone panel needs no letter."""
+    for axes, sign in zip(panels, ascii_lowercase, strict=False):
+        if len(panels) > 1:
+            axes.set_title(f"({sign}) {axes.get_title(loc='left')}".rstrip(), loc="left")
 
 
 def band(axes: Axes, x: FloatArray, y: FloatArray, error: FloatArray, look: Any) -> None:

@@ -239,7 +239,7 @@ def test_the_parts_of_one_time_are_one_frame(tmp_path, one):
         (("a", "b"), ('timestep="5"', 'timestep="5"'), r"a\.vtp and b\.vtp have the same timestep"),
         (("a", "b"), ('group="g"', 'group="g"'), r"a\.vtp and b\.vtp have the same timestep"),
         (("a", "b"), ('part="0"', 'part="1"'), r"ids|twice"),
-        (("a", "points"), ('part="0"', 'part="1"'), r"points without a radius \(points\.vtp"),
+        (("a", "points"), ('part="0"', 'part="1"'), r"a\.vtp: no radius"),
     ],
 )
 def test_files_that_are_not_parts_of_one_frame_are_refused(tmp_path, names, more, told):
