@@ -60,14 +60,7 @@ MOST_BARS = 15
     is_flag=True,
     help="Leave the dotted line with the slope of the 2017 paper out of the figure correlation.",
 )
-def compare(
-    tables: tuple[str, ...],
-    summary: bool,
-    differences: bool,
-    variants: str | None,
-    no_paper_line: bool,
-    **chosen: Any,
-) -> int:
+def compare(tables: tuple[str, ...], summary: bool, differences: bool, **chosen: Any) -> int:
     """
     Set the variants of fabric tables side by side.
 
@@ -84,15 +77,15 @@ def compare(
     outputs = take_output(chosen, "table")
     if summary and differences:
         raise click.UsageError("--summary and --differences print different tables: choose one")
-    if no_paper_line and outputs.plot is None:
+    if chosen["no_paper_line"] and outputs.plot is None:
         raise click.UsageError("--no-paper-line goes with --plot FILE")
     check_labels(chosen["labels"], tables)
     with usage_errors():
-        variants = variants and parse_variants("variants", variants)
+        variants = parse_variants("variants", chosen["variants"] or "abcd")
         refuse_inputs([outputs.output, outputs.plot], map(Path, tables))
     read = [(table, scanfab.read_rows(table)) for table in tables]
     rows = [row for table in choose_rows(read, chosen["cutoff"], chosen["labels"]) for row in table]
-    if variants is not None:
+    if chosen["variants"] is not None:
         rows = _of_variants(rows, variants)
     comparison = scanfab.compare_tables(rows, strain_max=chosen["strain_max"])
     shown = comparison.frames
@@ -108,7 +101,7 @@ def compare(
         print_comparison(comparison)
     else:
         print_csv(shown, excerpt, shown.columns)
-    draw(outputs, rows, "table", comparison=comparison, paper_line=not no_paper_line)
+    draw(outputs, rows, "table", comparison=comparison, paper_line=not chosen["no_paper_line"])
     return 0 if any(row.alpha_vs_axial is not None for row in comparison.frames) else 1
 
 

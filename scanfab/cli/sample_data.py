@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 
@@ -53,5 +54,5 @@ def _check_target(folder: Path) -> None:
         raise SettingsError(f"{folder}: is a file: name a new or an empty folder")
     elif any(folder.iterdir()):
         raise SettingsError(f"{folder}: is not empty: name a new or an empty folder")
-    else:
-        check_folder(folder / "samples")
+    elif not os.access(folder, os.W_OK):
+        raise SettingsError(f"{folder}: the folder cannot be written to")

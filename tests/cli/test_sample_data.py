@@ -102,9 +102,12 @@ def test_a_folder_that_cannot_be_filled_is_refused_and_kept(
     assert "Missing argument 'DIR'" in ask("sample-data", code=2).told
     (tmp_path / "empty").mkdir()
     monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
-    for name, locked in (("new", tmp_path), ("empty", tmp_path / "empty")):
+    for name, words in (
+        ("new", f"the folder {tmp_path} cannot be written to"),
+        ("empty", "the folder cannot be written to"),
+    ):
         told = ask("sample-data", tmp_path / name, code=2).told
-        assert told.endswith(f"the folder {locked} cannot be written to")
+        assert told.endswith(f"Error: {tmp_path / name}: {words}")
     assert {path.name for path in tmp_path.iterdir()} == {"mine.txt", "empty"}
 
 
