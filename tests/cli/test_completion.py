@@ -28,7 +28,9 @@ INTERACTIVE = {"bash": ["bash", "--norc", "-i"], "zsh": ["zsh", "-f", "-i"]}
 def scripted(shell: str) -> str:
     """The line of the page on the command line that makes a shell complete."""
     page = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
-    (line,) = re.findall(rf"^.*_SCANFAB_COMPLETE={shell}_source scanfab(?:\).*| \| .*)$", page, re.M)
+    (line,) = re.findall(
+        rf"^.*_SCANFAB_COMPLETE={shell}_source scanfab(?:\).*| \| .*)$", page, re.M
+    )
     return f"autoload -Uz compinit; compinit -u -D; {line}" if shell == "zsh" else line
 
 
@@ -47,7 +49,9 @@ def test_a_shell_completes_by_the_line_of_the_page(shell: str, tmp_path: Path) -
         return
     ours, theirs = os.openpty()
     streams = dict.fromkeys(("stdin", "stdout", "stderr"), theirs)
-    with subprocess.Popen(INTERACTIVE[shell], env=env, start_new_session=True, **streams) as process:
+    with subprocess.Popen(
+        INTERACTIVE[shell], env=env, start_new_session=True, **streams
+    ) as process:
         try:
             os.write(ours, f"{scripted(shell)}; echo rea''dy\n".encode())
             read_until(ours, "ready")
