@@ -70,6 +70,8 @@ redirects = {
     "python": "api/index.html",
     "troubleshooting": "messages.html",
 }
+# in the repository, a file of each old name leads to the new page
+exclude_patterns += [f"{name}.md" for name in redirects]
 
 
 def draw_math(self: Any, node: nodes.Element) -> None:

@@ -9,6 +9,7 @@ import pkgutil
 import re
 import shutil
 import sys
+import tomllib
 import warnings
 from importlib import import_module
 from pathlib import Path
@@ -193,6 +194,26 @@ def test_links_between_pages_lead_somewhere(page: Path) -> None:
         # figures and tables are made with the site
         if "://" not in target and "figures/" not in target and "tables/" not in target:
             assert (page.parent / target).exists(), target
+
+
+def test_old_names_of_pages_lead_to_the_new_pages_in_the_repository_and_on_the_site() -> None:
+    conf = (DOCS / "conf.py").read_text("utf-8")
+    moved = ast.literal_eval(re.findall(r"^redirects = (\{.*?^\})", conf, re.M | re.S)[0])
+    assert len(moved) == 9
+    for name, target in moved.items():
+        text = (DOCS / f"{name}.md").read_text("utf-8")
+        assert f"]({target.replace('.html', '.md')})" in text
+
+
+def test_the_conda_recipe_asks_for_the_packages_of_the_project() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    wanted = [*project["build-system"]["requires"], *project["project"]["dependencies"]]
+    wanted = [one.split(";")[0].replace("matplotlib", "matplotlib-base") for one in wanted]
+    recipe = (ROOT / ".ci" / "conda" / "recipe.yaml").read_text("utf-8")
+    asked = re.findall(r"^    - ([\w.-]+ >=[\d.]+)$", recipe, re.MULTILINE)
+    assert sorted(one.replace(" ", "") for one in asked) == sorted(wanted)
+    python = project["project"]["requires-python"].removeprefix(">=")
+    assert f'python_min: "{python}"' in recipe
 
 
 def test_every_option_is_documented_once_and_the_pages_speak_of_no_others(
