@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -32,6 +33,7 @@ def write_table(
     ``kind`` is the class of the table's settings. If a ``frame`` is given, every series must have
     it.
     """
+    from scanfab.io.follow import FollowedSeries
     from scanfab.pipeline.job import Job
     from scanfab.viz.paraview import vtk_folders
 
@@ -49,16 +51,9 @@ def write_table(
             raise click.UsageError(words)
     reading, settings = checked(chosen, kind)
     excerpt = excerpt_of(outputs, settings.columns)
-    follows = outputs.follow or outputs.follow_for is not None
-    if follows and (len(sources) > 1 or "-" in sources):
-        raise click.UsageError("--follow takes one folder, or one file that grows")
-    if follows:
-        followed = scanfab.follow_series(sources[0], seconds=outputs.follow_for, **reading)
-        series: list[Series] = [followed]
-    else:
-        series = open_series(sources, reading)
+    series = _open(sources, reading, outputs)
     for one in series if frame is not None else ():
-        if frame not in range(-len(one), len(one)):
+        if not isinstance(one, FollowedSeries) and frame not in range(-len(one), len(one)):
             has = f"{one.name} has {len(one)}, counted from 0"
             raise click.UsageError(f"--frame: there is no frame {frame}: {has}")
     drawing = _Drawing(outputs, figures)
@@ -89,12 +84,22 @@ def write_table(
                 executor=executor,
             )
             stack.enter_context(job.begun(drawing.needed))
-        if follows:
-            stack.enter_context(ending_in_order(followed.end))
-            followed.idle = lambda: drawing.redraw(job)
+        for one in series:
+            if isinstance(one, FollowedSeries):
+                stack.enter_context(ending_in_order(one.end))
+                one.idle = lambda: drawing.redraw(job)
         _write(job, excerpt)
     drawing.draw(job)
     return 0 if job.is_good else 1
+
+
+def _open(sources: tuple[str, ...], reading: dict[str, Any], outputs: Output) -> Sequence[Series]:
+    """The series that the sources name, or the one that is followed."""
+    if not outputs.follow and outputs.follow_for is None:
+        return open_series(sources, reading)
+    if len(sources) > 1 or "-" in sources:
+        raise click.UsageError("--follow takes one folder, or one file that grows")
+    return [scanfab.follow_series(sources[0], seconds=outputs.follow_for, **reading)]
 
 
 class _Drawing:

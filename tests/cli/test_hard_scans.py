@@ -46,10 +46,10 @@ def solid_in_ball(position, radius, reach):
 
 
 def test_many_grains_at_nearly_one_place_end_as_their_union():
-    """20,000 grains within a hair of one another: whole, no gap; in the RV no void."""
+    """2,000 grains within a hair of one another: whole, no gap; in the RV no void."""
     random = np.random.default_rng(2)
-    position = random.normal(size=(20_000, 3)) * 1e-6
-    packing = Packing(position, random.uniform(0.5, 1.5, 20_000), contacts=[[0, 1]])
+    position = random.normal(size=(2_000, 3)) * 1e-6
+    packing = Packing(position, random.uniform(0.5, 1.5, 2_000), contacts=[[0, 1]])
     with pytest.warns(ScanfabWarning, match="no void segment reaches the cut-off"):
         rows = compute(packing, variants="ac", tolerance=1e-2)
     assert [row.segments for row in rows] == [0, 0]

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from scanfab.base.errors import ReadError
 from scanfab.cli import group, main
 from tests.helpers.interruptions import PROGRAM
 from tests.helpers.truth import TRIAXIAL
@@ -16,13 +17,8 @@ from tests.helpers.truth import TRIAXIAL
 FAST = ["--directions", "9", "--spacing", "1rmin", "--boundary", "mask=3"]
 
 
-def scanfab(*args: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [*PROGRAM, *map(str, args)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
-
-
-def test_version_is_the_package_s() -> None:
-    assert scanfab("--version").stdout == f"scanfab {version('scanfab')}\n"
+def test_version_is_the_package_s(ask) -> None:
+    assert ask("--version").out == f"scanfab {version('scanfab')}\n"
 
 
 def test_help_lists_every_command_and_imports_no_heavy_package() -> None:
@@ -38,24 +34,23 @@ def test_help_lists_every_command_and_imports_no_heavy_package() -> None:
         assert f"\n  {command} " in answer.stdout
 
 
-def test_unreadable_source_is_exit_code_1_and_debug_shows_why(tmp_path: Path) -> None:
+def test_unreadable_source_is_exit_code_1_and_debug_shows_why(ask, tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("nothing\n")
-    answer = scanfab("compute", tmp_path)
-    assert answer.returncode == 1
-    assert answer.stderr.startswith("scanfab: error: ")
-    assert "no reader knows this format" in answer.stderr
-    assert answer.stdout == ""
-    assert "Traceback" in scanfab("--debug", "compute", tmp_path).stderr
+    answer = ask("compute", tmp_path, code=1)
+    assert answer.err.startswith("scanfab: error: ")
+    assert "no reader knows this format" in answer.err
+    assert answer.out == ""
+    with pytest.raises(ReadError, match="no reader knows this format"):
+        main.run(["compute", str(tmp_path), "--debug"])
 
 
-def test_results_go_to_standard_output_and_words_to_standard_error() -> None:
-    answer = scanfab("compute", TRIAXIAL, "--frames", "0", *FAST)
-    assert answer.returncode == 0
-    lines = answer.stdout.splitlines()
+def test_results_go_to_standard_output_and_words_to_standard_error(ask) -> None:
+    answer = ask("compute", TRIAXIAL, "--frames", "0", *FAST)
+    lines = answer.out.splitlines()
     assert lines[0].startswith("source,frame,step,time,strain,variant,grains")
     assert len(lines) == 5
-    assert "skipped" in answer.stderr
-    assert "\x1b" not in answer.stdout + answer.stderr
+    assert "skipped" in answer.err
+    assert "\x1b" not in answer.out + answer.err
 
 
 def test_cell_takes_three_or_six_numbers(ask, tmp_path: Path) -> None:

@@ -71,7 +71,7 @@ def refused(tmp_path, capsys):
     return refused
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("suffix", [".csv", ".json", ".parquet"])
 def test_the_bytes_are_those_of_one_run(series, tmp_path, suffix):
     """A job that no frame was left for has a table without rows."""
     words = ("--with", "harmonics", "--digits", "9")
@@ -201,11 +201,7 @@ def test_a_file_that_has_changed_between_jobs_is_named(parts, refused):
     ("place", "value", "said"),
     [
         (("inputs", 0), 5, "expected a manifest of scanfab compute"),
-        (
-            ("settings", "strain"),
-            "gone.csv",
-            "the settings of the manifest cannot be used: strain: ",
-        ),
+        (("settings", "strain"), "gone.csv", "settings of the manifest cannot be used: strain: "),
     ],
 )
 def test_a_manifest_that_cannot_be_used_is_named(parts, refused, place, value, said):

@@ -62,7 +62,8 @@ def test_discs_in_a_row_that_overlap():
 def test_it_stands_beside_the_sheared_sample():
     """A real, periodic run: without a cut-off within 15 % where there is anisotropy, as at 0.1."""
     series = scanfab.read_series("sample_data/liggghts_periodic")
-    table = scanfab.compute(series, cutoffs="0,0.1rmin,1rmin", variants="a", tolerance=1e-4)
+    words = {"variants": "a", "tolerance": 2e-4, "frames": "::2"}
+    table = scanfab.compute(series, cutoffs="0,0.1rmin,1rmin", **words)
     for row in table:
         smallest = table[2]["cutoff"]
         if row["cutoff"] > LONGEST_GAP * smallest:

@@ -96,7 +96,7 @@ def test_values_are_kept_as_they_are_meant():
     ("option", "values"),
     [
         ("variants", ["", "abe", "a,b", None]),
-        ("rv", [0, -0.5, NAN, INF, "wide", None]),
+        ("rv", [0, -0.5, NAN, INF, "wide", None, "", "0.4,0.4", "0.4,x", [0.4, -1], [0.4, NAN]]),
         ("rv_radius", [0, -1, NAN, "a"]),
         ("rv_center", [(0, 0, NAN), (0, 0, INF), (0, 0), (0, 0, 0, 0), 5, "1,2"]),
         ("rv_size", ["1,0,3", "1,-1,3", "1,nan,3", "1", "a", 5, ""]),
@@ -160,6 +160,7 @@ def test_a_strain_file_must_exist(tmp_path):
         ({"rv_shape": "ellipsoid", "rv_radius": 2.0}, "rv_radius: .* `rv_shape` is ellipsoid"),
         ({"rv_shape": "box", "rv_axis": "x"}, "rv_axis: .* choose `rv_shape=.cylinder.`"),
         ({"rv": "0.4,0.5", "rv_radius": 1}, "rv_radius: .* `rv` asks for 2"),
+        ({"rv": [0.4, 0.5], "rv_shape": "box", "rv_size": "1,2,3"}, "rv_size: .*`rv` asks for 2"),
     ],
 )
 def test_settings_must_go_together(options, words):

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from scanfab import Packing, ScanfabWarning, Settings, SettingsError, compute, find_contacts
+from scanfab import Packing, ScanfabWarning, Settings, compute, find_contacts
 from tests.helpers.lattices import ball_points
 
 FIXED = {"spacing": "0.3rmin", "directions": "lebedev:5", "workers": 1, "cutoff": "0.5rmin"}
@@ -104,12 +104,3 @@ def test_doubts_name_the_rv(ball):
     told = [str(one.message) for one in caught]
     assert any("variant c (RV 0.4): no void segment" in one for one in told), told
     assert any("variant c (RV 0.7): 10% of the directions" in one for one in told), told
-
-
-@pytest.mark.parametrize("wrong", ["0.4,0.4", "0.4,x", "", [0.4, -1], [0.4, float("nan")]])
-def test_sizes_that_cannot_be(wrong):
-    with pytest.raises(SettingsError, match=r"^rv: expected (a fraction above|fractions that d)"):
-        Settings(rv=wrong)
-    for one in ({"rv_radius": 2.0}, {"rv_shape": "box", "rv_size": "1,2,3"}):
-        with pytest.raises(SettingsError, match="`rv` asks for 2"):
-            Settings(rv=[0.4, 0.5], **one)
