@@ -48,13 +48,6 @@ def test_contacts_of_a_file_with_many_snapshots_are_found_by_step(tmp_path):
     assert [len(frame.contacts) for frame in frames_of(tmp_path)] == [2, 0, 1]
 
 
-def test_contacts_of_another_step_are_not_taken(tmp_path):
-    write(tmp_path / "dump.txt", dump_text(step=9))
-    write(tmp_path / "pairs.txt", pairs_text(step=10))
-    with pytest.warns(ScanfabWarning, match="no contact file for step 9"):
-        assert frames_of(tmp_path)[0].contacts is None
-
-
 def test_a_single_contact_file_in_a_format_without_steps_belongs_to_the_single_frame(tmp_path):
     shutil.copy(FLOOR / "pairs_pos_id_force_30000.vtk", tmp_path / "lines_8.vtk")
     packing = scanfab.read(FLOOR / "tutorial.txt", contacts=tmp_path / "lines_8.vtk")

@@ -19,7 +19,7 @@ from tests.helpers.dumps import (
     yade_lines,
     yade_spheres,
 )
-from tests.helpers.truth import BOX, CELL, SHEAR, YADE, csv_rows, id_pairs
+from tests.helpers.truth import BOX, CELL, OF_SHEAR, SHEAR, YADE, csv_rows, id_pairs
 
 
 def joined(tmp_path, local, rows=ROWS, columns=None, format=None, **options):
@@ -50,6 +50,7 @@ def test_no_contacts_at_all_are_an_empty_list(tmp_path, rows, format):
     assert (len(packing.contacts), packing.contacts.source) == (0, "file")
 
 
+SHEAR_PAIRS = SHEAR / "pairs.0.local.gz"
 NAMED = "id1=c_con[2],id2=c_con[4],fx=c_con[5],fy=c_con[6],fz=c_con[7]"
 APART = [*ROWS[:2], (3, 2, 0.61, 0.5, 0.5, 0.1)]
 
@@ -148,10 +149,6 @@ def test_contacts_that_are_cut_in_their_header_are_an_error(tmp_path, source):
     assert scanfab.read(tmp_path / source, contacts="geometric").contacts is None
 
 
-LAMMPS = (
-    "id1=c_ids[1],id2=c_ids[2],fx=c_pair[3],fy=c_pair[4],fz=c_pair[5],"
-    "tx=c_pair[6],ty=c_pair[7],tz=c_pair[8]"
-)
 
 
 def on_each_grain(packing):
@@ -228,10 +225,7 @@ def test_of_walls_whose_columns_are_not_proved_the_force_is_not_known(tmp_path):
     ("grains", "options"),
     [
         (CELL / "dump_30000.txt.gz", {"contacts": CELL / "contacts_30000.txt.gz"}),
-        (
-            SHEAR / "shear.0.lammpstrj.gz",
-            {"contacts": SHEAR / "pairs.0.local.gz", "contact_columns": LAMMPS},
-        ),
+        (SHEAR / "shear.0.lammpstrj.gz", {"contacts": SHEAR_PAIRS, "contact_columns": OF_SHEAR}),
         (YADE / "periodic.xml.bz2", {}),
     ],
 )

@@ -106,6 +106,9 @@ def test_users_say_what_columns_are_in_a_text_of_any_ending(tmp_path, capsys):
     assert_right(packing)
     np.testing.assert_array_equal(packing.columns["4"], 2 * RADIUS)
     np.testing.assert_array_equal(packing.columns["type"], ID)
+    pairs = {"contacts": rows(tmp_path / "pairs", ID[PAIRS]), "contact_columns": "id1=1,id2=2"}
+    packing = scanfab.read(path, columns="x=1,y=2,z=3,diameter=4,id=6", **pairs)
+    assert {*map(tuple, packing.contacts.pairs.tolist())} == {*map(tuple, PAIRS.tolist())}
     path = write(tmp_path / "pack.out", "made by hand\n" + path.read_text())
     assert_right(read(path, skip=1, columns="x=1,y=2,z=3,diameter=4"))
     assert run(["inspect", f"{path}", "--skip=1", "--columns=x=1,y=2,z=3,radius=5", "--json"]) == 0
@@ -312,9 +315,8 @@ def test_tables_beside_dumps_are_skipped_unless_they_are_named(tmp_path):
     dump = write(tmp_path / "dump_5.txt", dump_text(step=5))
     table = write(tmp_path / "table_5.csv", "id,x,y,z,radius\n1,0,0,0,1\n")
     pairs = write(tmp_path / "pairs_5.csv", "id1,id2\n1,2\n")
-    with pytest.warns(
-        ScanfabNote, match=r"skipped pairs_5\.csv, table_5\.csv: they hold results or other tables"
-    ):
+    told = r"skipped pairs_5\.csv, table_5\.csv: they hold results or other tables"
+    with pytest.warns(ScanfabNote, match=told):
         series = scanfab.read_series(tmp_path)
     assert (len(series[0].read()), series.contacts) == (3, ())
     assert len(read(table)) == 1

@@ -117,9 +117,7 @@ def test_forces_whose_grain_is_in_doubt_and_arrays_of_other_names_are_left_out(t
     with pytest.warns(ScanfabWarning, match=r"lines\.vtp: the forces are left out: 67% of them"):
         assert scanfab.read(spheres, contacts=contacts).contacts.force is None
     polydata(contacts, cells={"normal_force": np.ones(3), "ContactForce": PUSH, "kn": np.ones(3)})
-    with pytest.warns(
-        ScanfabNote, match=r"contact arrays that are not read: \w+, \w+: only a vector"
-    ):
+    with pytest.warns(ScanfabNote, match=r"arrays that are not read: \w+, \w+: only a vector"):
         assert scanfab.read(spheres, contacts=contacts).contacts.force is None
 
 
@@ -189,9 +187,7 @@ def test_files_elsewhere_are_not_read(tmp_path, name, kind):
     else:
         tag, key = ("Piece", "Source") if kind == "PPolyData" else ("DataSet", "file")
         path = listing(folder / "a.pvd", kind, tag, key, [name], 'timestep="0"')
-    with pytest.raises(
-        ReadError, match=r"which is outside the folder of this file|not well-formed"
-    ):
+    with pytest.raises(ReadError, match=r"outside the folder of this file|not well-formed"):
         next(iter(scanfab.read_series(path, radius=1.0))).read()
 
 
