@@ -10,6 +10,7 @@ import pytest
 import scanfab
 from scanfab import ReadError
 from tests.helpers.dumps import (
+    refuses,
     PAIRS,
     ROWS,
     dump_text,
@@ -144,8 +145,7 @@ def test_contacts_by_id_need_ids_in_the_grain_file(tmp_path):
 def test_contacts_that_are_cut_in_their_header_are_an_error(tmp_path, source):
     write(tmp_path / "dump_0.txt", dump_text())
     write(tmp_path / "pairs_0.txt", pairs_text()[:60])
-    with pytest.raises(ReadError, match=r"pairs_0.txt.*incomplete.*`contacts=\"geometric\"`"):
-        scanfab.read(tmp_path / source)
+    refuses(tmp_path / source, r"pairs_0.txt.*incomplete.*`contacts=\"geometric\"`")
     assert scanfab.read(tmp_path / source, contacts="geometric").contacts is None
 
 
@@ -262,5 +262,4 @@ def test_a_file_with_another_number_of_forces_is_refused(tmp_path):
     position = [[0, 0, 0], [1.9, 0, 0]]
     spheres = yade_spheres(tmp_path / "a-spheres-0.vtk", position, [1, 1], id=[5, 6])
     lines = yade_lines(tmp_path / "a-intrs-0.vtk", [position], {"force": [[2, 0, 0]] * 2})
-    with pytest.raises(scanfab.ScanfabError, match=r"a-intrs-0\.vtk"):
-        scanfab.read(spheres, contacts=lines)
+    refuses(spheres, r"a-intrs-0\.vtk", error=scanfab.ScanfabError, contacts=lines)

@@ -12,7 +12,7 @@ from scanfab import ReadError, ScanfabWarning
 from scanfab.io.formats import binary_dump as binary
 from scanfab.io.reader import reader_for, reader_named
 from scanfab.testing import check_reader
-from tests.helpers.dumps import NAMES, ROWS, binary_dump, write
+from tests.helpers.dumps import NAMES, ROWS, binary_dump, refuses, write
 from tests.helpers.made.lammps import netcdf, yaml_text
 from tests.helpers.truth import OF_SHEAR, SHEAR, id_pairs, lammps_fabric, off_by
 
@@ -125,11 +125,9 @@ def test_netcdf(tmp_path):
 
 
 def test_netcdf_that_cannot_be_read(tmp_path, monkeypatch):
-    with pytest.raises(ReadError, match="coordinates was not written for all atoms"):
-        scanfab.read(netcdf(tmp_path / "a.nc", axes=2), frame=0)
+    refuses(netcdf(tmp_path / "a.nc", axes=2), "coordinates was not written for all atoms", frame=0)
     monkeypatch.setattr(binary, "find_spec", lambda name: None)
-    with pytest.raises(ReadError, match=r'pip install "scanfab\[netcdf\]"'):
-        scanfab.read(tmp_path / "a.nc")
+    refuses(tmp_path / "a.nc", r'pip install "scanfab\[netcdf\]"')
 
 
 def test_the_kit(tmp_path):
@@ -204,5 +202,4 @@ ONE, BLOCK = binary_dump(names=NAMES), struct.pack("<i", 18)
     ],
 )
 def test_what_cannot_be_read_is_told(tmp_path, data, told):
-    with pytest.raises(ReadError, match=rf"dump.bin.*{told}"):
-        scanfab.read(written(tmp_path, data))
+    refuses(written(tmp_path, data), rf"dump.bin.*{told}")

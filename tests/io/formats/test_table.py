@@ -15,7 +15,7 @@ import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.cli.main import run
 from scanfab.io.reader import reader_for
-from tests.helpers.dumps import dump_text, pairs_text, write
+from tests.helpers.dumps import dump_text, pairs_text, refuses, write
 
 # sixty-four equal spheres that touch along the axes
 GRID = np.stack(np.meshgrid(*[np.arange(4.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
@@ -155,8 +155,7 @@ ROWS = "0,0,0,0.5,7\n1,0,0,0.5,7\n"
     ],
 )
 def test_a_column_that_serves_twice_is_named(tmp_path, names, columns, twice):
-    with pytest.raises(ReadError, match=f"the column {twice}"):
-        scanfab.read(write(tmp_path / "g.csv", names + ROWS), columns=columns)
+    refuses(write(tmp_path / "g.csv", names + ROWS), f"the column {twice}", columns=columns)
 
 
 @pytest.mark.parametrize(
@@ -330,8 +329,7 @@ def test_a_table_without_names_beside_others_is_a_frame_only_if_the_format_is_na
     write(tmp_path / "energy.txt", "0 1 2 0.1\n0 2 3 0.1\n")
     with pytest.warns(ScanfabNote, match=r"skipped energy\.txt"):
         assert len(scanfab.read_series(tmp_path)[0].read()) == 64
-    with pytest.raises(ReadError, match="several series"):
-        scanfab.read_series(tmp_path, format="table")
+    refuses(tmp_path, "several series", format="table")
     (tmp_path / "grains.csv").unlink()
     assert len(scanfab.read_series(tmp_path)[0].read()) == 2
 

@@ -11,7 +11,7 @@ import pytest
 import scanfab
 from scanfab.base.errors import ReadError
 from scanfab.io.reader import reader_for
-from tests.helpers.dumps import write, yade_lines, yade_spheres
+from tests.helpers.dumps import refuses, write, yade_lines, yade_spheres
 from tests.helpers.truth import (
     SIX_DIGITS,
     YADE,
@@ -120,8 +120,7 @@ def test_normal_and_shear_force_add_up(tmp_path):
 def test_a_contact_through_a_face_without_a_cell_asks_for_it(tmp_path):
     # away from the file of the cell
     spheres = shutil.copy(YADE / PERIODIC_SPHERES, tmp_path)
-    with pytest.raises(scanfab.PackingError, match="name its cell"):
-        scanfab.read(spheres, contacts=YADE / PERIODIC_INTRS)
+    refuses(spheres, "name its cell", error=scanfab.PackingError, contacts=YADE / PERIODIC_INTRS)
 
 
 @pytest.mark.parametrize(
@@ -170,5 +169,4 @@ def test_attributes_have_the_names_of_the_second_line_or_are_numbered(tmp_path):
     ],
 )
 def test_a_text_that_cannot_be_read_says_why(tmp_path, text, message):
-    with pytest.raises(ReadError, match=message):
-        scanfab.read(write(tmp_path / "a.txt", text))
+    refuses(write(tmp_path / "a.txt", text), message)
