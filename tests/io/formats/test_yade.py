@@ -160,7 +160,7 @@ def test_attributes_have_the_names_of_the_second_line_or_are_numbered(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("#format x_y_z_r\n1 2 3\n", "first line names 4 columns, the rows have 3"),
+        ("#format x_y_z_r\n1 2 3\n", "line 1 names 4 columns, but the rows have 3"),
         ("#format x_y_z_r\n1 2 3 oops\n", "a.txt, line 2: .*oops"),
         ("#format x_y_z_r\n1 2 3 1\n1 2 3\n", "a.txt, line 3: expected 4 columns"),
         ("#format x_y_z_r\n# a comment\n0 0 0 1\n3 x 0 1\n", "a.txt, line 4: .*'x'"),
