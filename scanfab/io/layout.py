@@ -90,7 +90,8 @@ def text_table(path: Path, skip: int) -> TextTable:
     # rows below a line of names are checked later, when the table is read
     for number, row in zip(numbers if names is None else (), rows, strict=False):
         if len(row) != width:
-            raise ReadError(f"{path}, line {number + 1}: expected {width} columns, found {len(row)}")
+            wrong = f"expected {width} columns as above, found {len(row)}"
+            raise ReadError(f"{path}, line {number + 1}: {wrong}")
     if width > 1 and len(names or ()) != width and rows and not any(row[-1] for row in rows):
         width -= 1  # each row ends with a separator
     own = names or [f"{place + 1}" for place in range(width)]

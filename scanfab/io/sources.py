@@ -298,7 +298,8 @@ def _choose_contacts(
         families, own = sorting.contacts_beside(grains, around, options)
     in_grains = getattr(grains.reader, "lists_contacts", False)
     if contacts == "file" and not (own or in_grains):
-        raise ReadError(f'{grains.pattern}: there is no contact file, which `contacts="file"` needs')
+        lacks = 'there is no contact file, which `contacts="file"` needs'
+        raise ReadError(f"{grains.pattern}: {lacks}")
     if contacts == "file":
         return own, "path" if own else "grains"
     if own:

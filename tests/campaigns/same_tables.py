@@ -52,8 +52,8 @@ WANTED: dict[str, str] = {
     r"column radius_of_dump: None|column radius: .* -> None": "a column beside the named radius",
     r"tesis_particles_0\.vtk \[0\]: column": "without rows a column has no kind",
     r"\.csv: other order of columns$": "the parts of the jackknife come last",
-    r"(auto|triaxial|cutoffs|oblique|discs)\.csv row \d+ (lines|segments|gvs_axis|coaxiality)": "an "
-    "automatic scan of a and b, and another of c and d",
+    r"(auto|triaxial|cutoffs|oblique|discs)\.csv row \d+ (lines|segments|gvs_axis|coax)": "a and b "
+    "have an automatic scan of their own, c and d another",
     r"^(compared_\w+|one_cutoff)\.csv row": "made of tables of automatic scans",
     r"row \d+ alpha_vs_axial_(without|half|sample_se)": "the sample's error has a scan of its own",
     r"surface\.csv row \d+ window_alpha": "exact for a shape from a file",

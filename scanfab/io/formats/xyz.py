@@ -108,7 +108,7 @@ def _head(path: Path, text: bytes) -> Head:
     """Parse the first two lines of a frame."""
     lines, count = text[:HEAD].split(b"\n", 2), COUNT.match(text)
     if count is None or len(lines) < 3:
-        raise ReadError(f"{path}: expected a count and a line with Properties=, found {spelt(text)}")
+        raise ReadError(f"{path}: expected a count and Properties=, found {spelt(text)}")
     pairs = PAIR.findall(lines[1].decode("utf-8", "replace"))
     words = {key.lower(): quoted or bare for key, quoted, bare in pairs}
     if "properties" not in words:
