@@ -198,8 +198,7 @@ def lacking(plugin: object) -> str | None:
 def plugin_named(offers: Mapping[str, Offer], what: str, name: str) -> Any:
     """The ``reader`` or ``writer`` that a user names; UnknownFormatError lists those that exist."""
     if name not in offers:
-        listed = f"the {what}s are {', '.join(offers)}"
-        raise UnknownFormatError(f"there is no {what} called {name!r}; {listed}")
+        raise UnknownFormatError(f"there is no {what} called {name!r}, only {', '.join(offers)}")
     advice = lacking(offers[name].plugin)
     if advice is not None:
         raise UnknownFormatError(f"{name} needs another package: {advice}")

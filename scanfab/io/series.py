@@ -206,8 +206,7 @@ class Series:
             self.known.space = first_space
         own, decided = space_of(position), self.known.space
         if own.is_plane and not decided.is_plane:
-            all_one = "`dim=2` reads all as discs, `dim=3` all as spheres"
-            raise PackingError(f"{other_space(own, decided)}; {all_one}")
+            raise PackingError(f"{other_space(own, decided)}; `dim=2` or `dim=3` chooses for all")
         return decided
 
     def _centres_before(self, number: int) -> Iterator[FloatArray]:

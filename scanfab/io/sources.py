@@ -165,8 +165,7 @@ def read_series(
         source = [source]
     given = list(source)
     if not given or not all(isinstance(path, str | os.PathLike) for path in given):
-        expected = "the path of a folder or file, or several of files"
-        raise unusable("source", expected, arguments["source"])
+        raise unusable("source", "the path of a folder or file, or files", arguments["source"])
     with unpacking_up_to(options.max_unpacked):
         series = _series(named_once(given), contacts, options)
     return replace(series, cells=cells, reading=reading, dim=dim)

@@ -80,12 +80,7 @@ def curves_of(rows: Iterable[Mapping[str, Any]]) -> list[Curve]:
     groups = groups_of(rows)
     names = short_names(source for source, _ in groups)
     return [
-        Curve(
-            names[source],
-            variant,
-            factor * _drawable(column_of(group, abscissa)),
-            group,
-        )
+        Curve(names[source], variant, factor * _drawable(column_of(group, abscissa)), group)
         for (source, variant), group in groups.items()
     ]
 

@@ -257,10 +257,8 @@ def format_of(path: Path) -> TableFormat:
     own = {form.suffix: form for form in OWN_FORMATS}
     table_format = own.get(suffix) or known_formats().get(suffix)
     if table_format is None:
-        raise SettingsError(
-            f"{path}: results can be written as {', '.join(known_formats())}, "
-            f"not as {path.suffix or 'a file without a suffix'}"
-        )
+        listed, found = ", ".join(known_formats()), path.suffix or "a file without a suffix"
+        raise SettingsError(f"{path}: results can be written as {listed}, not as {found}")
     return table_format
 
 
@@ -307,8 +305,5 @@ def read_rows(path: Path | str, *, whole: bool = False) -> list[dict[str, Any]]:
     table_format = next(form for form in (*others, *reversed(OWN_FORMATS)) if form.recognises(data))
     rows = table_format.read(data, str(path))
     if whole and table_format.is_text and not data.endswith(b"\n"):
-        raise ReadError(
-            f"{path}: the last line has no line end, so the file may be cut off: copy it again, or "
-            f"remove it and run its command again"
-        )
+        raise ReadError(f"{path}: the last line has no line end, so the file may be cut off")
     return rows

@@ -71,10 +71,7 @@ def choose_rows(
     """
     named = [(str(name), [dict(row) for row in rows]) for name, rows in tables]
     if labels and len(labels) != len(named):
-        raise SettingsError(
-            f"labels: expected one name for each table, in the same order: found {len(labels)} for "
-            f"{len(named)}"
-        )
+        raise SettingsError(f"labels: found {len(labels)} for {len(named)}, expected one a table")
     for number, (name, rows) in enumerate(named):
         for row in rows:
             if row.get("source", "") is None:
@@ -124,9 +121,7 @@ def _of_cutoff(name: str, rows: Rows, cutoff: float) -> Rows:
     nearest = min(cutoffs, key=lambda value: abs(value - cutoff), default=math.nan)
     if not abs(nearest - cutoff) <= ROUNDING * abs(nearest):
         listed = ", ".join(f"{value:.3g}" for value in cutoffs) or "none in this table"
-        raise SettingsError(
-            f"{name}: no row has the cut-off {cutoff:g}: expected a cut-off of the table: {listed}"
-        )
+        raise SettingsError(f"{name}: no row has the cut-off {cutoff:g}: found {listed}")
     kept: dict[tuple[Any, ...], dict[str, Any]] = {}
     for place, row in enumerate(rows):
         if row.get("cutoff") == nearest:

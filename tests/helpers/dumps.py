@@ -7,7 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+import scanfab
+from scanfab.base.errors import ReadError, ScanfabError
 from tests.helpers.lattices import shaken_cubic
 
 UNIT_BOX = ((0, 1), (0, 1), (0, 1))
@@ -200,3 +203,9 @@ def _scalars(arrays) -> str:
         + "".join(f"{float(value)!r}\n" for value in values)
         for name, values in arrays.items()
     )
+
+
+def refuses(source, told: str, *, error: type[ScanfabError] = ReadError, **options) -> None:
+    """Reading a file or series ends in an error with these words."""
+    with pytest.raises(error, match=told):
+        scanfab.read(source, **options)

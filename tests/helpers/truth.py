@@ -15,6 +15,11 @@ TRIAXIAL = SAMPLE_DATA / "yade_triaxial"
 BOX = SAMPLE_DATA / "liggghts_box"
 CELL = SAMPLE_DATA / "liggghts_periodic"
 SHEAR = SAMPLE_DATA / "lammps_shear"
+# the meaning of the columns in its lists of pairs
+OF_SHEAR = (
+    "id1=c_ids[1],id2=c_ids[2],fx=c_pair[3],fy=c_pair[4],fz=c_pair[5],"
+    "tx=c_pair[6],ty=c_pair[7],tz=c_pair[8]"
+)
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 

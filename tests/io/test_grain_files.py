@@ -12,7 +12,7 @@ import pytest
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote
 from scanfab.cli.main import run
-from tests.helpers.dumps import PAIRS, dump_text, local_text, pairs_text, write
+from tests.helpers.dumps import PAIRS, dump_text, local_text, pairs_text, refuses, write
 from tests.helpers.truth import SAMPLE_DATA
 
 NO_RADIUS = "id type x y z c_rad"
@@ -70,8 +70,7 @@ def test_points_are_named_behind_the_series_that_have_a_radius(tmp_path):
     series(tmp_path, "ex_dump", "ex_contacts", 9)
     write(tmp_path / "ex_points_9.txt", dump_text(step=9, names=NO_RADIUS))
     write(tmp_path / "other_7.txt", dump_text(step=7))
-    with pytest.raises(ReadError, match=r"(?s)ex_dump_9.*other_7.*ex_points_9.txt; it has no rad"):
-        scanfab.read_series(tmp_path)
+    refuses(tmp_path, r"(?s)ex_dump_9.*other_7.*ex_points_9.txt; it has no rad")
     assert contacts_of(tmp_path / "ex_dump_9.txt") == [2]
 
 
@@ -87,8 +86,7 @@ def test_a_fabric_table_is_known(tmp_path, ending, capsys):
 
 def test_folders_below_are_named_where_there_is_no_dump(folder):
     for _ in range(2):
-        with pytest.raises(ReadError, match=r"holds no dumps, only folders: name .*dumps"):
-            scanfab.read_series(folder.parent)
+        refuses(folder.parent, r"holds no dumps, only folders: name .*dumps")
         write(folder.parent / "notes.txt", "hello\n")
 
 
@@ -107,8 +105,7 @@ def test_globs_in_quotes_are_expanded(folder, capsys):
 def test_contacts_that_cannot_be_read_say_how_to_leave_them_alone(folder, beside):
     write(folder / "contacts_9.txt", pairs_text([(1, 77)], step=9))
     message = r'contacts_9.txt: no two columns.*`contacts="geometric"` ignores it'
-    with pytest.raises(ReadError, match=message):
-        scanfab.read(folder / "dump_9.txt" if beside else folder)
+    refuses(folder / "dump_9.txt" if beside else folder, message)
 
 
 def test_what_editors_leave_is_no_frame(folder):
@@ -159,8 +156,7 @@ def test_a_cut_file_that_may_be_the_contacts_is_an_error(tmp_path, beside):
         text = gzip.decompress(file.read_bytes())
         (tmp_path / f"rec-{name}-0.vtk").write_bytes(text[: 300 if name == "intrs" else None])
     source = tmp_path / "rec-spheres-0.vtk" if beside else tmp_path
-    with pytest.raises(ReadError, match=r'rec-intrs-0.vtk.*`contacts="geometric"` ignores it'):
-        scanfab.read(source)
+    refuses(source, r'rec-intrs-0.vtk.*`contacts="geometric"` ignores it')
     assert scanfab.read(source, contacts="geometric").contacts is None
 
 

@@ -11,7 +11,7 @@ import pytest
 import scanfab
 from scanfab.base.errors import NoFrameError, ReadError, ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.io.formats.liggghts import LiggghtsReader
-from tests.helpers.dumps import PAIRS, dump_text, pairs_text, write
+from tests.helpers.dumps import PAIRS, dump_text, pairs_text, refuses, write
 from tests.helpers.truth import FLOOR, id_pairs
 
 STEPS = (9, 10, 100)
@@ -48,13 +48,6 @@ def test_contacts_of_a_file_with_many_snapshots_are_found_by_step(tmp_path):
     assert [len(frame.contacts) for frame in frames_of(tmp_path)] == [2, 0, 1]
 
 
-def test_contacts_of_another_step_are_not_taken(tmp_path):
-    write(tmp_path / "dump.txt", dump_text(step=9))
-    write(tmp_path / "pairs.txt", pairs_text(step=10))
-    with pytest.warns(ScanfabWarning, match="no contact file for step 9"):
-        assert frames_of(tmp_path)[0].contacts is None
-
-
 def test_a_single_contact_file_in_a_format_without_steps_belongs_to_the_single_frame(tmp_path):
     shutil.copy(FLOOR / "pairs_pos_id_force_30000.vtk", tmp_path / "lines_8.vtk")
     packing = scanfab.read(FLOOR / "tutorial.txt", contacts=tmp_path / "lines_8.vtk")
@@ -80,8 +73,7 @@ def test_contacts_by_geometry_need_no_file(folder):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert frames_of(folder)[0].contacts is None
-    with pytest.raises(ReadError, match='there is no contact file, which `contacts="file"` needs'):
-        scanfab.read_series(folder, contacts="file")
+    refuses(folder, 'there is no contact file, which `contacts="file"` needs', contacts="file")
 
 
 @pytest.mark.parametrize("named", ["c", "c/other_*.txt", "c/other_9.txt"])
@@ -134,8 +126,7 @@ WRONG = [
 def test_a_source_without_grains_is_an_error(tmp_path, files, name, said):
     for file, text in files.items():
         write(tmp_path / file, text)
-    with pytest.raises(ReadError, match=said):
-        scanfab.read_series(tmp_path if name is None else tmp_path / name)
+    refuses(tmp_path if name is None else tmp_path / name, said)
 
 
 @pytest.mark.parametrize(

@@ -12,10 +12,8 @@ import pyvista
 import scanfab
 from scanfab.base.errors import SettingsError, UnknownFormatError
 from scanfab.cli.main import run
-from scanfab.io.reader import GrainTable, JoinedContacts, Snapshot, installed_readers, reader_for
-from scanfab.packing.contacts import ContactList
+from scanfab.io.reader import installed_readers, reader_for
 from tests.helpers.dumps import cubic_rows, dump_text, write
-from tests.helpers.plugins import offer
 from tests.helpers.truth import FLOOR
 
 POSITION = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0], [1.9, 1.9, 0]])
@@ -80,15 +78,6 @@ def test_a_folder_that_is_named_twice_is_read_once(tmp_path, monkeypatch, capsys
     assert printed.err.count(said) == 1
 
 
-def test_a_file_that_is_named_twice_is_one_frame(tmp_path):
-    files = [
-        write(tmp_path / f"dump_{step}.txt", dump_text(cubic_rows(), step=step)) for step in (0, 9)
-    ]
-    with pytest.warns(scanfab.ScanfabWarning, match=r"dump_0.txt: named twice .* read once"):
-        series = scanfab.read_series([tmp_path / "dump_*.txt", files[0]])
-    assert [frame.step for frame in series] == [0, 9]
-
-
 def test_a_series_may_start_with_frames_of_boundary_alone(tmp_path):
     walls = [(1, 2, 5, 0, 0, 0.1), (2, 2, 0, 5, 0, 0.1)]
     grains = [(3, 1, 0, 0, 0, 1), (4, 1, 2, 0, 0, 1), (5, 1, 0, 2, 0, 1)]
@@ -120,46 +109,6 @@ def test_a_value_of_another_kind_is_told_by_its_option(source, options, said):
 def test_an_unknown_option_is_told_with_the_nearest(read):
     with pytest.raises(TypeError, match=f"{read.__name__} has no option .*: did you mean 'format'"):
         read("sample_data", formt="yade")
-
-
-class NumbersReader:
-    """A foreign plugin: a first line that names the kind, then numbers."""
-
-    name = "numbers"
-    description = "numbers in rows"
-    extensions = (".numbers",)
-
-    def recognises(self, path):
-        return path.read_bytes().startswith(b"numbers of ")
-
-    def kind(self, path):
-        return path.read_text().split()[2]
-
-    def snapshots(self, path):
-        return [Snapshot(path)]
-
-    def read_grains(self, snapshot, options):
-        values = np.loadtxt(snapshot.path, skiprows=1, ndmin=2)
-        return GrainTable(values[:, :3], values[:, 3], None, {}, None)
-
-    def read_contacts(self, snapshot, options, grains):
-        pairs = np.loadtxt(snapshot.path, skiprows=1, ndmin=2).astype(int)
-        return JoinedContacts(ContactList(pairs), np.zeros(len(grains.radius), int))
-
-
-@pytest.mark.parametrize("format", [None, "numbers"])
-def test_a_foreign_plugin_reads_a_series_like_the_built_in_ones(tmp_path, monkeypatch, format):
-    offer(monkeypatch, "scanfab.readers", "numbers", lambda: NumbersReader)
-    installed_readers.cache_clear()
-    for step in (9, 10):
-        write(tmp_path / f"g_{step}.dat", f"numbers of grains\n0 0 0 1\n1.9 0 0 1\n0 0 {step} 1\n")
-        write(tmp_path / f"c_{step}.dat", "numbers of contacts\n0 1\n")
-    try:
-        frames = [frame.read() for frame in scanfab.read_series(tmp_path, format=format)]
-    finally:
-        installed_readers.cache_clear()
-    assert [(frame.step, len(frame)) for frame in frames] == [(9, 3), (10, 3)]
-    np.testing.assert_array_equal(frames[1].contacts.pairs, [[0, 1]])
 
 
 def test_a_name_that_does_not_exist_is_an_error_that_lists_those_that_do():

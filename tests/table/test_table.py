@@ -169,15 +169,6 @@ def test_a_saved_table_has_the_bytes_of_the_command_line_and_is_loaded_again(
     assert load(path) == results
 
 
-def test_some_columns_and_digits_are_saved(results, tmp_path):
-    results.save(tmp_path / "t.parquet", fields="strain,frame", digits=1)
-    assert load(tmp_path / "t.parquet").names == ("strain", "frame")
-    with pytest.raises(SettingsError, match="did you mean strain"):
-        results.save(tmp_path / "t.csv", fields="strains")
-    with pytest.raises(SettingsError, match="there is no folder"):
-        results.save(tmp_path / "nowhere" / "t.csv")
-
-
 def test_a_table_with_other_columns_keeps_them(tmp_path):
     table = Table([{"frame": 1, "mine": 0.5}, {"frame": 2, "word": "x"}])
     assert [column.kind for column in table.columns] == [int, float, str]

@@ -111,9 +111,9 @@ def test_columns_and_digits_that_do_not_exist_are_refused(fields, digits, messag
 @every_format
 def test_numbers_of_numpy_are_written_and_what_is_not_finite_is_missing(tmp_path, suffix):
     path = tmp_path / f"t{suffix}"
-    numbers = {"frame": np.int64(0), "a": np.float64(0.5), "n": np.int32(3)}
-    Table([{**numbers, "b": math.nan, "c": -math.inf}]).save(path)
-    assert read_rows(path) == [{"frame": 0, "a": 0.5, "n": 3, "b": None, "c": None}]
+    numbers = {"frame": np.int64(0), "a": np.float64(0.125), "n": np.int32(3)}
+    Table([{**numbers, "b": math.nan, "c": -math.inf}]).save(path, digits=2)
+    assert read_rows(path) == [{"frame": 0, "a": 0.12, "n": 3, "b": None, "c": None}]
 
 
 @every_format

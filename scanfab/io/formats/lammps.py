@@ -20,9 +20,7 @@ from scanfab.io.formats.vtk import VtkReader
 from scanfab.io.reader import GrainTable, JoinedContacts, ReadOptions, Snapshot
 
 # only LAMMPS writes these items, and bounds with 16 digits (LIGGGHTS: six digits)
-LAMMPS_ITEMS = re.compile(
-    rb"(?m)^ITEM: (?:(?:UNITS|TIME)\s|BOX BOUNDS(?: abc|[^\n]*\n-?\d\.\d{16}e))"
-)
+LAMMPS_ITEMS = re.compile(rb"(?m)^ITEM: ((UNITS|TIME)\s|BOX BOUNDS( abc|[^\n]*\n-?\d\.\d{16}e))")
 # a restart of LIGGGHTS begins with a flag, the length of the version, and the version
 RESTART = re.compile(rb"LammpS RestartT|\0{4}.{2}\0\0[^\0]{0,100}LIGGGHTS", re.DOTALL)
 FORMS: tuple[GrainsOnly, ...] = (TextDump(), DataFile(), NetcdfDump(), BinaryDump())

@@ -178,8 +178,7 @@ class VtkReader(GrainsOnly):
                 continue
             other = frames.setdefault(entry.get("timestep"), {}).setdefault(part, path)
             if other is not path:
-                both = f"{other.name} and {path.name}"
-                raise ReadError(f"{index}: {both} have the same timestep, part and group")
+                raise ReadError(f"{index}: {other.name} and {path.name} have the same timestep")
         found = []
         for word, parts in frames.items():
             time = None if word is None else numbers(f"{index}: timestep", word.encode(), 1)[0]

@@ -56,8 +56,7 @@ class TextExport(GrainsOnly):
             names = named[1].split() if named else names[:-1]
             names += [f"attr{number}" for number in range(1, width - len(names) + 1)]
         if width not in (0, len(names)):
-            problem = f"{path}: the first line names {len(names)} columns, the rows have {width}"
-            raise ReadError(problem)
+            raise ReadError(f"{path}: line 1 names {len(names)} columns, but the rows have {width}")
         return read_rows(snapshot, rows, Layout(tuple(names))), cell
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import ReadError, ScanfabError, ScanfabWarning
+from scanfab import ScanfabError, ScanfabWarning
 from scanfab.io.reader import reader_named
 from scanfab.testing import check_reader
-from tests.helpers.dumps import dump_text, write
+from tests.helpers.dumps import dump_text, refuses, write
 from tests.helpers.made.data_files import CENTRES, DIAMETERS, TITLE, data_file
 
 LAMMPS = "LAMMPS data file via write_data, version 2 Aug 2023, timestep = 12"
@@ -93,8 +93,7 @@ def test_columns_can_be_named_by_their_numbers(tmp_path):
 def test_what_is_no_such_file(tmp_path, old, new, message):
     text = data_file(title=LAMMPS)
     assert old in text
-    with pytest.raises(ScanfabError, match=message):
-        scanfab.read(write(tmp_path / "a.data", text.replace(old, new)))
+    refuses(write(tmp_path / "a.data", text.replace(old, new)), message, error=ScanfabError)
 
 
 def test_cut_files_and_the_kit(tmp_path):
@@ -116,8 +115,7 @@ def test_cut_files_and_the_kit(tmp_path):
 def test_a_binary_restart_is_named_with_what_to_write(tmp_path, data):
     path = tmp_path / "restart.1000"
     path.write_bytes(data)
-    with pytest.raises(ReadError, match=r"a binary restart.*dump custom"):
-        scanfab.read(path)
+    refuses(path, r"a binary restart.*dump custom")
     write(tmp_path / "dump.1000", dump_text())
     with pytest.warns(ScanfabWarning, match="binary restart"):
         assert len(scanfab.read_series(tmp_path)) == 1

@@ -15,11 +15,12 @@ from tests.helpers.dumps import (
     dump_text,
     local_text,
     pairs_text,
+    refuses,
     write,
     yade_lines,
     yade_spheres,
 )
-from tests.helpers.truth import BOX, CELL, SHEAR, YADE, csv_rows, id_pairs
+from tests.helpers.truth import BOX, CELL, OF_SHEAR, SHEAR, YADE, csv_rows, id_pairs
 
 
 def joined(tmp_path, local, rows=ROWS, columns=None, format=None, **options):
@@ -50,6 +51,7 @@ def test_no_contacts_at_all_are_an_empty_list(tmp_path, rows, format):
     assert (len(packing.contacts), packing.contacts.source) == (0, "file")
 
 
+SHEAR_PAIRS = SHEAR / "pairs.0.local.gz"
 NAMED = "id1=c_con[2],id2=c_con[4],fx=c_con[5],fy=c_con[6],fz=c_con[7]"
 APART = [*ROWS[:2], (3, 2, 0.61, 0.5, 0.5, 0.1)]
 
@@ -143,15 +145,8 @@ def test_contacts_by_id_need_ids_in_the_grain_file(tmp_path):
 def test_contacts_that_are_cut_in_their_header_are_an_error(tmp_path, source):
     write(tmp_path / "dump_0.txt", dump_text())
     write(tmp_path / "pairs_0.txt", pairs_text()[:60])
-    with pytest.raises(ReadError, match=r"pairs_0.txt.*incomplete.*`contacts=\"geometric\"`"):
-        scanfab.read(tmp_path / source)
+    refuses(tmp_path / source, r"pairs_0.txt.*incomplete.*`contacts=\"geometric\"`")
     assert scanfab.read(tmp_path / source, contacts="geometric").contacts is None
-
-
-LAMMPS = (
-    "id1=c_ids[1],id2=c_ids[2],fx=c_pair[3],fy=c_pair[4],fz=c_pair[5],"
-    "tx=c_pair[6],ty=c_pair[7],tz=c_pair[8]"
-)
 
 
 def on_each_grain(packing):
@@ -228,10 +223,7 @@ def test_of_walls_whose_columns_are_not_proved_the_force_is_not_known(tmp_path):
     ("grains", "options"),
     [
         (CELL / "dump_30000.txt.gz", {"contacts": CELL / "contacts_30000.txt.gz"}),
-        (
-            SHEAR / "shear.0.lammpstrj.gz",
-            {"contacts": SHEAR / "pairs.0.local.gz", "contact_columns": LAMMPS},
-        ),
+        (SHEAR / "shear.0.lammpstrj.gz", {"contacts": SHEAR_PAIRS, "contact_columns": OF_SHEAR}),
         (YADE / "periodic.xml.bz2", {}),
     ],
 )
@@ -268,5 +260,4 @@ def test_a_file_with_another_number_of_forces_is_refused(tmp_path):
     position = [[0, 0, 0], [1.9, 0, 0]]
     spheres = yade_spheres(tmp_path / "a-spheres-0.vtk", position, [1, 1], id=[5, 6])
     lines = yade_lines(tmp_path / "a-intrs-0.vtk", [position], {"force": [[2, 0, 0]] * 2})
-    with pytest.raises(scanfab.ScanfabError, match=r"a-intrs-0\.vtk"):
-        scanfab.read(spheres, contacts=lines)
+    refuses(spheres, r"a-intrs-0\.vtk", error=scanfab.ScanfabError, contacts=lines)

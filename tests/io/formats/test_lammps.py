@@ -8,19 +8,15 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import ReadError, ScanfabWarning
+from scanfab import ScanfabWarning
 from scanfab.io.formats import binary_dump as binary
 from scanfab.io.reader import reader_for, reader_named
 from scanfab.testing import check_reader
-from tests.helpers.dumps import NAMES, ROWS, binary_dump, write
+from tests.helpers.dumps import NAMES, ROWS, binary_dump, refuses, write
 from tests.helpers.made.lammps import netcdf, yaml_text
-from tests.helpers.truth import SHEAR, id_pairs, lammps_fabric, off_by
+from tests.helpers.truth import OF_SHEAR, SHEAR, id_pairs, lammps_fabric, off_by
 
 FORMS = SHEAR / "forms"
-COLUMNS = (
-    "id1=c_ids[1],id2=c_ids[2],fx=c_pair[3],fy=c_pair[4],fz=c_pair[5],"
-    "tx=c_pair[6],ty=c_pair[7],tz=c_pair[8]"
-)
 LAST = SHEAR / "shear.200000.lammpstrj.gz"
 LAST_PAIRS = SHEAR / "pairs.200000.local.gz"
 # LAMMPS computed its fabric in the state that is dumped, with 15 digits
@@ -30,7 +26,7 @@ GOLDEN = np.loadtxt(SHEAR / "fabric.txt")
 @pytest.fixture(scope="module")
 def frames():
     with pytest.warns(scanfab.ScanfabNote, match="skipped"):
-        series = scanfab.read_series(SHEAR, contact_columns=COLUMNS)
+        series = scanfab.read_series(SHEAR, contact_columns=OF_SHEAR)
     return [frame.read() for frame in series]
 
 
@@ -58,7 +54,7 @@ def test_contacts_of_the_file_and_by_geometry_give_lammps_own_fabric(frames, num
 
 
 def test_forces_are_the_sum_of_both_parts():
-    packing = scanfab.read(LAST, contacts=LAST_PAIRS, contact_columns=COLUMNS)
+    packing = scanfab.read(LAST, contacts=LAST_PAIRS, contact_columns=OF_SHEAR)
     values = np.loadtxt(LAST_PAIRS, skiprows=9, max_rows=1)
     row = np.flatnonzero((packing.id[packing.contacts.pairs] == values[1:3]).all(axis=1))
     np.testing.assert_allclose(packing.contacts.force[row], [-(values[5:8] + values[8:11])])
@@ -74,7 +70,7 @@ def test_forces_are_the_sum_of_both_parts():
     ],
 )
 def test_ids_are_found_without_being_named_and_forces_are_not(contacts, columns):
-    named = scanfab.read(LAST, contacts=LAST_PAIRS, contact_columns=COLUMNS)
+    named = scanfab.read(LAST, contacts=LAST_PAIRS, contact_columns=OF_SHEAR)
     packing = scanfab.read(LAST, contacts=contacts, contact_columns=columns)
     assert id_pairs(packing) == id_pairs(named)
     assert packing.contacts.force is None
@@ -129,11 +125,9 @@ def test_netcdf(tmp_path):
 
 
 def test_netcdf_that_cannot_be_read(tmp_path, monkeypatch):
-    with pytest.raises(ReadError, match="coordinates was not written for all atoms"):
-        scanfab.read(netcdf(tmp_path / "a.nc", axes=2), frame=0)
+    refuses(netcdf(tmp_path / "a.nc", axes=2), "coordinates was not written for all atoms", frame=0)
     monkeypatch.setattr(binary, "find_spec", lambda name: None)
-    with pytest.raises(ReadError, match=r'pip install "scanfab\[netcdf\]"'):
-        scanfab.read(tmp_path / "a.nc")
+    refuses(tmp_path / "a.nc", r'pip install "scanfab\[netcdf\]"')
 
 
 def test_the_kit(tmp_path):
@@ -208,5 +202,4 @@ ONE, BLOCK = binary_dump(names=NAMES), struct.pack("<i", 18)
     ],
 )
 def test_what_cannot_be_read_is_told(tmp_path, data, told):
-    with pytest.raises(ReadError, match=rf"dump.bin.*{told}"):
-        scanfab.read(written(tmp_path, data))
+    refuses(written(tmp_path, data), rf"dump.bin.*{told}")

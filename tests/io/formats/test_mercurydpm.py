@@ -7,7 +7,7 @@ import pytest
 
 import scanfab
 from scanfab import ReadError, ScanfabWarning
-from tests.helpers.dumps import write
+from tests.helpers.dumps import refuses, write
 from tests.helpers.made.lf_dem import (
     HEAD,
     RUN_VISCOSITY,
@@ -128,16 +128,14 @@ def test_a_last_frame_that_is_cut_is_left_out(run, ending):
     with pytest.warns(ScanfabWarning, match=r"last snapshot, number \d, is incomplete"):
         assert len(series[0].read().contacts) == 0
     assert len(series) == (2 if ending == "data" else 3)
-    with pytest.raises(ReadError, match=r"the file is incomplete"):
-        scanfab.read(write(run / "b.data", data_frame(1)[:-50]))
+    refuses(write(run / "b.data", data_frame(1)[:-50]), r"the file is incomplete")
 
 
 def test_a_text_that_begins_with_a_number_is_no_frame(tmp_path):
     path = write(
         tmp_path / "a.txt", "2 samples of sand from France\nwere sheared by hand in a wooden box\n"
     )
-    with pytest.raises(scanfab.ScanfabError, match="no reader knows this format"):
-        scanfab.read(path)
+    refuses(path, "no reader knows this format", error=scanfab.ScanfabError)
 
 
 @pytest.mark.filterwarnings("error")

@@ -8,9 +8,9 @@ import pytest
 import pyvista
 
 import scanfab
-from scanfab.base.errors import ReadError
 from scanfab.io.reader import reader_for, reader_named
 from scanfab.testing import check_reader, made_up_packings
+from tests.helpers.dumps import refuses
 from tests.helpers.made.on_dem import COMPRESSION, FORCE, IDS, POSITION, draft_1, draft_2
 
 
@@ -32,8 +32,7 @@ def test_both_drafts_hold_the_same_packing(tmp_path, make):
 
 def test_a_draft_whose_signs_are_not_known_is_refused(tmp_path):
     path = draft_1(tmp_path / "a.vtkhdf", "0.3")
-    with pytest.raises(ReadError, match=r"'0.3', expected 0.1 or 0.2.*sign of the normal force"):
-        scanfab.read(path)
+    refuses(path, r"'0.3', expected 0.1 or 0.2.*sign of the normal force")
 
 
 def test_what_is_written_has_the_names_of_the_draft(tmp_path):
@@ -93,8 +92,7 @@ def test_what_cannot_be_read_is_told(tmp_path, reason):
     (tmp_path / "z.bin").write_bytes(bytes(24))
     with h5py.File(path, "a") as file:
         SPOILT[reason](file["VTKHDF/PointData"])
-    with pytest.raises(ReadError, match=reason):
-        scanfab.read(path)
+    refuses(path, reason)
 
 
 def test_damaged_files_end_nothing(tmp_path):

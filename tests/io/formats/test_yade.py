@@ -11,7 +11,7 @@ import pytest
 import scanfab
 from scanfab.base.errors import ReadError
 from scanfab.io.reader import reader_for
-from tests.helpers.dumps import write, yade_lines, yade_spheres
+from tests.helpers.dumps import refuses, write, yade_lines, yade_spheres
 from tests.helpers.truth import (
     SIX_DIGITS,
     YADE,
@@ -120,8 +120,7 @@ def test_normal_and_shear_force_add_up(tmp_path):
 def test_a_contact_through_a_face_without_a_cell_asks_for_it(tmp_path):
     # away from the file of the cell
     spheres = shutil.copy(YADE / PERIODIC_SPHERES, tmp_path)
-    with pytest.raises(scanfab.PackingError, match="name its cell"):
-        scanfab.read(spheres, contacts=YADE / PERIODIC_INTRS)
+    refuses(spheres, "name its cell", error=scanfab.PackingError, contacts=YADE / PERIODIC_INTRS)
 
 
 @pytest.mark.parametrize(
@@ -161,7 +160,7 @@ def test_attributes_have_the_names_of_the_second_line_or_are_numbered(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("#format x_y_z_r\n1 2 3\n", "first line names 4 columns, the rows have 3"),
+        ("#format x_y_z_r\n1 2 3\n", "line 1 names 4 columns, but the rows have 3"),
         ("#format x_y_z_r\n1 2 3 oops\n", "a.txt, line 2: .*oops"),
         ("#format x_y_z_r\n1 2 3 1\n1 2 3\n", "a.txt, line 3: expected 4 columns"),
         ("#format x_y_z_r\n# a comment\n0 0 0 1\n3 x 0 1\n", "a.txt, line 4: .*'x'"),
@@ -170,5 +169,4 @@ def test_attributes_have_the_names_of_the_second_line_or_are_numbered(tmp_path):
     ],
 )
 def test_a_text_that_cannot_be_read_says_why(tmp_path, text, message):
-    with pytest.raises(ReadError, match=message):
-        scanfab.read(write(tmp_path / "a.txt", text))
+    refuses(write(tmp_path / "a.txt", text), message)
