@@ -52,6 +52,7 @@ def folder(tmp_path, monkeypatch):
         ("compute cube --rv-shape box --rv-radius 2", 2, "--rv-radius: has no meaning if"),
         ("compute cube --rv-axis x", 2, "leave out --rv-axis, or choose --rv-shape cylinder"),
         ("map cube --slices two", 2, "two"),
+        ("map cube --slices 2 --frame 1", 2, "--frame: there is no frame 1: cube has 1, counted"),
         ("map cube --slices 2 --with state", 2, "No such option '--with'"),
         ("map cube", 2, "exactly one of --grid, --slices and --shells, found none"),
         ("map cube --grid 2,2", 2, "three numbers of blocks, such as 4,4,8, found '2,2'"),

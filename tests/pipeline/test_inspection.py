@@ -95,3 +95,15 @@ def test_options_that_do_not_exist_or_fit_are_refused_at_once():
         scanfab.inspect(series, min_contact=3)
     with pytest.raises(scanfab.SettingsError, match="boundary"):
         scanfab.inspect(series, boundary="mask")
+
+
+def test_the_rv_is_that_of_the_first_frame_whichever_frames_are_chosen(tmp_path):
+    """A frame before the chosen ones may be damaged: then the next one decides."""
+    shifted = [(id, type, x + 0.25, *rest) for id, type, x, *rest in ROWS]
+    texts = [dump_text(), dump_text(shifted, step=1), dump_text(shifted, step=2)]
+    every = reports(tmp_path, texts)
+    (last,) = reports(tmp_path, texts, frames="2:")
+    assert last.rv_center == every[0].rv_center
+    flat = [(*ROWS[0][:5], 0.0), *ROWS[1:]]
+    (last,) = reports(tmp_path, [dump_text(flat), *texts[1:]], frames="2:")
+    assert last.rv_center[0] == pytest.approx(every[0].rv_center[0] + 0.25)
