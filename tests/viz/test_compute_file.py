@@ -249,4 +249,3 @@ def test_series_that_one_table_cannot_tell_apart_are_refused(short_series, dumps
     other = scanfab.read_series(dumps, contacts="geometric")
     with pytest.raises(scanfab.SettingsError, match="read with the same options"):
         from_python(tmp_path / "table.csv", [series, other])
-
