@@ -42,15 +42,15 @@ def compute_file(
     """
     Compute the fabric table of a series into a file, frame by frame: ``scanfab compute -o``.
 
-    Rows are kept in ``FILE.part`` as they come, so that an interrupted computation can be resumed.
-    FILE appears at the end: it is complete or untouched. The command line writes the same bytes, so
-    it can resume what this function began, and the other way round.
+    Rows are written to ``FILE.part`` frame by frame, so that an interrupted computation can be
+    resumed. FILE is replaced at the end: it is complete or untouched. The command line writes the
+    same bytes, so it can resume a computation that this function began, and vice versa.
 
     Parameters
     ----------
     source : Series, path, or sequence of them
-        What :func:`scanfab.read_series` returns, or files and folders: each folder is a series, and
-        all single files together are one series.
+        Series of :func:`scanfab.read_series`, or paths of files and folders: each folder is a
+        series, and all single files together are one series.
     output : path
         ``.csv``, ``.tsv``, ``.json``, ``.jsonl``, ``.parquet``, or a format of another package.
         ``FILE.manifest.json`` beside it holds settings, versions, inputs with size and hash,

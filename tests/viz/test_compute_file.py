@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import scanfab
-from scanfab.base.errors import SettingsError, SkippedFrameWarning
+from scanfab.base.errors import SkippedFrameWarning
 from scanfab.cli.main import run
 from tests.helpers.dumps import write
 from tests.helpers.interruptions import interrupted_at_row, write_series
@@ -22,7 +22,6 @@ WORDS = (
 OPTIONS = {
     "directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "ac", "workers": 2,
 }  # fmt: skip
-SUFFIXES = [".csv", ".tsv", ".json", ".jsonl", ".parquet"]
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +41,10 @@ def commanded(output: Path, *words: str, sources: tuple[Path, ...]) -> int:
 
 def from_python(output: Path, source, **options) -> scanfab.Table:
     return scanfab.compute_file(source, output, **{**OPTIONS, **options})
+
+
+def files_of(folder: Path) -> dict[str, bytes]:
+    return {str(one.relative_to(folder)): one.read_bytes() for one in folder.rglob("*.*")}
 
 
 def manifest_of(output: Path) -> bytes:
@@ -68,7 +71,7 @@ def test_parts_of_different_frames_make_no_table(short_series, tmp_path):
         from_python(tmp_path / "fabric.csv", series)
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("suffix", [".jsonl", ".parquet"])
 def test_table_and_manifest_are_those_of_the_command(short_series, tmp_path, capsys, suffix):
     ours, other = tmp_path / f"ours{suffix}", tmp_path / f"other{suffix}"
     assert commanded(other, sources=(short_series,)) == 0
@@ -82,10 +85,12 @@ def test_table_and_manifest_are_those_of_the_command(short_series, tmp_path, cap
 
 
 @pytest.mark.parametrize(
-    ("name", "excerpt"),
-    [("table.parquet", {}), ("table.csv", {"fields": "source,frame,variant,gc_xx", "digits": 5})],
+    ("begins", "name", "excerpt"),
+    [
+        ("Python", "table.parquet", {}),
+        ("command", "table.csv", {"fields": "source,frame,variant,gc_xx", "digits": 5}),
+    ],
 )
-@pytest.mark.parametrize("begins", ["the command", "Python"])
 def test_each_goes_on_with_what_the_other_has_left(
     short_series, tmp_path, monkeypatch, name, excerpt, begins
 ):
@@ -142,21 +147,15 @@ def test_several_series_are_one_table(short_series, dumps, tmp_path):
 
 
 def test_paraview_files_are_those_of_the_command(short_series, dumps, tmp_path):
-    for name, sources in (("one", (short_series,)), ("two", (short_series, dumps))):
-        ours, other = tmp_path / f"{name}-ours", tmp_path / f"{name}-other"
-        words = ("--vtk", str(other), "--frames", ":2")
-        assert commanded(tmp_path / "t.csv", *words, sources=sources) == 0
-        from_python(tmp_path / "table.csv", list(sources), vtk=ours, frames=":2")
-        found = [path.relative_to(other) for path in sorted(other.rglob("*.*"))]
-        assert found == [path.relative_to(ours) for path in sorted(ours.rglob("*.*"))]
-        assert all((ours / path).read_bytes() == (other / path).read_bytes() for path in found)
-
-
-def test_a_resumed_collection_keeps_the_frames_that_it_has(short_series, tmp_path):
-    output, folder = tmp_path / "table.csv", tmp_path / "vtk"
+    """A resumed run adds its frames to the collections."""
+    sources, other = (short_series, dumps), tmp_path / "other"
+    assert commanded(tmp_path / "t.csv", "--vtk", str(other), sources=sources) == 0
     for frames in (":2", ":4"):
-        from_python(output, short_series, vtk=folder, frames=frames, resume=True)
-    assert (folder / "grains.pvd").read_text().count("<DataSet ") == 4
+        options = {"vtk": tmp_path / "ours", "frames": frames, "resume": True}
+        from_python(tmp_path / "table.csv", list(sources), **options)
+    found = files_of(tmp_path / "ours")
+    assert found == files_of(other)
+    assert found["series-1/grains.pvd"].count(b"<DataSet ") == 4
 
 
 @pytest.fixture
@@ -225,6 +224,8 @@ def test_what_cannot_be_resumed_names_arguments(short_series, tmp_path):
         ({"vtk": "v", "cutoff": "1rmin", "cutoffs": "1,2"}, scanfab.SettingsError, "one cut-off"),
         ({"source": []}, scanfab.SettingsError, "expected a Series or the path of dumps"),
         ({"source": [3]}, scanfab.SettingsError, "expected a Series or the path of dumps"),
+        ({"source": 3}, scanfab.SettingsError, "expected a Series or the path of dumps"),
+        ({"source": scanfab.Packing([[0, 0, 0]], 1.0)}, scanfab.SettingsError, r"save\(\)"),
     ],
 )
 def test_wrong_arguments_are_named(short_series, tmp_path, monkeypatch, change, error, said):
@@ -248,9 +249,3 @@ def test_series_that_one_table_cannot_tell_apart_are_refused(short_series, dumps
     other = scanfab.read_series(dumps, contacts="geometric")
     with pytest.raises(scanfab.SettingsError, match="read with the same options"):
         from_python(tmp_path / "table.csv", [series, other])
-
-
-@pytest.mark.parametrize("source", [3, scanfab.Packing([[0, 0, 0]], 1.0)])
-def test_what_is_no_series_is_told(tmp_path, source):
-    with pytest.raises(SettingsError, match=r"expected a Series or the path of dumps.*save\(\)"):
-        scanfab.compute_file(source, tmp_path / "t.csv")

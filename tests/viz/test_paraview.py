@@ -52,10 +52,6 @@ def test_every_file_has_its_arrays_and_the_row(computed, kind):
         assert list(mesh.field_data["variant"]) == [row["variant"] for row in rows]
         expected = [row["alpha_vs_axial"] for row in rows]
         assert mesh.field_data["alpha_vs_axial"].tolist() == expected
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_collection_leads_to_every_frame(computed, kind):
     reader = pyvista.get_reader(computed.vtk / f"{kind}.pvd")
     assert reader.time_values == [0.0, 3.0, 6.0]
     reader.set_active_time_value(6.0)

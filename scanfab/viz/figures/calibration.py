@@ -16,7 +16,7 @@ from scanfab.table.row import column_of, number_of, total_error
 from scanfab.viz.figures.figure import Figure
 from scanfab.viz.figures.style import LABELS, LOOKS, WIDTH, band, plain
 
-# ladder: label of the axis, whether it is logarithmic, and the paper's choice
+# For each ladder: label of the x axis, whether it is logarithmic, and the value in the 2017 paper.
 PANELS: dict[str, tuple[str, bool, float | None]] = {
     "spacing": ("spacing of lines $s/r_{min}$", True, 0.1),
     "directions": ("number of directions", True, None),
@@ -34,9 +34,9 @@ class Ladders(Figure):
     Parameters
     ----------
     data : sequence of StepRow
-        Of :func:`scanfab.calibrate`; lengths of the axes are relative to r_min.
+        The steps of :func:`scanfab.calibrate`. Spacings and cut-offs are divided by r_min.
     ladder : str, optional
-        ``"spacing"``, ``"directions"``, ``"cutoff"`` or ``"rv"``, for one Axes.
+        The ladder to draw on one Axes: ``"spacing"``, ``"directions"``, ``"cutoff"`` or ``"rv"``.
 
     Raises
     ------
@@ -55,16 +55,16 @@ class Ladders(Figure):
         self.ladder = ladder
 
     def draw(self, ax: Axes) -> None:
-        """One of the ladders."""
+        """Draw the chosen ladder."""
         self._draw_ladder(ax, self.ladder)
         ax.legend()
 
     def panels(self, part: FigureBase) -> list[Axes]:
-        """All four."""
+        """Draw all four ladders."""
         panels: list[Axes] = part.subplots(2, 2).ravel().tolist()
         for panel, ladder in zip(panels, PANELS, strict=True):
             self._draw_ladder(panel, ladder)
-        # what was scanned, and what bands, bars and dots are
+        # the legend's title names the frame and explains bands, bars and dotted lines
         lines = ["bands: one total standard error, of scan and sample together"]
         if np.isnan(_totals(_known(self.data))).any():
             lines.append("no band where either part is not known")
@@ -79,7 +79,7 @@ class Ladders(Figure):
         return panels
 
     def _draw_ladder(self, panel: Axes, ladder: str) -> None:
-        """A curve for each variant."""
+        """Draw a curve for each variant."""
         label, logarithmic, paper = PANELS[ladder]
         rows = [row for row in self.data if row.ladder == ladder]
         for variant in sorted({row.variant for row in rows}):
@@ -96,10 +96,10 @@ class Ladders(Figure):
 
 
 def _known(rows: Sequence[Any]) -> list[Any]:
-    """The steps that have a void fabric."""
+    """Select the steps that have a void fabric."""
     return [row for row in rows if row.alpha_vs_axial is not None]
 
 
 def _totals(rows: Sequence[Any]) -> FloatArray:
-    """Their total errors; NaN where these are not known."""
+    """Total errors of steps; NaN where an error is not known."""
     return np.array([total_error(row, "alpha_vs_axial") for row in rows], np.float64)

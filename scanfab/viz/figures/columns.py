@@ -1,4 +1,4 @@
-"""The figure columns: any numbers of a table over the strain, a panel for each column."""
+"""The figure columns: numeric columns of a table over the strain, a panel for each column."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scanfab.table.table import Table
 from scanfab.viz.figures.curves import ROW, Curves, Quantity
 from scanfab.viz.figures.style import WIDTH, plain
 
-# of the groups of further columns, those that a reader looks at first; two to a row of panels
+# The columns that are drawn if no names are given, as far as the table has them.
 FIRST = (
     "p", "q", "void_ratio", "coordination_mechanical", "acst_vs", "acst_c",
     "alpha_bn_axial", "alpha_fn_axial", "alpha_ft_axial", "alpha_gc_strong_axial",
@@ -24,15 +24,16 @@ class Columns(Curves):
     """
     Columns of the table over the strain, or over the frames.
 
-    A panel for each column; bands are the standard errors of the columns named ``NAME_se``.
+    Each column has a panel. Bands are standard errors, from the columns named ``NAME_se``.
 
     Parameters
     ----------
     data : Table
-        A fabric table; of one source, or of one variant.
+        A fabric table; on one Axes of one source, or of one variant.
     of : str or sequence of str, optional
-        Names of columns, between commas; on one Axes the first. By default those of stress, forces,
-        invariants and harmonics that the table has (option `with_`).
+        Names of columns; in a text they are separated by commas. One Axes shows the first column.
+        The default are the columns of stress, forces, invariants and harmonics that the table has
+        (see the option `with_`).
 
     Raises
     ------
@@ -63,29 +64,29 @@ class Columns(Curves):
 
     @classmethod
     def parse(cls, argument: str) -> dict[str, Any] | None:
-        """The names behind the colon, between commas."""
+        """Read names of columns, separated by commas."""
         return {"of": argument} if argument else None
 
     @classmethod
     def suits(cls, data: Table) -> bool:
-        """Whether the table has columns that are drawn without being named."""
+        """Whether the table has columns that are drawn by default."""
         return bool(_first(data))
 
     @property
     def size(self) -> tuple[float, float]:
-        """Two panels to a row."""
+        """Width and height for rows of two panels, inches."""
         return WIDTH, ROW * self.rows * len(self.groups) + 0.8
 
     @property
     def caption(self) -> str:
-        """With the names and the abscissa."""
+        """The names of the columns and of the x axis."""
         has_errors = any(f"{name}_se" in self.data.names for name in self.names)
         errors = "; bands are their standard errors, as the table has them" if has_errors else ""
         return f"{', '.join(self.names)} over {abscissa_words(self.data)}{errors}."
 
 
 def _named(data: Table, of: str | Sequence[str] | None) -> list[str]:
-    """The columns to draw, all of them numbers of the table."""
+    """Names of the columns to draw; SettingsError if a column is missing or has no numbers."""
     asked = of.split(",") if isinstance(of, str) else list(of or ())
     names = [name.strip() for name in asked] or _first(data)
     if not names:
@@ -101,6 +102,6 @@ def _named(data: Table, of: str | Sequence[str] | None) -> list[str]:
 
 
 def _first(data: Table) -> list[str]:
-    """What is drawn of a table if nobody chooses."""
+    """Names of the columns that are drawn by default."""
     names = [name for name in FIRST if name in data.names]
     return [name for name in names if any(one[name] is not None for one in data)]

@@ -154,8 +154,13 @@ class Rose(DirectionalFigure):
     def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> float:
         """Draw rings about 1 at the polar angles; gives back the reach of the scale from 1."""
         looks = self.looks
-        rings_of = void_rings if kind == "voids" else contact_rings
-        every = [rings_of(one, list(looks)) for one in frames]
+        if kind == "voids":
+            every = [void_rings(one, list(looks)) for one in frames]
+        else:
+            every = [
+                [contact_ring(one.normals, phi, one.space) for phi in looks if len(one.normals)]
+                for one in frames
+            ]
         reach = max((ring.reach for rings in every for ring in rings), default=0.02)
         for axes, rings in zip(column, every, strict=True):
             _draw_rings(axes, rings, reach, looks)
@@ -275,12 +280,6 @@ def _vectors(theta: FloatArray, phi: float, space: Space) -> FloatArray:
     flat, basis = np.sin(polar), np.eye(3)[sorted(space.along)]
     parts = [flat * np.cos(azimuth), flat * np.sin(azimuth), np.full(len(theta), np.cos(polar))]
     return np.column_stack(parts[: len(basis)]) @ basis
-
-
-def contact_rings(frame: ScannedFrame, angles: Sequence[float]) -> list[Ring]:
-    """Contact normals of a frame at some polar angles; none without contacts."""
-    normals = frame.normals
-    return [contact_ring(normals, phi, frame.space) for phi in angles if len(normals)]
 
 
 def contact_ring(normals: FloatArray, phi: float, space: Space = SPACE) -> Ring:

@@ -1,4 +1,4 @@
-"""What a reader of a table should know before believing it, in plain words."""
+"""Warnings of the report about the numbers of a table, in plain words."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from scanfab.base.errors import SettingsError
 from scanfab.scan.directions import direction_rule
 from scanfab.table.row import groups_of, numbers_of
 
-# share of the largest void anisotropy from which an error is worth a word
+# The report warns of an error above this share of the largest void anisotropy.
 NOTABLE = 0.1
+# The report warns of scan directions with a larger bias than this.
 SOME_BIAS = 1e-5
 VOID = "alpha_vs_axial"
 
@@ -22,14 +23,14 @@ Groups = Mapping[tuple[str, str], Sequence[Mapping[str, Any]]]
 
 def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, Any]]) -> list[str]:
     """
-    Warnings about a table, one sentence or two each.
+    Warnings about tables, each in one or two sentences.
 
     Parameters
     ----------
     rows : sequence of mapping
-        Of fabric tables.
+        The rows of the fabric tables.
     asked : iterable of mapping
-        The settings of their manifests.
+        The settings in their manifests.
     """
     found = [*_biases(asked)]
     filled = [row for row in rows if row[VOID] is not None]
@@ -48,7 +49,7 @@ def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, A
 
 
 def _biases(asked: Iterable[Mapping[str, Any]]) -> Iterator[str]:
-    """Rules of directions that would see anisotropy where there is none."""
+    """Warn of rules of scan directions that find anisotropy in an isotropic sample."""
     for one in asked:
         with suppress(SettingsError):
             name = str(one.get("directions") or "")
@@ -62,7 +63,7 @@ def _biases(asked: Iterable[Mapping[str, Any]]) -> Iterator[str]:
 
 
 def _unknown_errors(groups: Groups) -> Iterator[str]:
-    """Variants of whose scan no error is known."""
+    """Warn of variants without a standard error of the scan."""
     for (source, variant), group in groups.items():
         if not numbers_of(group, f"{VOID}_se"):
             why = "it was made of one replicate"
@@ -75,12 +76,12 @@ def _unknown_errors(groups: Groups) -> Iterator[str]:
 
 
 def _large_errors(groups: Groups) -> Iterator[str]:
-    """Sources whose total error is large beside their signal, and what would make it smaller."""
+    """Warn of sources with a large total error, and say what would make it smaller."""
     large: dict[str, list[tuple[str, float, float]]] = {}
     for (source, variant), group in groups.items():
         peak = max(group, key=lambda row: abs(float(row[VOID])))
         signal = abs(float(peak[VOID]))
-        # of the other frames only where the peak's own are not known
+        # use the errors of other frames only if the frame of the peak has none
         scan, sample = (
             max(numbers_of([peak], part) or numbers_of(group, part), default=0.0)
             for part in (f"{VOID}_se", f"{VOID}_sample_se")
@@ -93,7 +94,7 @@ def _large_errors(groups: Groups) -> Iterator[str]:
             )
             large.setdefault(source, []).append((text, scan, sample))
     for source, doubts in large.items():
-        # a part that is less than half of the other hardly adds to the whole
+        # a part that is less than half of the other part hardly adds to the total error
         lines = any(scan > 0.5 * sample for _, scan, sample in doubts)
         grains = any(sample > 0.5 * scan for _, scan, sample in doubts)
         cure = "Only more grains would help; more lines cannot."

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import os
-import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning, SettingsError
+from scanfab.base.errors import ScanfabError, SettingsError
 from scanfab.base.files import whole_file
 from scanfab.io.families import PathLike
 from scanfab.io.series import Series
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox
-from scanfab.pipeline.options import as_options
+from scanfab.pipeline.options import Told, as_options, listening
 from scanfab.pipeline.record import read_manifest, reopen, repeat_command, restored_settings
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import Length
@@ -43,9 +42,6 @@ from scanfab.viz.scene import Look, look_at
 
 # A scan of so many segments takes about half a minute. Pictures that need more are made rougher.
 MOST_SEGMENTS = 3e8
-
-Told = dict[type[Warning], list[str]]
-"""Messages by category, warnings and notes."""
 
 
 class Input(NamedTuple):
@@ -162,8 +158,7 @@ def make_report(
             "expected files of tables, beside which manifests say what made them: save a table, or "
             "compute it by scanfab.compute_file, and name its file"
         )
-    told: Told = {ScanfabWarning: [], ScanfabNote: []}
-    with _listening(told) as caught:
+    with listening() as told:
         inputs = read_inputs([Path(one) for one in named], cutoff, labels)
         rows = [row for one in inputs if not one.is_map for row in one.rows]
         maps = [one.rows for one in inputs if one.is_map]
@@ -175,14 +170,14 @@ def make_report(
             with suppress(SettingsError):
                 figures += make_figures(blocks, "map")
         pictures = [picture_of(one, "svg") for one in figures]
-    for one in caught:
-        warnings.warn(one.message, one.category, stacklevel=2)
-    sections = [_section(one, told) for one in inputs]
+    # warnings about the sources read again stand only in the page
+    with listening(lambda _: None) as of_sources:
+        sections = [_section(one, of_sources) for one in inputs]
     for section in sections:
         pictures += section["shown"]["pictures"] if section["shown"] else []
     every = [row for one in inputs for row in one.rows]
     asked = [one.manifest["settings"] for one in inputs if one.manifest is not None]
-    doubts = [*told[ScanfabWarning], *map(as_options, caveats_of(rows, asked))]
+    doubts = [*told.warnings, *of_sources.warnings, *map(as_options, caveats_of(rows, asked))]
     page = render_page(
         title=title or _usual_title(every),
         author=author,
@@ -191,7 +186,7 @@ def make_report(
         results=results_tables(comparison.summary, rows),
         pictures=pictures,
         warnings=list(dict.fromkeys(doubts)),
-        notes=list(dict.fromkeys(told[ScanfabNote])),
+        notes=list(dict.fromkeys([*told.notes, *of_sources.notes])),
         sections=sections,
         frames=[*([frame_table(rows)] if rows else []), *map(block_table, maps)],
     )
@@ -200,20 +195,6 @@ def make_report(
 
 # the name of the command
 report = make_report
-
-
-@contextmanager
-def _listening(told: Told) -> Iterator[list[Any]]:
-    """Collect the messages of a block in ``told``; gives back the warnings themselves."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        try:
-            yield caught
-        finally:
-            for one in caught:
-                for kind in told:
-                    if issubclass(one.category, kind):
-                        told[kind].append(as_options(str(one.message)))
 
 
 def read_inputs(
@@ -253,7 +234,7 @@ def _usual_title(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _section(one: Input, told: Told) -> dict[str, Any]:
-    """One table's part of the page, from its manifest and source; ``told`` gets the warnings."""
+    """The part of the page on one table; warnings of its manifest are added to ``told``."""
     section: dict[str, Any] = {"title": str(one.path), "missing": "", "shown": None, "no_view": ""}
     if one.manifest is None:
         missing = (
@@ -262,12 +243,11 @@ def _section(one: Input, told: Told) -> dict[str, Any]:
         )
         return {**section, "missing": missing}
     asked, found = one.manifest["settings"], one.manifest.get("settings_file")
-    told[ScanfabWarning] += map(str, one.manifest.get("warnings") or [])
-    told[ScanfabNote] += map(str, one.manifest.get("notes") or [])
+    told.warnings += map(str, one.manifest.get("warnings") or [])
+    told.notes += map(str, one.manifest.get("notes") or [])
     if one.rows:
         try:
-            with _listening(told):
-                section["shown"] = show_frames(one)
+            section["shown"] = show_frames(one)
         except (ScanfabError, OSError) as error:
             section["no_view"] = f"The view is left out: {as_options(error)}."
     # options of the settings file beside the dumps, which the command line has overridden

@@ -18,7 +18,7 @@ from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
 from scanfab.table.row import total_error
 from scanfab.viz.figures.lengths import CutoffCurve, Cutoffs
-from scanfab.viz.figures.page import drawn_page, find_figure, make_figures, save_figures
+from scanfab.viz.figures.page import drawn_page, find_figure, make_figures
 from scanfab.viz.figures.projection import (
     contact_noise,
     noise_note,
@@ -29,7 +29,7 @@ from scanfab.viz.figures.projection import (
 from scanfab.viz.figures.rose import contact_ring
 from scanfab.viz.scanned_frames import ScannedFrames
 from tests.conftest import ROOT, SAMPLE
-from tests.helpers.figures import BYTES, row_of
+from tests.helpers.figures import row_of
 
 pytestmark = pytest.mark.filterwarnings("ignore:skipped:scanfab.base.errors.ScanfabNote")
 WORDS = {"boundary": "mask=3", "tolerance": 5e-4}
@@ -57,11 +57,8 @@ def unit_vectors(rng, *shape):
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
-def test_every_figure_of_the_sample_is_drawn(scanned, tmp_path):
-    for figure, suffix in zip(make_figures(scanned, "frames"), [*BYTES, ".png"], strict=True):
-        path = tmp_path / f"figure{suffix}"
-        save_figures(path, [figure])
-        assert path.read_bytes().startswith(BYTES[suffix])
+def test_every_figure_of_the_sample_is_drawn(scanned):
+    for figure in make_figures(scanned, "frames"):
         assert scanned.name in figure.caption
         assert figure.caption.endswith(".")
         with drawn_page([figure]) as page:
