@@ -21,7 +21,7 @@ from tests.helpers.uncompiled import run_uncompiled
 from tests.helpers.windows import random_window
 from tests.scan.kernels.test_axes import KINDS
 
-RUNS_OF_A_KIND = 25
+RUNS_OF_A_KIND = 15
 CUTOFFS = [0.0, 0.3, 0.8]
 
 
@@ -176,18 +176,17 @@ def of_poisson(edge, cutoff, packings=120):
     return ratio(np.array(length), np.array(number, dtype=float))
 
 
-@pytest.mark.parametrize("edge", EDGES)
+@pytest.mark.parametrize("edge", ["start", "ends"])
 def test_poisson_spheres_have_their_mean_length_in_small_windows(edge):
-    """``start`` and ``ends`` c + 1/β, ``clip`` c + A1/(A0 + βA1)."""
+    """ℓ = c + 1/β; clipped to the window it would be c + A1/(A0 + βA1)."""
     cutoff, window, beta = 0.5, 9.0, 0.2 * np.pi * 13 / 12
     a0 = 1 - cutoff**2 / (4 * window**2)
     a1 = 4 * window / 3 - cutoff + cutoff**3 / (12 * window**2)
     found = of_poisson(edge, cutoff)
-    expected = cutoff + (a1 / (a0 + beta * a1) if edge == "clip" else 1 / beta)
-    assert found.error < 6e-3 * expected
-    assert found.agrees(expected, within=2e-2)
+    assert found.error < 6e-3 * (cutoff + 1 / beta)
+    assert found.agrees(cutoff + 1 / beta, within=2e-2)
     # what clip misses is seen
-    assert edge == "clip" or not found.agrees(cutoff + a1 / (a0 + beta * a1), within=1.0)
+    assert not found.agrees(cutoff + a1 / (a0 + beta * a1), within=1.0)
 
 
 def test_a_segment_that_reaches_through_many_cells_is_followed():
@@ -206,16 +205,3 @@ def test_a_segment_that_reaches_through_many_cells_is_followed():
     assert number == len(expected)
     assert length == pytest.approx(expected.sum(), rel=1e-9)
     assert sums.left_out.sum() == 0.0
-
-
-@pytest.mark.parametrize("edge", ["start", "ends"])
-def test_kernels_run_without_the_compiler(edge):
-    run_uncompiled(
-        f"""
-import numpy as np
-from tests.scan.kernels.test_axes import overlapping
-from tests.scan.test_edges import check_open
-for seed in range(3):
-    check_open(overlapping, np.random.default_rng(seed), "{edge}", ("cd", "c", "d"))
-"""
-    )
