@@ -109,13 +109,13 @@ def assert_equals_naive(medium, normal, offset, spacing, cutoff):
 
 @pytest.mark.parametrize("periods", PERIODS, ids=str)
 def test_gaps_equal_those_of_explicit_images(periods):
-    for seed in range(8):
+    for seed in range(5):
         check_equals_naive(np.random.default_rng([seed, *periods]), periods)
 
 
 @pytest.mark.parametrize("periods", PERIODS, ids=str)
 def test_long_gaps_in_sparse_media_equal_those_of_explicit_images(periods):
-    for seed in range(4):
+    for seed in range(2):
         random = np.random.default_rng([seed, *periods, 1])
         check_equals_naive(random, periods, sparse_medium)
 
