@@ -13,7 +13,6 @@ from scanfab import (
     scan_lines,
 )
 from scanfab.scan.kernels.periodic import CellGrains
-from tests.helpers import naive
 from tests.helpers.scanning import ratio
 
 UNIT_CELL = np.eye(3), np.ones(3, bool)

@@ -5,7 +5,7 @@ import pytest
 
 from scanfab import Packing, ScanfabWarning, compute
 from tests.helpers.lattices import Spheres, separate_spheres, shaken_cubic
-from tests.helpers.scanning import Z, scan_along, solids_of
+from tests.helpers.scanning import scan_along, solids_of
 
 
 def joined(*parts):

@@ -22,7 +22,6 @@ from scanfab.packing.sample import VARIANTS
 from scanfab.packing.search import near_pairs, overlapping_pairs
 from tests.helpers import naive
 from tests.helpers.lattices import face_centred_cubic, simple_cubic
-from tests.helpers.uncompiled import run_uncompiled
 
 TOLERANCE = 1e-4
 

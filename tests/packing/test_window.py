@@ -86,7 +86,7 @@ def test_a_rod_is_met_by_an_image_that_is_not_the_nearest(half, place):
     center = np.array([5.0, 10.0, 10.0])
     packing = Packing([[0, 0, 0]], 0.5, cell=Cell([10.0, 20.0, 20.0]))
     window = Window(center, box([2 * half, 0.02, 0.02], turn))
-    point = center + [place * along]
+    point = (center + place * along)[None]
     assert point[0, 0] > 10.0
     assert window.may_meet(point, np.full(1, 0.5), packing).all()
     assert window.contains(point, packing).all() == (place < half)

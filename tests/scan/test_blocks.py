@@ -16,7 +16,6 @@ from scanfab.scan.tallies import tally_triads
 from tests.helpers import naive
 from tests.helpers.lattices import poisson_spheres, rotation
 from tests.helpers.scanning import solids_of
-from tests.helpers.uncompiled import run_uncompiled
 from tests.helpers.windows import random_window
 from tests.scan.kernels.test_periodic import lines_of, random_medium
 from tests.scan.test_edges import open_solids

@@ -17,7 +17,6 @@ from scanfab.scan.solids import shortest_gap
 from tests.helpers import naive
 from tests.helpers.lattices import ball_points, rotation
 from tests.helpers.scanning import ratio, scan_triads
-from tests.helpers.uncompiled import run_uncompiled
 from tests.helpers.windows import random_window
 from tests.scan.kernels.test_axes import KINDS
 

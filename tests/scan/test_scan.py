@@ -8,7 +8,7 @@ from scanfab.scan.lines import line_triads, turned_triads
 from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import MAX_LINES
 from tests.helpers import naive
-from tests.helpers.lattices import Spheres, poisson_spheres, separate_spheres
+from tests.helpers.lattices import poisson_spheres
 from tests.helpers.scanning import fabric, solids_of
 
 RULE = direction_rule("lebedev:5")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from scanfab import box, cylinder, direction_rule, ellipsoid, scan_lines, sphere
+from scanfab import box, cylinder, direction_rule, scan_lines, sphere
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.gaps import scan_gaps
 from scanfab.scan.kernels.strips import section_along, spans
@@ -12,7 +12,7 @@ from scanfab.scan.lines import line_triads
 from scanfab.scan.solids import clip_of
 from tests.helpers import naive
 from tests.helpers.lattices import Spheres, poisson_spheres, rotation
-from tests.helpers.scanning import mean_lengths, scan_along, solids_of
+from tests.helpers.scanning import solids_of
 from tests.helpers.windows import cut_ball, random_window
 
 NOTHING = Spheres(np.zeros((0, 3)), np.zeros(0))

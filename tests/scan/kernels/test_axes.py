@@ -16,7 +16,6 @@ from scanfab.scan.solids import shortest_gap
 from tests.helpers import naive
 from tests.helpers.lattices import ball_points, poisson_spheres, rotation
 from tests.helpers.scanning import scan_triads
-from tests.helpers.uncompiled import run_uncompiled
 from tests.helpers.windows import random_window
 
 RUNS_OF_A_KIND = 60

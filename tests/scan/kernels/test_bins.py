@@ -10,7 +10,6 @@ from scanfab.scan.lines import line_triads
 from scanfab.scan.tallies import tally_triads
 from tests.helpers import naive
 from tests.helpers.lattices import rotation
-from tests.helpers.uncompiled import run_uncompiled
 from tests.helpers.windows import random_window
 from tests.scan.kernels.test_axes import KINDS, overlapping, region
 

@@ -9,7 +9,6 @@ from scanfab.scan.kernels import periodic, sweep
 from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.tallies import FollowedTooFarError, Following, tally_triads
 from tests.helpers import naive
-from tests.helpers.uncompiled import run_uncompiled
 from tests.scan.kernels.test_axes import WAYS, by_lists
 
 PERIODS = [(1, 1, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (1, 0, 0), (0, 0, 1)]
