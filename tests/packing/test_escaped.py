@@ -10,7 +10,7 @@ from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_conta
 from scanfab.packing.escaped import escaped_grains
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.plan import make_plan
-from tests.helpers.lattices import ball_points, shaken_cubic
+from tests.helpers.lattices import ball_points, shaken_cubic, simple_cubic
 
 SPHERES = shaken_cubic(np.random.default_rng(5), 9)
 
@@ -51,6 +51,12 @@ def test_grains_that_flew_away_together_and_to_several_sides_are_all_found():
     packing = with_flown((30, 4, 4), (31, 4, 4), (4, -30, 4), (4, 4, 1e6))
     assert escaped_of(packing) == [729, 730, 731, 732]
     assert escaped_grains(packing, np.ones(733, bool)).gap == pytest.approx(20.5, abs=1.0)
+
+
+def test_one_grain_of_a_small_sample_may_escape():
+    """Although it is more than one of a hundred."""
+    packing = Packing(np.vstack([simple_cubic(4).position, [20.0, 2.0, 2.0]]), 0.5)
+    assert escaped_of(packing) == [64]
 
 
 @pytest.mark.parametrize("far", [3.0, 13.0])

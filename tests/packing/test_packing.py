@@ -125,20 +125,11 @@ def test_the_point_is_the_middle_of_the_overlap():
 
 
 def test_a_contact_through_a_face_takes_the_nearest_image():
-    contacts = in_cell(contacts=[[2, 0]]).contacts
+    contacts = in_cell(contacts=ContactList([[2, 0]], force=[[3.0, 1, 0]])).contacts
     np.testing.assert_array_equal(contacts.image, [[1, 0, 0]])
     np.testing.assert_allclose(contacts.normal, [[1, 0, 0]])
     np.testing.assert_allclose(contacts.point, [[4.75, 0, 0]])
-
-
-def test_a_contact_may_name_its_image_from_where_its_grains_are_given():
-    """The last grain is given two periods away from the cell."""
-    given = ROW + np.array([[0.0, 0, 0], [0, 0, 0], [11.4, 0, 0]])
-    listed = ContactList([[0, 2]], image=[[-3, 0, 0]])
-    cell = Cell([5.7, 9, 9], (True, False, False))
-    contacts = Packing(given, 1.0, contacts=listed, cell=cell).contacts
-    np.testing.assert_array_equal(contacts.image, [[-1, 0, 0]])
-    np.testing.assert_allclose(contacts.normal, [[-1, 0, 0]])
+    np.testing.assert_allclose(contacts.force_n, [3.0])
 
 
 def test_each_pair_counts_once_with_its_first_force_whichever_grain_is_first():
@@ -147,12 +138,6 @@ def test_each_pair_counts_once_with_its_first_force_whichever_grain_is_first():
     contacts = Packing(ROW, 1.0, contacts=listed).contacts
     np.testing.assert_array_equal(contacts.pairs, [[1, 0], [1, 2]])
     np.testing.assert_array_equal(contacts.force, force[[0, 2]])
-
-
-def test_a_grain_touches_its_own_image_once():
-    listed = ContactList([[0, 0], [0, 0]], image=[[1, 0, 0], [-1, 0, 0]])
-    packing = Packing([[0, 0, 0]], 1.0, contacts=listed, cell=Cell([1.9, 9, 9]))
-    assert len(packing.contacts) == 1
 
 
 def test_the_source_of_a_list_is_kept():
@@ -197,14 +182,6 @@ def test_the_other_grain_feels_the_opposite():
     np.testing.assert_array_equal(one.force_n, two.force_n)
     stress = [np.outer(c.force[0], c.normal[0]) for c in (one, two)]
     np.testing.assert_array_equal(*stress)
-
-
-def test_through_a_periodic_face_the_normal_is_that_of_the_image():
-    places = [[0.5, 5, 5], [9.0, 5, 5]]
-    listed = ContactList([[0, 1]], force=[[-3.0, 1, 0]])
-    contacts = Packing(places, 1.0, contacts=listed, cell=Cell([10, 10, 10])).contacts
-    np.testing.assert_allclose(contacts.normal, [[-1, 0, 0]], atol=1e-12)
-    np.testing.assert_allclose(contacts.force_n, [3.0])
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,6 @@ from scanfab.packing.sample import VARIANTS
 from scanfab.packing.search import near_pairs, overlapping_pairs
 from tests.helpers import naive
 from tests.helpers.lattices import face_centred_cubic, simple_cubic
-from tests.helpers.uncompiled import run_uncompiled
 
 TOLERANCE = 1e-4
 
@@ -84,25 +83,6 @@ def check_random_periodic(random):
 def test_contacts_are_those_of_the_slow_twin(check, times):
     for seed in range(times):
         check(np.random.default_rng(seed))
-
-
-def test_contacts_are_those_of_the_slow_twin_uncompiled():
-    run_uncompiled(
-        "import numpy as np\n"
-        "from scanfab.packing import search\n"
-        "from tests.packing import test_search as here\n"
-        "assert not hasattr(search.find_pairs, 'py_func')\n"
-        "for seed in range(20):\n"
-        "    here.check_random_open(np.random.default_rng(seed))\n"
-        "    here.check_random_periodic(np.random.default_rng(seed))\n"
-    )
-
-
-@pytest.mark.parametrize("edges", [(0.5, 0.5, 0.5), (0.7, 2.5, 8.0), (2.9, 2.9, 2.9)])
-def test_cells_thinner_than_a_grain(edges):
-    position = np.random.default_rng(3).random((4, 3)) * edges
-    cell = {"vectors": edges, "periodic": (True, True, True)}
-    assert_those_of_the_slow_twin(position, np.array([0.49, 0.3, 0.1, 0.48]), **cell)
 
 
 def test_a_grain_of_many_cells_is_a_mistake_of_units():
@@ -172,30 +152,15 @@ def test_cubic_lattices_have_their_coordination_and_the_isotropic_fabric(lattice
         assert row.alpha_c == pytest.approx(0, abs=1e-9)
 
 
-@pytest.mark.parametrize("axis", [0, 1, 2])
-def test_all_contacts_along_one_axis(axis):
-    """A chain through the cell: n⊗n."""
-    position = np.zeros((5, 3)) + 2.0
-    position[:, axis] = np.arange(5) + 0.5
-    edges = np.where(np.arange(3) == axis, 5.0, 4.0)
-    packing = find_contacts(Packing(position, 0.5, cell=Cell(edges)), TOLERANCE)
-    tensor = contact_fabric(packing.contacts.normal)
-    assert len(packing.contacts) == 5
-    assert tensor.matrix == pytest.approx(np.diag(np.eye(3)[axis]), abs=1e-12)
-    assert tensor.axial(np.eye(3)[axis]) == pytest.approx(1.0)
-
-
-def through_many_images():
-    """Two grains of a cell that is thinner than they are along x and y."""
-    cell = Cell([0.6, 1.5, 9.0], (True, True, False))
-    return find_contacts(Packing([[0.1, 0.1, 4], [0.4, 1.3, 4]], 1.0, cell=cell))
+# two grains of a cell that is thinner than they are along x and y
+THIN = Cell([0.6, 1.5, 9.0], (True, True, False))
 
 
 @pytest.mark.parametrize(
     "packing",
     [
         find_contacts(Packing(*simple_cubic(2), cell=Cell([2, 2, 2])), TOLERANCE),
-        through_many_images(),
+        find_contacts(Packing([[0.1, 0.1, 4], [0.4, 1.3, 4]], 1.0, cell=THIN)),
     ],
     ids=["lattice", "through several images"],
 )
@@ -209,15 +174,6 @@ def test_contacts_listed_twice_or_from_both_sides_count_once(packing):
     again = packing.with_contacts(both).contacts
     assert np.array_equal(again.pairs, listed.pairs)
     assert np.array_equal(again.image, listed.image)
-
-
-def test_a_pair_touches_through_each_image_that_is_near_enough():
-    steps = list(itertools.product(range(-9, 10), repeat=2))
-    near = [(i, j) for i, j in steps if np.hypot(0.3 + 0.6 * i, 1.2 + 1.5 * j) < 2.0]
-    own = [(i, j) for i, j in steps if (i, j) > (0, 0) and np.hypot(0.6 * i, 1.5 * j) < 2.0]
-    expected = {(0, 1, (i, j, 0)) for i, j in near}
-    expected |= {(row, row, (i, j, 0)) for row in (0, 1) for i, j in own}
-    assert canonical(through_many_images().contacts) == expected
 
 
 @pytest.mark.parametrize(

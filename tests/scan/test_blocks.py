@@ -16,7 +16,6 @@ from scanfab.scan.tallies import tally_triads
 from tests.helpers import naive
 from tests.helpers.lattices import poisson_spheres, rotation
 from tests.helpers.scanning import solids_of
-from tests.helpers.uncompiled import run_uncompiled
 from tests.helpers.windows import random_window
 from tests.scan.kernels.test_periodic import lines_of, random_medium
 from tests.scan.test_edges import open_solids
@@ -180,16 +179,6 @@ def test_by_the_rule_start_each_end_is_in_its_own_block(seed):
     check_start(np.random.default_rng([seed, 4]))
 
 
-def test_segments_are_in_the_block_of_their_middle_uncompiled():
-    run_uncompiled(
-        "import numpy as np\n"
-        "from tests.scan import test_blocks as here\n"
-        "np.seterr(invalid='ignore')\n"
-        "here.check_window_and_whole(np.random.default_rng([0, 3]))\n"
-        "here.check_start(np.random.default_rng([0, 4]))\n"
-    )
-
-
 @pytest.mark.parametrize("edge", ["clip", "start", "ends"])
 def test_all_blocks_together_are_the_scan_of_the_same_lines(edge):
     random = np.random.default_rng(6)
@@ -214,5 +203,6 @@ def test_lines_of_a_map_are_kept_in_any_number_of_threads():
     blocks = some_blocks(random)[0]
     words = {"spacing": 0.2, "cutoffs": [0.1], "blocks": (blocks, blocks), "variants": "ac"}
     one, three = (scan_gaps(solids, RULE, workers=n, **words) for n in (1, 3))
-    assert np.array_equal(one.length, three.length)
+    assert np.array_equal(one.number, three.number)
+    assert np.array_equal(one.square, three.square)
     assert np.array_equal(one.scan.chords, three.scan.chords)

@@ -17,11 +17,10 @@ from scanfab.scan.solids import shortest_gap
 from tests.helpers import naive
 from tests.helpers.lattices import ball_points, rotation
 from tests.helpers.scanning import ratio, scan_triads
-from tests.helpers.uncompiled import run_uncompiled
 from tests.helpers.windows import random_window
 from tests.scan.kernels.test_axes import KINDS
 
-RUNS_OF_A_KIND = 25
+RUNS_OF_A_KIND = 15
 CUTOFFS = [0.0, 0.3, 0.8]
 
 
@@ -101,7 +100,7 @@ def test_rules_equal_the_slow_twin_on_any_packing(kind, edge, narrow_margin):
 @pytest.mark.parametrize("edge", EDGES)
 @pytest.mark.parametrize("periodic", [(True, True, True), (True, False, True), (False, True, True)])
 def test_rules_equal_the_slow_twin_in_tilted_cells(periodic, edge, narrow_margin):
-    for seed in range(8):
+    for seed in range(4):
         random = np.random.default_rng([seed, 5])
         cell = Cell([[4.0, 0, 0], [1.7, 3.5, 0], [-0.9, 1.2, 3.2]], periodic)
         position = random.uniform(0, 1, (14, 3)) @ cell.vectors
@@ -176,18 +175,17 @@ def of_poisson(edge, cutoff, packings=120):
     return ratio(np.array(length), np.array(number, dtype=float))
 
 
-@pytest.mark.parametrize("edge", EDGES)
+@pytest.mark.parametrize("edge", ["start", "ends"])
 def test_poisson_spheres_have_their_mean_length_in_small_windows(edge):
-    """``start`` and ``ends`` c + 1/β, ``clip`` c + A1/(A0 + βA1)."""
+    """ℓ = c + 1/β; clipped to the window it would be c + A1/(A0 + βA1)."""
     cutoff, window, beta = 0.5, 9.0, 0.2 * np.pi * 13 / 12
     a0 = 1 - cutoff**2 / (4 * window**2)
     a1 = 4 * window / 3 - cutoff + cutoff**3 / (12 * window**2)
     found = of_poisson(edge, cutoff)
-    expected = cutoff + (a1 / (a0 + beta * a1) if edge == "clip" else 1 / beta)
-    assert found.error < 6e-3 * expected
-    assert found.agrees(expected, within=2e-2)
+    assert found.error < 6e-3 * (cutoff + 1 / beta)
+    assert found.agrees(cutoff + 1 / beta, within=2e-2)
     # what clip misses is seen
-    assert edge == "clip" or not found.agrees(cutoff + a1 / (a0 + beta * a1), within=1.0)
+    assert not found.agrees(cutoff + a1 / (a0 + beta * a1), within=1.0)
 
 
 def test_a_segment_that_reaches_through_many_cells_is_followed():
@@ -206,16 +204,3 @@ def test_a_segment_that_reaches_through_many_cells_is_followed():
     assert number == len(expected)
     assert length == pytest.approx(expected.sum(), rel=1e-9)
     assert sums.left_out.sum() == 0.0
-
-
-@pytest.mark.parametrize("edge", ["start", "ends"])
-def test_kernels_run_without_the_compiler(edge):
-    run_uncompiled(
-        f"""
-import numpy as np
-from tests.scan.kernels.test_axes import overlapping
-from tests.scan.test_edges import check_open
-for seed in range(3):
-    check_open(overlapping, np.random.default_rng(seed), "{edge}", ("cd", "c", "d"))
-"""
-    )

@@ -38,14 +38,6 @@ def assert_all_octants_are(sums, gaps, place):
         np.testing.assert_allclose(length, expected_length, rtol=1e-10)
 
 
-@pytest.mark.parametrize("place", range(len(CUTOFFS)))
-def test_all_octants_together_are_the_scan_of_the_same_lines(solids, place):
-    gaps = gaps_of(solids, seed=3)
-    sums = scan_lines(solids, RULE, spacing=0.3, cutoff=CUTOFFS[place], replicates=range(3), seed=3)
-    assert np.array_equal(gaps.axes, sums.axes)
-    assert_all_octants_are(sums, gaps, place)
-
-
 @pytest.mark.parametrize("periodic", [(True, True, True), (True, False, True)])
 def test_all_octants_of_a_periodic_packing_are_the_scan_of_the_same_lines(periodic):
     random = np.random.default_rng(1)
@@ -85,12 +77,6 @@ def test_octant_left_out_is_that_of_the_slow_twin(solids):
             assert (under[0, 2], over[0, 2]) == pytest.approx(tuple(rest[:2]))
             over, under = gaps.kept("c", place, moment=2, without=block)
             assert (under[0, 2], over[0, 2]) == pytest.approx(tuple(rest[1:]))
-
-
-def test_threads_change_nothing(solids):
-    one, three = gaps_of(solids), gaps_of(solids, workers=3)
-    assert np.array_equal(one.square, three.square)
-    assert np.array_equal(one.number, three.number)
 
 
 def test_variants_that_are_not_wanted_have_no_sums(solids):

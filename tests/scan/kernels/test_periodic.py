@@ -9,7 +9,6 @@ from scanfab.scan.kernels import periodic, sweep
 from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.tallies import FollowedTooFarError, Following, tally_triads
 from tests.helpers import naive
-from tests.helpers.uncompiled import run_uncompiled
 from tests.scan.kernels.test_axes import WAYS, by_lists
 
 PERIODS = [(1, 1, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (1, 0, 0), (0, 0, 1)]
@@ -109,13 +108,13 @@ def assert_equals_naive(medium, normal, offset, spacing, cutoff):
 
 @pytest.mark.parametrize("periods", PERIODS, ids=str)
 def test_gaps_equal_those_of_explicit_images(periods):
-    for seed in range(8):
+    for seed in range(5):
         check_equals_naive(np.random.default_rng([seed, *periods]), periods)
 
 
 @pytest.mark.parametrize("periods", PERIODS, ids=str)
 def test_long_gaps_in_sparse_media_equal_those_of_explicit_images(periods):
-    for seed in range(4):
+    for seed in range(2):
         random = np.random.default_rng([seed, *periods, 1])
         check_equals_naive(random, periods, sparse_medium)
 
@@ -153,25 +152,6 @@ def test_every_direction_crosses_its_face_steeply():
         assert prism.length <= np.sqrt(3) * 3.0 + 1e-9
         assert prism.triad @ prism.triad.T == pytest.approx(np.eye(3), abs=1e-12)
         assert prism.base_v > 0
-
-
-def test_without_overlap_the_mean_gap_is_that_of_stereology():
-    """Porosity / (N_V π⟨r²⟩) at cut-off 0, in every direction without channels."""
-    random = np.random.default_rng(3)
-    vectors = np.array([[3.0, 0, 0], [1.0, 3, 0], [-1.0, 0.5, 3]])
-    grid = np.stack(np.meshgrid(*3 * [np.arange(3.0)], indexing="ij"), -1).reshape(-1, 3) / 3
-    position = grid @ vectors + random.uniform(-0.04, 0.04, (27, 3))
-    radius = random.uniform(0.25, 0.42, 27)
-    medium = CellGrains(position, radius, np.zeros(27, bool), vectors, np.ones(3, bool))
-    volume = abs(np.linalg.det(vectors))
-    porosity = 1 - 4 / 3 * np.pi * np.sum(radius**3) / volume
-    expected = porosity * volume / (np.pi * np.sum(radius**2))
-    total = sum(
-        tallies_of(medium, direction(random), random.random(2), 0.04, 0.0, "a")[0]
-        for _ in range(60)
-    )
-    assert total[sweep.LENGTH] / total[sweep.KEPT] == pytest.approx(expected, rel=0.01)
-    assert total[sweep.VOID] / total[sweep.LINE_LENGTH] == pytest.approx(porosity, rel=0.01)
 
 
 def test_simple_cubic_along_an_edge():
@@ -230,14 +210,3 @@ def test_without_solids_all_lines_are_channels(corner):
     assert tally[sweep.LINES] == tally[sweep.KEPT] == 0
     assert tally[sweep.VOID] == pytest.approx(tally[sweep.LINE_LENGTH])
     assert tally[sweep.CHANNELS] > 1000
-
-
-def test_gaps_equal_those_of_explicit_images_uncompiled():
-    run_uncompiled(
-        "import numpy as np\n"
-        "from tests.scan.kernels import test_periodic as here\n"
-        "np.seterr(invalid='ignore')\n"
-        "for periods in here.PERIODS:\n"
-        "    for seed in range(2):\n"
-        "        here.check_equals_naive(np.random.default_rng([seed, *periods]), periods)\n"
-    )

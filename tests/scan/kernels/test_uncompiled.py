@@ -1,0 +1,41 @@
+"""The kernels as plain Python: they equal their slow twins, and no index is out of range."""
+
+from tests.helpers.uncompiled import run_uncompiled
+
+
+def test_kernels_equal_their_slow_twins_uncompiled():
+    """All in one process, as loading the package takes longer than most of the checks."""
+    run_uncompiled(
+        """
+import numpy as np
+from scanfab.packing import search
+from scanfab.scan.kernels import axes
+from tests.packing import test_search
+from tests.scan import test_blocks, test_edges
+from tests.scan.kernels import test_axes, test_bins, test_periodic
+
+assert not hasattr(axes.scan_axes, "py_func")
+assert not hasattr(search.find_pairs, "py_func")
+np.seterr(invalid="ignore")
+random = np.random.default_rng
+for seed in range(4):
+    for kind in test_axes.KINDS:
+        test_axes.check_random_packing(kind, random(seed))
+        if seed < 3:
+            test_bins.check_random_packing(kind, random(seed))
+    test_axes.check_less_that_is_wanted(seed)
+test_axes.test_a_chord_that_reaches_back_past_the_last_gap()
+test_bins.check_only_what_is_wanted_is_added()
+for periods in test_periodic.PERIODS:
+    for seed in range(2):
+        test_periodic.check_equals_naive(random([seed, *periods]), periods)
+for edge in ("start", "ends"):
+    for seed in range(3):
+        test_edges.check_open(test_axes.overlapping, random(seed), edge, ("cd", "c", "d"))
+test_blocks.check_window_and_whole(random([0, 3]))
+test_blocks.check_start(random([0, 4]))
+for seed in range(20):
+    test_search.check_random_open(random(seed))
+    test_search.check_random_periodic(random(seed))
+"""
+    )
