@@ -60,9 +60,9 @@ def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
     Show how the void fabric of one frame changes with spacing, directions, cut-off and RV.
 
     Each step is a row with the error of the scan, the error of the sample, and the time it took.
-    Then follow the steps from which on the result no longer changes, and the recommended settings
+    scanfab then names the steps from which on the result no longer changes, and recommends settings
     as a command line. The spacings go down to r_min/10, the value of the 2017 paper. --cutoff and
-    --rv set the cut-off and the RV of the ladders that do not change them.
+    --rv set the cut-off and the RV of the ladders that change something else.
 
     On a terminal the steps are a readable table. Otherwise they are CSV on standard output, and
     the findings go to standard error.

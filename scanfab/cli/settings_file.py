@@ -95,7 +95,7 @@ def _as_typed(key: str, value: Any) -> Any:
     for item in several:
         # bool is a subclass of int, so True would be taken for the number 1
         if isinstance(item, bool) or not isinstance(item, str | int | float):
-            raise unusable(key, "numbers or text in quotes, one or a list of them", item)
+            raise unusable(key, "numbers or text in quotes, alone or in a list", item)
     words = [str(item) for item in several]
     typed = words if option.several else ",".join(words)
     option.parse(key, typed)

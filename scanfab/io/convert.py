@@ -95,7 +95,7 @@ def convert(
     if isinstance(source, str | os.PathLike):
         source = read_series(source, **reading)
     elif reading:
-        raise SettingsError(f"`{next(iter(reading))}` is for files that are not read yet")
+        raise SettingsError(f"`{next(iter(reading))}` applies to files alone, not to packings")
     chosen = parse_frames("frames", frames)
     inputs = _inputs_to_keep(source, chosen, writer) if isinstance(source, Series) else []
     packings = _packings(source, chosen)

@@ -10,9 +10,9 @@ import sys
 import tempfile
 import zlib
 from collections.abc import Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from contextvars import ContextVar
-from functools import lru_cache, partial
+from functools import cache, lru_cache, partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
@@ -37,7 +37,7 @@ ANYWAY = 64 << 20
 KEPT = 16
 # bytes that are copied in one piece
 PART = 4 << 20
-# the folder of each decompressed copy has a name that begins with this
+# names of the folders of decompressed copies begin with this
 PREFIX = "scanfab-"
 Stamp = tuple[str, int, int, int]
 """Identifies a file in its present state: path, inode, size and time of change."""
@@ -172,8 +172,7 @@ def temporary_copy(content: Iterable[bytes], name: str) -> Path:
     """
     folder = ""
     try:
-        folder = tempfile.mkdtemp(prefix=PREFIX)
-        at_end(partial(shutil.rmtree, folder, ignore_errors=True))
+        folder = tempfile.mkdtemp(dir=_folder(os.getpid()))
         copy = Path(folder) / name
         with open(copy, "wb") as file:
             file.writelines(content)
@@ -185,6 +184,22 @@ def temporary_copy(content: Iterable[bytes], name: str) -> Path:
             place = tempfile.tempdir or "any folder"
             raise ReadError(f"{name}: cannot be written to {place}: {advice}") from None
         raise
+
+
+@cache
+def _folder(process: int) -> str:
+    """The folder for the copies of a process; it is removed at the end of the process."""
+    folder = tempfile.mkdtemp(prefix=PREFIX)
+    at_end(partial(_remove_at_end, folder))
+    return folder
+
+
+def _remove_at_end(folder: str) -> None:
+    # renamed first, so that a thread that is still reading cannot add a copy
+    last = f"{folder}-removed"
+    with suppress(OSError):
+        os.rename(folder, last)
+    shutil.rmtree(last, ignore_errors=True)
 
 
 def without_temporary(text: str) -> str:
@@ -199,7 +214,7 @@ def without_temporary(text: str) -> str:
     """
     # tempfile.tempdir is set once there is a copy
     folder = re.escape(os.path.join(tempfile.tempdir or "", PREFIX))
-    return re.sub(rf"{folder}\w+[/\\]", "", text)
+    return re.sub(rf"{folder}\w+[/\\]tmp\w+[/\\]", "", text)
 
 
 def _decompressor(head: bytes) -> Any:

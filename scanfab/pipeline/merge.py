@@ -164,4 +164,4 @@ def _rows_of(source: str, frame: int, parts: Sequence[Record]) -> list[Row]:
                 raise ReadError(f"{part.path}: lacks {what}: run its job again")
             warn(f"{part.path}: {what} was skipped, see its manifest")
             return []
-    raise ReadError(f"{what} is in none of the parts: name all of them, or choose `frames`")
+    raise ReadError(f"{what} is in none of the parts: name all parts, or choose `frames`")

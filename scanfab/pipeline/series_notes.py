@@ -133,8 +133,9 @@ class SeriesNotes:
             if change > STRAIN:
                 yield Note(
                     "no_strain",
-                    f"the column strain is empty, since there is neither a periodic cell nor a "
-                    f"boundary, but the extents of the grains change by {change:.2g}: "
+                    f"the column strain is empty, since no periodic edge of a cell lies along the "
+                    f"loading axis and no boundary is named, but the extents of the grains change "
+                    f"by {change:.2g}: "
                     f'`strain="grains"` measures the strain by them',
                     kind=ScanfabNote,
                 )

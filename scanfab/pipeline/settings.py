@@ -101,8 +101,8 @@ class Settings:
     """Axis of the cylinder (default: `axis`)."""
     rv_follows: str = window(default="none", choices=("none", "strain"))
     """
-    none: the RV keeps its shape. strain: it deforms with the sample, that is with whatever `strain`
-    is measured by: the cell, or the extents of boundary or grains along x, y, z.
+    none: the RV keeps its shape. strain: it deforms with what `strain` measures: the cell, or the
+    extents of boundary or grains along x, y, z.
     """
     edge: str = window(default=CLIP, choices=EDGES)
     """
@@ -161,8 +161,8 @@ class Settings:
     """
     Limit for the work of an auto scan: in each frame the scans of the whole sample and of the RVs
     each stop before they cut more than this number of chords from grains (each line also counts as
-    a chord). The default, 1e9 with the tolerance auto and else 1e10, takes one processor some ten
-    seconds, or one or two minutes.
+    a chord). Default: 1e9 with the tolerance auto, which takes one processor some ten seconds;
+    otherwise 1e10, which takes one or two minutes.
     """
     min_contacts: int = sample(values.parse_count, default=2)
     """A grain with fewer contacts (a clump: with fewer neighbours) is a rattler."""
@@ -200,9 +200,9 @@ class Settings:
         optional(whole("the number of a frame, such as 0 or -1", lambda _: True)), metavar="FRAME"
     )
     """
-    The frame from which L0, the RV, the radii behind rmin and the like, and the blocks of a map
-    come: its number in each series; a negative number counts from the end (default: the first frame
-    that has grains).
+    Number of the reference frame in each series. This frame sets L0, the RV, rmin, rmean and rmax,
+    and the blocks of a map. A negative number counts from the end (default: the first frame that
+    has grains).
     """
     seed: int = scan(values.parse_count, default=0)
     """Seed of the random numbers."""

@@ -212,8 +212,8 @@ def plane_rule(count: int, plane: Space) -> DirectionRule:
     """
     if not 2 <= count <= MOST_STEPS:
         raise SettingsError(
-            f"directions: in {plane} from 2 to {MOST_STEPS} axes, found {count}: one axis says "
-            f"nothing of what lies across it"
+            f"directions: expected 2 to {MOST_STEPS} axes in {plane}, found {count}: one axis "
+            f"measures nothing across it"
         )
     angle = np.pi * (np.arange(count) + 0.5) / count
     axes = np.column_stack([np.cos(angle), np.sin(angle)]) @ plane.basis[:2]

@@ -215,7 +215,7 @@ def margin_of(grains: CellGrains) -> float:
 
 
 def shortest_gap(solids: Solids) -> float:
-    """Shorter gaps are rounding, dump's length unit."""
+    """Length below which a gap is only rounding, dump's length unit."""
     radius = solids.grain_radius
     return SHORTEST * float(radius.min()) if len(radius) else 0.0
 

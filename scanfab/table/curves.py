@@ -36,7 +36,7 @@ CERTAIN, ALONG = 5.0, 0.6
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One source and variant over its frames."""
+    """The rows of one source and variant, over the frames."""
 
     source: str
     variant: str

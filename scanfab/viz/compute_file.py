@@ -142,7 +142,7 @@ def _opened(source: Source | Sequence[Source], options: dict[str, Any]) -> Seque
     if not given or not all(isinstance(one, str | os.PathLike) for one in given):
         raise SettingsError(
             f"expected a Series or the path of dumps, or several of one kind, found {source!r}: "
-            f"of packings, compute() makes a table, which has save()"
+            f"for packings call compute(), and save() of its table"
         )
     paths = [os.fspath(path) for one in given for path in expanded(one)]
     return open_sources(paths, **take_reading(options))

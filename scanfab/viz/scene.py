@@ -202,7 +202,7 @@ def scene_of(sample: Sample, *windows: Window) -> Scene:
 
 
 def grains_of(sample: Sample, window: Window | None) -> Grains:
-    """The particles of a frame, with what the sample knows of them."""
+    """The particles of a frame: which are rattlers or boundary, and which lie in the RV."""
     packing, bodies = sample.packing, sample.packing.bodies
     return Grains(
         position=packing.position,
@@ -218,7 +218,7 @@ def grains_of(sample: Sample, window: Window | None) -> Grains:
 
 
 def inside(points: FloatArray, sample: Sample, window: Window | None) -> BoolArray:
-    """Which points lie in the RV; none without one."""
+    """Which points lie in the RV; if there is no RV, none do."""
     if window is None or len(points) == 0:
         return np.zeros(len(points), bool)
     return window.contains(points, sample.packing)

@@ -131,7 +131,8 @@ class VtkReader(GrainsOnly):
             return contacts
         names = [name for name in mesh.line_arrays if "force" in name.lower() and name != "force"]
         if names:
-            note(f"contact arrays that are not read: {', '.join(names)}: only a vector `force` is")
+            listed = ", ".join(names)
+            note(f"contact arrays that are not read: {listed}: only a vector `force` is read")
         if contacts.force is None:
             return contacts
         pairs, force = np.asarray(contacts.pairs), np.asarray(contacts.force, np.float64)

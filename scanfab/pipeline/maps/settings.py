@@ -101,5 +101,5 @@ class MapSettings(Settings):
 
 
 def is_map(options: Any) -> bool:
-    """Whether options include an option of maps alone."""
+    """Whether one of the options makes a map, such as ``slices``."""
     return any(options.get(name) is not None for name in BLOCK_OPTIONS)

@@ -269,7 +269,7 @@ def sort_by(values: FloatArray, members: IntArray) -> None:
 
 @inner()
 def insert(values: FloatArray, members: IntArray, gap: int) -> None:
-    """Order those that are a multiple of the gap apart: fast where few are far from their place."""
+    """Sort members that are a multiple of the gap apart; fast if few are far from their place."""
     step = np.uint64(gap)
     for i in range(step, np.uint64(members.size)):
         moving, j = members[i], np.uint64(i)

@@ -91,7 +91,7 @@ def _named(data: Table, of: str | Sequence[str] | None) -> list[str]:
     names = [name.strip() for name in asked] or _first(data)
     if not names:
         raise SettingsError(
-            "figure columns: name those to draw: the table has none of those that `with_` adds"
+            "figure columns: name those to draw: the table has no columns that `with_` adds"
         )
     for name in names:
         if name not in data.names:

@@ -47,7 +47,7 @@ MOST_MARKERS = 25
 
 
 class Drawn(NamedTuple):
-    """A curve, its place among all of the table, its look and its name in the legend."""
+    """A curve, its number among all curves of the table, its look and its name in the legend."""
 
     curve: Curve
     place: int

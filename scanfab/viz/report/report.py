@@ -155,8 +155,8 @@ def make_report(
     named = [tables] if isinstance(tables, str | os.PathLike) else list(tables)
     if not all(isinstance(one, str | os.PathLike) for one in named):
         raise SettingsError(
-            "expected files of tables, beside which manifests say what made them: save a table, or "
-            "compute it by scanfab.compute_file, and name its file"
+            "expected files of tables with a manifest beside each: save a table, or compute it by "
+            "scanfab.compute_file, and name its file"
         )
     with listening() as told:
         inputs = read_inputs([Path(one) for one in named], cutoff, labels)
