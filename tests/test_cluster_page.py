@@ -99,7 +99,7 @@ def folders(tmp_path):
 
 def test_the_array_of_slurm(call, interrupt, whole, folders):
     """A task computes the folder of its index, and is submitted again after it was killed."""
-    command = "bash", "-c", script("#SBATCH --array").replace("--boundary type=2 ", "")
+    command = "bash", "-c", script("folders=(tests").replace("--boundary type=2 ", "")
     interrupt(
         signal.SIGKILL, "tests/*.part", *command,
         SLURM_CPUS_PER_TASK="1", SLURM_ARRAY_TASK_ID="0",

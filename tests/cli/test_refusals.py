@@ -41,7 +41,7 @@ def folder(tmp_path, monkeypatch):
         ("compute cube --directions nonsense:3", 2, "--directions: no rule is called 'nonsense:3'"),
         ("compute cube --boundary mask", 2, "--boundary: expected COLUMN=VALUE"),
         ("compute cube --frames a:b", 2, "--frames: expected a slice"),
-        ("compute cube --format nonsense", 2, "there is no reader called 'nonsense'; the readers"),
+        ("compute cube --format nonsense", 2, "there is no reader called 'nonsense', only edem"),
         ("compute cube --cell 1 2", 2, "--cell: expected three lengths"),
         ("compute cube --columns radius", 2, "--columns: expected NAME=COLUMN"),
         ("compute cube --columns x=1,x=2", 2, "--columns: expected one column for x"),

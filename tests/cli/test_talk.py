@@ -55,7 +55,7 @@ def test_verbose_says_what_is_used_and_how_long_each_frame_takes(said, series):
     result, lines = said("compute", *FAST, "--verbose", "--workers", "2")
     text = "\n".join(lines)
     assert re.search(
-        r"scanfab: scanfab [\d.]+, numpy [\d.]+, numba [\d.]+, Python .*; 2 work", text
+        r"scanfab: scanfab \S+, numpy [\d.]+, numba [\d.]+, Python .*; 2 work", text
     )
     assert f"scanfab: {series}: grains from {series}/dump_*.txt by liggghts, 3 files" in lines
     for frame in range(3):
