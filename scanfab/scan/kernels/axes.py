@@ -162,7 +162,11 @@ def scan_axes(
         triad, offset, tally = axes.triads[axis], axes.offsets[axis], tallies[axis]
         whole = counts.whole is not None
         grid = open_grid(extent, triad, offset, axes.spacing, clip.reach, whole)
-        spheres = project(position, radius, removed, triad, grid, clip.reach, counts.window)
+        reach, margin = np.inf, 0.0
+        if counts.window is not None and counts.window.start is not None:
+            # other spheres change no line
+            reach, margin = clip.reach, counts.window.margin
+        spheres = project(position, radius, removed, triad, grid, reach, margin)
         section = section_along(clip, triad)
         here = bins_along(bins, triad, axis)
         beyond = None

@@ -13,7 +13,7 @@ import numpy as np
 
 from scanfab.base.jit import LANES, ONE, inner
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
-from scanfab.scan.kernels.strips import FAR, Edge, Sphere, Strip, span
+from scanfab.scan.kernels.strips import FAR, Sphere, Strip, span
 
 # a bucket with more indices is sorted by itself, and not with all others
 FEW = 16
@@ -185,13 +185,13 @@ def project(
     triad: FloatArray,
     grid: Grid,
     reach: float,
-    window: Edge | None,
+    margin: float,
 ) -> Spheres:
     """
     The spheres that may meet a line, ordered by depth, in the triad with rows u, v, n.
 
-    By the rule ``start`` without those that lie aside of the ball that holds the window, whose
-    radius is ``reach``, or more than the margin before or behind it.
+    Without those that lie aside of a ball about the origin, or more than the margin before or
+    behind it.
     """
     u_x, u_y, u_z = triad[0, 0], triad[0, 1], triad[0, 2]
     v_x, v_y, v_z = triad[1, 0], triad[1, 1], triad[1, 2]
@@ -208,9 +208,8 @@ def project(
         column, row = (u - grid.first_u) * per_spacing, (v - grid.first_v) * per_spacing
         away = radius[k] * per_spacing
         meets = (np.floor(row + away) >= row - away) & (np.floor(column + away) >= column - away)
-        if window is not None and window.start is not None:
-            beyond, near = max(abs(depth) - window.margin, 0.0), reach + radius[k]
-            meets &= u * u + v * v + beyond * beyond <= near * near
+        beyond, near = max(abs(depth) - margin, 0.0), reach + radius[k]
+        meets &= u * u + v * v + beyond * beyond <= near * near
         count += np.uint64(meets)
     return in_order(found, int(count))
 
