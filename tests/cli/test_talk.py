@@ -54,9 +54,7 @@ def test_quiet_leaves_out_notes_but_no_warning_and_no_error(said):
 def test_verbose_says_what_is_used_and_how_long_each_frame_takes(said, series):
     result, lines = said("compute", *FAST, "--verbose", "--workers", "2")
     text = "\n".join(lines)
-    assert re.search(
-        r"scanfab: scanfab \S+, numpy [\d.]+, numba [\d.]+, Python .*; 2 work", text
-    )
+    assert re.search(r"scanfab: scanfab \S+, numpy [\d.]+, numba [\d.]+, Python .*; 2 work", text)
     assert f"scanfab: {series}: grains from {series}/dump_*.txt by liggghts, 3 files" in lines
     for frame in range(3):
         assert re.search(rf"scanfab: {series}: frame {frame}: 64 grains in [\d.e-]+ s", text)
