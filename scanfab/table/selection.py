@@ -121,7 +121,8 @@ def _of_cutoff(name: str, rows: Rows, cutoff: float) -> Rows:
     nearest = min(cutoffs, key=lambda value: abs(value - cutoff), default=math.nan)
     if not abs(nearest - cutoff) <= ROUNDING * abs(nearest):
         listed = ", ".join(f"{value:.3g}" for value in cutoffs) or "none in this table"
-        raise SettingsError(f"{name}: no row has the cut-off {cutoff:g}: found {listed}")
+        expected = f"expected a cut-off of the table: {listed}"
+        raise SettingsError(f"{name}: no row has the cut-off {cutoff:g}: {expected}")
     kept: dict[tuple[Any, ...], dict[str, Any]] = {}
     for place, row in enumerate(rows):
         if row.get("cutoff") == nearest:
