@@ -27,7 +27,7 @@ PLANE = "x y vx vy radius angle omega species"
 SPACE = "x y z vx vy vz radius q1 q2 q3 wx wy wz species"
 LAYOUTS = {6: Layout(tuple(PLANE.split()), line=2), 8: Layout(tuple(SPACE.split()), line=2)}
 # the line above a frame: number of grains, time, and bounds
-FRAME = rb"(?m)^\d{1,15}[ \t]+(\S+)(?:[ \t]+[-+.\deEinfa]+){%d}[ \t]*\r?\n"
+FRAME = rb"\d{1,15}[ \t]+(\S+)(?:[ \t]+[-+.\deEinfa]+){%d}[ \t]*\r?\n"
 FRAMES = {width: re.compile(FRAME % (width - 2)) for width in LAYOUTS}
 # time, rows of both grains, contact point, overlaps, normal and tangential force, both directions
 PAIRS = "t i j x y z delta deltat fn ft nx ny nz tx ty tz"

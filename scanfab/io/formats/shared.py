@@ -245,8 +245,7 @@ def marked_frames(
     path : Path
         The file.
     mark : Pattern
-        Matches at the first line of each frame. The search is fast if the pattern begins with a
-        letter, not with ``^`` or a choice.
+        Matches at the first line of each frame.
     check : callable, optional
         Reads the last of several frames and raises CutError if it is incomplete. By default a
         frame is incomplete if its last line has no end.
@@ -263,12 +262,13 @@ def marked_frames(
     starts: list[int] = []
     frames: list[Snapshot] = []
     size = 0
+    # the search is fast, as it begins with a literal
+    line = re.compile(rb"\n(?=" + mark.pattern + rb")", mark.flags)
     # not mapped into memory: the process would crash if another program truncated the file
     with open(plain(path), "rb") as stream:
         # pieces of whole lines, so that no mark is cut in two
         while piece := stream.read(PIECE) + stream.readline():
-            here = (match.start() for match in mark.finditer(piece))
-            starts += [size + at for at in here if piece[at - 1 : at] in (b"", b"\n")]
+            starts += [size + match.start() for match in line.finditer(b"\n" + piece)]
             size += len(piece)
         start = min(starts, default=size)
         lost = NO_COMMENT.search(text_of(Snapshot(path, stop=start)))
