@@ -217,6 +217,11 @@ def test_of_walls_whose_columns_are_not_proved_the_force_is_not_known(tmp_path):
         packing = scanfab.read(BOX / "dump_120000.txt.gz", contacts=walls)
         assert packing.wall_forces is None
         assert packing.wall_contacts.sum() == len(values)
+    # the forces of one list alone are not those of all walls
+    files = [BOX / "dump_120000.txt.gz", BOX / "walls_120000.txt.gz", tmp_path / "short.txt"]
+    packing = scanfab.read_series(files)[0].read()
+    assert packing.wall_forces is None
+    assert packing.wall_contacts.sum() == 2 * len(values)
 
 
 @pytest.mark.parametrize(
