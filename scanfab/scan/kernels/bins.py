@@ -67,13 +67,12 @@ class Bins(NamedTuple):
     """
 
     def of_whole(self, center: FloatArray) -> Bins:
-        """Empty bins by the whole's blocks for what lies in a window about a centre."""
+        """The same bins, by the whole's blocks for what lies in a window about a centre."""
         to_block, parts, repeats, form, halves = self.partition
         to_block = to_block[::-1].copy()
         to_block[:, :, 3] += to_block[:, :, :3] @ center
         parts, repeats, form = parts[::-1].copy(), repeats[::-1].copy(), form[::-1].copy()
-        partition = Partition(to_block, parts, repeats, form, halves)
-        return self._replace(partition=partition, sums=np.zeros_like(self.sums))
+        return self._replace(partition=Partition(to_block, parts, repeats, form, halves))
 
 
 def no_bins(axes: int) -> Bins:

@@ -91,10 +91,11 @@ def open_grid(
     The lines that meet the window or, of the whole, any sphere.
 
     ``reach`` is the radius of the ball that holds the window; lines that meet the ball alone are
-    there, too.
+    there, too. A window without an end is met by every line.
     """
-    low_u = low_v = -reach
-    high_u = high_v = reach
+    high_u = high_v = reach if reach < FAR else 0.0
+    low_u = low_v = -high_u
+    whole = whole or reach > FAR
     if whole and extent.reach > 0.0:
         low_u, high_u = shadow(extent, triad[0], low_u, high_u)
         low_v, high_v = shadow(extent, triad[1], low_v, high_v)
