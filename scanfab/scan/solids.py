@@ -17,6 +17,7 @@ from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import CLIP
 from scanfab.scan.kernels.cells import Cells, fill_cells
+from scanfab.scan.kernels.grid import Bounds
 from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.kernels.strips import FAR, Clip
 
@@ -121,6 +122,11 @@ class Solids:
             what.append(f"a periodic whole of {counted(len(self.medium.radius), 'grain')}")
         what.append("no window" if self.window is None else f"window of {self.window}")
         return f"Solids: {', '.join(what)}"
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        """What holds all spheres."""
+        return bounds_of(self.position, self.radius)
 
     @cached_property
     def cells(self) -> Cells:
@@ -319,3 +325,12 @@ def _farthest(grains: CellGrains, volume: float, solid: BoolArray | slice) -> fl
     periods = float(np.linalg.norm(grains.vectors[grains.periodic], axis=1).sum())
     free_path = volume / (np.pi * float(np.sum(radius**2)))
     return MOST_PERIODS * periods + MOST_FREE_PATHS * free_path
+
+
+def bounds_of(position: FloatArray, radius: FloatArray) -> Bounds:
+    """A box and a ball about the origin that hold some spheres."""
+    if not len(radius):
+        return Bounds(np.zeros(3), np.zeros(3), 0.0)
+    low, high = (position - radius[:, None]).min(axis=0), (position + radius[:, None]).max(axis=0)
+    reach = float((np.sqrt(np.einsum("ij,ij->i", position, position)) + radius).max())
+    return Bounds(0.5 * (low + high), 0.5 * (high - low), reach)

@@ -14,9 +14,8 @@ from scanfab.scan.edges import CLIP, ENDS
 from scanfab.scan.kernels import sweep
 from scanfab.scan.kernels.axes import Axes, Followed, scan_axes, scan_cell
 from scanfab.scan.kernels.bins import OF_WHOLE, OF_WINDOW, Bins, no_bins
-from scanfab.scan.kernels.grid import Bounds
 from scanfab.scan.kernels.strips import Counts, Edge
-from scanfab.scan.solids import Inner, Solids, clip_of, shortest_gap
+from scanfab.scan.solids import Inner, Solids, bounds_of, clip_of, shortest_gap
 
 # of the spacing and for each variant: spheres of such a radius are scanned as fast row by row as
 # over lists of chords; for the more variants the lists serve, the sooner they pay
@@ -186,11 +185,14 @@ class _Lines(NamedTuple):
         if window is not None and window.start is not None:
             followed = Followed(solids.cells, not self.first, self.following.left)
         position, radius = np.ascontiguousarray(position[solid]), radius[solid]
+        extent = solids.bounds  # only the whole asks for it
+        if whole is not None and not self.first:
+            extent = bounds_of(position, radius)
         scan_axes(
             position,
             radius,
             removed[solid],
-            _bounds(position, radius),
+            extent,
             self.axes,
             clip_of(shape),
             Counts(self.cutoff, self.both, whole, window, None),
@@ -226,12 +228,3 @@ class _Lines(NamedTuple):
                 # but for the cut-off: segments that reach it are known to count
                 margin = min(margin, max(NARROW * margin, 1.01 * self.cutoff))
             self.scan(None, Edge(None, True, margin))
-
-
-def _bounds(position: FloatArray, radius: FloatArray) -> Bounds:
-    """What holds all spheres."""
-    if not len(radius):
-        return Bounds(np.zeros(3), np.zeros(3), 0.0)
-    low, high = (position - radius[:, None]).min(axis=0), (position + radius[:, None]).max(axis=0)
-    reach = float((np.sqrt(np.einsum("ij,ij->i", position, position)) + radius).max())
-    return Bounds(0.5 * (low + high), 0.5 * (high - low), reach)
