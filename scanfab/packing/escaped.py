@@ -10,6 +10,7 @@ import numpy as np
 from scanfab.base.errors import Note
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.packing import Packing
+from scanfab.packing.window import SurfaceBox
 
 # A gap between surfaces is wide if it is above RADII largest radii, and above TIMES the usual gap.
 # The usual gap is the one to the nearest neighbour that only a share LONELY of the grains exceeds.
@@ -87,7 +88,7 @@ def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
     return Escaped(grains & ~left, gap, _number(packing, flown) > most)
 
 
-def notes_of_escaped(packing: Packing, escaped: Escaped) -> list[Note]:
+def notes_of_escaped(packing: Packing, grains: BoolArray, escaped: Escaped) -> list[Note]:
     """The note on grains that have escaped; an empty list if there are none."""
     rows = np.flatnonzero(escaped.grains)
     if not rows.size:
@@ -102,9 +103,12 @@ def notes_of_escaped(packing: Packing, escaped: Escaped) -> list[Note]:
         f"in a and b it is still solid: {cure} takes it out"
     )
     if escaped.are_many:
+        boxes = [SurfaceBox.of(packing, chosen) for chosen in (grains, grains & ~escaped.grains)]
+        wide, narrow = (" x ".join(f"{x:.4g}" for x in box.high - box.low) for box in boxes)
         text = (
             f"; these are too many to be left out, so they widen the sample's extents, RV "
-            f"and octants; if they have flown away, {cure} takes them out"
+            f"and octants: {wide} with them, {narrow} without; if they have flown away, {cure} "
+            f"takes them out"
         )
     return [Note(ESCAPED, f"{grain}: {escaped.gap:g} away from all others{text}")]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from scanfab import box, cylinder, direction_rule, scan_lines, sphere
+from scanfab import box, cylinder, direction_rule, ellipsoid, scan_lines, sphere
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.gaps import scan_gaps
 from scanfab.scan.kernels.strips import section_along, spans
@@ -12,7 +12,7 @@ from scanfab.scan.lines import line_triads
 from scanfab.scan.solids import clip_of
 from tests.helpers import naive
 from tests.helpers.lattices import Spheres, poisson_spheres, rotation
-from tests.helpers.scanning import solids_of
+from tests.helpers.scanning import mean_lengths, scan_along, solids_of
 from tests.helpers.windows import cut_ball, random_window
 
 NOTHING = Spheres(np.zeros((0, 3)), np.zeros(0))
@@ -42,6 +42,23 @@ def test_lines_measure_the_volume_along_every_axis_and_the_surface_over_all(name
     assert rule.weights @ sums.lines[0, 2] * 0.02**2 == pytest.approx(surface / 4, rel=2e-3)
 
 
+def test_lines_through_an_empty_box_are_as_long_as_its_edges():
+    sums = scan_along(solids_of(NOTHING, box(2 * HALF)), np.eye(3), 0.05)
+    assert mean_lengths(sums, "c").value == pytest.approx(2 * HALF)
+
+
+def test_lines_along_a_cylinder_are_as_long_as_it_is():
+    for axis in np.concatenate([TURN, direction_rule("lebedev:11").axes]):
+        sums = scan_along(solids_of(NOTHING, cylinder(0.7, 2.6, axis)), [axis], 0.05)
+        assert mean_lengths(sums, "c").value == pytest.approx(2.6)
+        assert sums.lines[:, 2].mean() * 0.05**2 == pytest.approx(np.pi * 0.49, rel=0.02)
+
+
+def test_lines_along_an_axis_of_an_ellipsoid_have_two_thirds_of_it_on_average():
+    sums = scan_along(solids_of(NOTHING, ellipsoid(HALF, TURN)), TURN, 0.01)
+    assert mean_lengths(sums, "c").value == pytest.approx(4 / 3 * HALF, rel=1e-3)
+
+
 @njit
 def quadric_along(clip, triad):
     section = section_along(clip, triad)
@@ -57,7 +74,7 @@ def test_a_sphere_has_the_same_numbers_along_all_axes():
 
 def test_spans_are_those_of_the_naive_twin():
     random = np.random.default_rng(6)
-    for _ in range(120):
+    for _ in range(300):
         window = random_window(random)
         if not isinstance(window, float):
             triad, points = rotation(random), random.uniform(-2.0, 2.0, (40, 2))
@@ -92,3 +109,11 @@ def test_whole_and_window_may_have_blocks_of_their_own():
         solids, RULE, spacing=0.1, cutoffs=[0.0], blocks=(blocks[1], blocks[1]), replicates=[0]
     )
     assert np.array_equal(gaps.number[:, 2:], octants.number[:, 2:])
+
+
+def test_nothing_is_tallied_of_lines_that_miss_a_region_inside_its_ball():
+    """A thin plate: most lines across its ball pass it by."""
+    plate = box([2.0, 2.0, 0.02])
+    sums = scan_along(solids_of(NOTHING, plate), [[1.0, 0.0, 0.0]], 0.004)
+    assert sums.lines[:, 2].mean() * 0.004**2 == pytest.approx(2.0 * 0.02, rel=0.01)
+    assert sums.line_length[:, 2] == pytest.approx(2.0 * sums.lines[:, 2])

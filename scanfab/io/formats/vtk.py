@@ -131,12 +131,13 @@ class VtkReader(GrainsOnly):
             return contacts
         names = [name for name in mesh.line_arrays if "force" in name.lower() and name != "force"]
         if names:
-            listed = ", ".join(names)
-            note(f"contact arrays that are not read: {listed}: only a vector `force` is read")
+            note(f"contact arrays that are not read: {', '.join(names)}: only a vector `force` is")
         if contacts.force is None:
             return contacts
-        pairs, force = np.asarray(contacts.pairs), np.asarray(contacts.force, np.float64)
-        return contacts._replace(force=proved_force(path, grains, pairs, force))
+        force = np.asarray(contacts.force, np.float64)
+        return contacts._replace(
+            force=proved_force(path, grains, np.asarray(contacts.pairs), force)
+        )
 
     def carries(self, path: Path) -> Carries:
         """Files of scanfab have a cell, LIGGGHTS writes a box file; VTK has no cell."""
@@ -179,7 +180,12 @@ class VtkReader(GrainsOnly):
                 continue
             other = frames.setdefault(entry.get("timestep"), {}).setdefault(part, path)
             if other is not path:
-                raise ReadError(f"{index}: {other.name} and {path.name} have the same timestep")
+                both = f"{other.name} and {path.name}"
+                raise ReadError(f"{index}: {both} have the same timestep, part and group")
+        names = {kind: name for (name, _, _), kind in kinds.items()}
+        if {"grains", "points"} <= names.keys():
+            points = f"points without a radius ({names['points']}) beside {names['grains']}"
+            raise ReadError(f"{index}: lists {points}: take them out, or name the files")
         found = []
         for word, parts in frames.items():
             time = None if word is None else numbers(f"{index}: timestep", word.encode(), 1)[0]

@@ -24,7 +24,8 @@ PERIODIC_HEAD = b"##PERIODIC::"
 TEXT_HEADS = (b"#format ", PERIODIC_HEAD)
 # the array that marks the interactions of VTKRecorder
 RECORDED = b'Name="forceN"'
-COMMENT = re.compile(rb"#[^\n]*")
+# a line of comment; the search is fast, as it begins with a literal
+COMMENT = re.compile(rb"\n[ \t]*#[^\n]*")
 
 
 class TextExport(GrainsOnly):
@@ -43,7 +44,7 @@ class TextExport(GrainsOnly):
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """The columns by the names in the first line; attributes are named in the second."""
         path = snapshot.path
-        rows = COMMENT.sub(b"", text_of(snapshot))
+        rows = COMMENT.sub(b"\n", b"\n" + text_of(snapshot))[1:]
         width = len(rows.lstrip().split(b"\n", 1)[0].split())
         head, second = [*first_bytes(path, 1 << 14).decode("utf-8", "replace").splitlines(), ""][:2]
         cell, names = None, head.removeprefix("#format").strip().split("_")

@@ -157,6 +157,12 @@ def test_attributes_have_the_names_of_the_second_line_or_are_numbered(tmp_path):
     assert len(scanfab.read(write(path, "#format x_y_z_r\n"))) == 0
 
 
+def test_a_comment_is_a_line_of_its_own(tmp_path):
+    """A sign of a comment inside a row is damage, which must not cut the row short."""
+    path = write(tmp_path / "a.txt", "#format x_y_z_r\n  # more\n0 0 0 0.5\n3 0 1 0.2#5\n")
+    refuses(path, r"line 4: expected a number in the column r, found '0\.2#5'")
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
