@@ -6,8 +6,8 @@ from typing import Any
 
 import click
 
-from scanfab.cli.options import SourceCommand, in_order, options
-from scanfab.pipeline.options import MAP_OPTIONS
+from scanfab.cli.options import SourceCommand, checked, in_order, open_series, options
+from scanfab.pipeline.options import MAP_OPTIONS, Output
 
 
 @click.command(cls=SourceCommand)
@@ -28,8 +28,15 @@ def map(sources: tuple[str, ...], frame: int | None, **chosen: Any) -> int:
     its blocks scatter more than their errors explain.
     """
     from scanfab.cli.rows import write_table
-    from scanfab.pipeline.maps.settings import MapSettings
+    from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings
 
+    if all(chosen[name] is None for name in BLOCK_OPTIONS):
+        # discs have no map, so do not ask for blocks first
+        asked = {name: chosen[name] for name in chosen.keys() - vars(Output())}
+        reading, _ = checked({**asked, "slices": 1}, MapSettings)
+        for series in open_series(sources, reading):
+            if len(series) and (space := series[0].read().space).is_plane:
+                raise click.UsageError(f"a map needs spheres, but all grains are discs in {space}")
     if frame is not None:
         if chosen["frames"] is not None:
             raise click.UsageError("--frame and --frames choose frames in two ways: name one")

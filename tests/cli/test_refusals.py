@@ -91,6 +91,7 @@ def folder(tmp_path, monkeypatch):
         ("view cube --screenshot x.png --frame 9", 1, "there is no frame 9"),
         # what is of space, of discs
         ("compute {DISCS} --axis 0,1,1", 2, "--axis: the axis (0, 0.7071, 0.7071) leads out of"),
+        ("map {DISCS}", 2, "a map needs spheres, but all grains are discs"),
         ("map {DISCS} --grid 2,2,1", 1, "needs spheres, but all grains are discs"),
     ],
 )
