@@ -126,7 +126,12 @@ class Solids:
     @cached_property
     def bounds(self) -> Bounds:
         """What holds all spheres."""
-        return bounds_of(self.position, self.radius)
+        return _bounds(self.position, self.radius)
+
+    @cached_property
+    def bounds_left(self) -> Bounds:
+        """What holds the spheres that are not removed."""
+        return _bounds(self.position[~self.removed], self.radius[~self.removed])
 
     @cached_property
     def cells(self) -> Cells:
@@ -327,7 +332,7 @@ def _farthest(grains: CellGrains, volume: float, solid: BoolArray | slice) -> fl
     return MOST_PERIODS * periods + MOST_FREE_PATHS * free_path
 
 
-def bounds_of(position: FloatArray, radius: FloatArray) -> Bounds:
+def _bounds(position: FloatArray, radius: FloatArray) -> Bounds:
     """A box and a ball about the origin that hold some spheres."""
     if not len(radius):
         return Bounds(np.zeros(3), np.zeros(3), 0.0)

@@ -15,7 +15,7 @@ from scanfab.scan.kernels import sweep
 from scanfab.scan.kernels.axes import Axes, Followed, scan_axes, scan_cell
 from scanfab.scan.kernels.bins import OF_WHOLE, OF_WINDOW, Bins, no_bins
 from scanfab.scan.kernels.strips import Counts, Edge
-from scanfab.scan.solids import Inner, Solids, bounds_of, clip_of, shortest_gap
+from scanfab.scan.solids import Inner, Solids, clip_of, shortest_gap
 
 # of the spacing and for each variant: spheres of such a radius are scanned as fast row by row as
 # over lists of chords; for the more variants the lists serve, the sooner they pay
@@ -185,14 +185,11 @@ class _Lines(NamedTuple):
         if window is not None and window.start is not None:
             followed = Followed(solids.cells, not self.first, self.following.left)
         position, radius = np.ascontiguousarray(position[solid]), radius[solid]
-        extent = solids.bounds  # only the whole asks for it
-        if whole is not None and not self.first:
-            extent = bounds_of(position, radius)
         scan_axes(
             position,
             radius,
             removed[solid],
-            extent,
+            solids.bounds if self.first else solids.bounds_left,
             self.axes,
             clip_of(shape),
             Counts(self.cutoff, self.both, whole, window, None),
