@@ -252,7 +252,7 @@ def proved_force(
     if sign is None:
         return None
     which = "second" if sign > 0 else "first"
-    note(f"the forces act on the {which} grain of each contact: then nearly all are pushes")
+    note(f"the forces act on the {which} grain of each contact, since they push the grains apart")
     return sign * force
 
 

@@ -173,7 +173,7 @@ class Sample:
         list of Note
             Empty if there are none.
         """
-        return notes_of_escaped(self.packing, self.escaped)
+        return notes_of_escaped(self.packing, self.grains, self.escaped)
 
     @cached_property
     def touching(self) -> Touching:

@@ -208,7 +208,10 @@ def compare_tables(
         note(TURNED)
     origins = {row.get("contacts_from") for row in rows} - {None, ""}
     if len(origins) > 1:
-        note("contacts come from files in some frames and from geometry in others: slopes mix both")
+        note(
+            "contacts come from files in some frames and from geometry in others (contacts_from): "
+            "the slope on the contact fabric mixes both"
+        )
     fits = [_fitted_group(group, column, strain_max) for group in groups.values()]
     _tell_of_errors([summary for summary, _ in fits], rows)
     normalised = [row for group in groups.values() for row in _normalised(group)]

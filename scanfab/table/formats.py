@@ -305,5 +305,8 @@ def read_rows(path: Path | str, *, whole: bool = False) -> list[dict[str, Any]]:
     table_format = next(form for form in (*others, *reversed(OWN_FORMATS)) if form.recognises(data))
     rows = table_format.read(data, str(path))
     if whole and table_format.is_text and not data.endswith(b"\n"):
-        raise ReadError(f"{path}: the last line has no line end, so the file may be cut off")
+        raise ReadError(
+            f"{path}: the last line has no line end, so the file may be cut off: copy it again, or "
+            f"remove it and run its command again"
+        )
     return rows

@@ -71,7 +71,10 @@ def choose_rows(
     """
     named = [(str(name), [dict(row) for row in rows]) for name, rows in tables]
     if labels and len(labels) != len(named):
-        raise SettingsError(f"labels: found {len(labels)} for {len(named)}, expected one a table")
+        raise SettingsError(
+            f"labels: expected one name for each table, in the same order: found {len(labels)} for "
+            f"{len(named)}"
+        )
     for number, (name, rows) in enumerate(named):
         for row in rows:
             if row.get("source", "") is None:

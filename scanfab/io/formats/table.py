@@ -255,7 +255,8 @@ def _refuse_wrong_guess(path: Path, roles: dict[str, str], columns: Columns) -> 
     elif len(radius) > 1 and np.all(np.abs(position) < MOST):
         away, nearest = KDTree(position, balanced_tree=False).query(position[:LOOKED_AT], k=2)
         if np.median(away[:, 1] / radius[nearest].sum(axis=1)) < LEAST_DISTANCE:
-            lacks = "grains would be inside one another: is the last a diameter, or two frames"
+            lacks = "grains would be inside one another: is the last a diameter, or are these two "
+            lacks += "frames"
     guess = " ".join(roles)
     if lacks:
         raise ReadError(f"{path}: the columns have no names, and as {guess} {lacks}: {ASK}")

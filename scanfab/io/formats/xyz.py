@@ -71,7 +71,8 @@ class XyzReader(GrainsOnly):
                     head = _head(path, first + stream.readline())
                     rows = sum(1 for _ in islice(stream, head.rows))
                     if rows < head.rows:
-                        leave_out_last(path, len(frames), f"found {rows} of {head.rows} rows")
+                        reason = f"expected {head.rows} rows, the file ends after {rows}"
+                        leave_out_last(path, len(frames), reason)
                         break
                     words = (head.words.get(key, "") for key in ("step", "timestep"))
                     steps = [int(word) for word in words if re.fullmatch(r"[-+]?[0-9]{1,18}", word)]
@@ -108,7 +109,8 @@ def _head(path: Path, text: bytes) -> Head:
     """Parse the first two lines of a frame."""
     lines, count = text[:HEAD].split(b"\n", 2), COUNT.match(text)
     if count is None or len(lines) < 3:
-        raise ReadError(f"{path}: expected a count and Properties=, found {spelt(text)}")
+        expected = "expected a number of rows and a line with Properties="
+        raise ReadError(f"{path}: {expected}, found {spelt(text)}")
     pairs = PAIR.findall(lines[1].decode("utf-8", "replace"))
     words = {key.lower(): quoted or bare for key, quoted, bare in pairs}
     if "properties" not in words:

@@ -108,7 +108,8 @@ def _read_save(path: Path, options: ReadOptions) -> GrainTable:
         # the vectors of the cell are the columns of hSize
         sides = [[_number(scene, f".//hSize/m{row}{k}") for row in range(3)] for k in range(3)]
     except (ElementTree.ParseError, LookupError, ValueError, OverflowError) as error:
-        raise ReadError(f"{path}: cannot be read as a simulation of YADE: {error}") from None
+        reason = f"cannot be read as a simulation that YADE saved (O.save): {error}"
+        raise ReadError(f"{path}: {reason}") from None
     is_periodic = scene.findtext(".//isPeriodic") == "1"
     cell = cell_of(path, sides, PERIODIC, np.zeros(3)) if is_periodic else None
     table = np.array(spheres).reshape(-1, 7)

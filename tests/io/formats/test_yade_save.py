@@ -79,8 +79,8 @@ def test_the_small_save_in_a_tilted_cell(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("</scene>", "</scen>", "cannot be read as a simulation of YADE"),
-        (small_save()[900:], "", "cannot be read as a simulation of YADE"),
+        ("</scene>", "</scen>", "cannot be read as a simulation that YADE saved"),
+        (small_save()[900:], "", "cannot be read as a simulation that YADE saved"),
         ("<radius>0.1</radius>", "", "<px> has no <radius>"),
         ("<radius>0.1</radius>", "<radius>nan</radius>", "must be finite"),
         ("<id>1</id>", "<id>1.5</id>", "ids must be whole numbers"),
