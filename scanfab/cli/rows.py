@@ -52,10 +52,8 @@ def write_table(
     reading, settings = checked(chosen, kind)
     excerpt = excerpt_of(outputs, settings.columns)
     series = _open(sources, reading, outputs)
-    for one in series if frame is not None else ():
-        if not isinstance(one, FollowedSeries) and frame not in range(-len(one), len(one)):
-            has = f"{one.name} has {len(one)}, counted from 0"
-            raise click.UsageError(f"--frame: there is no frame {frame}: {has}")
+    if frame is not None:
+        _check_frame(series, frame)
     drawing = _Drawing(outputs, figures)
     if drawing.kind == "frames" and len(series) > 1:
         raise click.UsageError(f"--figure {outputs.figure} draws one series: name one source")
@@ -91,6 +89,16 @@ def write_table(
         _write(job, excerpt)
     drawing.draw(job)
     return 0 if job.is_good else 1
+
+
+def _check_frame(series: Sequence[Series], frame: int) -> None:
+    """UsageError if a series, which is not followed, lacks the frame."""
+    from scanfab.io.follow import FollowedSeries
+
+    for one in series:
+        if not isinstance(one, FollowedSeries) and frame not in range(-len(one), len(one)):
+            has = f"{one.name} has {len(one)}, counted from 0"
+            raise click.UsageError(f"--frame: there is no frame {frame}: {has}")
 
 
 def _open(sources: tuple[str, ...], reading: dict[str, Any], outputs: Output) -> Sequence[Series]:

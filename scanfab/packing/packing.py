@@ -106,12 +106,7 @@ class Packing:
         )
         self.id: IntArray = cast("id", np.arange(count) if id is None else id, np.int64, (count,))
         check_lengths(centres, self.radius, self.id)
-        ordered = np.sort(self.id)
-        again = ordered[1:][ordered[1:] == ordered[:-1]]
-        if again.size:
-            raise PackingError(
-                f"the id {again[0]} occurs twice: {count - again.size} ids for {count} grains"
-            )
+        _refuse_twice(self.id)
         if isinstance(space, Space):
             _refuse_outside(centres, space)
         else:
@@ -331,6 +326,15 @@ def spelt_plane(position: FloatArray, space: Space) -> str:
     """Spell the coordinate that some centres share, such as ``z = 0``."""
     assert space.across is not None
     return f"{'xyz'[space.across]} = {position[0, space.across]:g}"
+
+
+def _refuse_twice(id: IntArray) -> None:
+    ordered = np.sort(id)
+    again = ordered[1:][ordered[1:] == ordered[:-1]]
+    if again.size:
+        raise PackingError(
+            f"the id {again[0]} occurs twice: {len(id) - again.size} ids for {len(id)} grains"
+        )
 
 
 def _refuse_outside(position: FloatArray, space: Space) -> None:
