@@ -134,3 +134,9 @@ def test_poisson_spheres_in_a_clipped_window(cutoff):
     estimate = ratio(np.array(length), np.array(segments))
     assert estimate.error < 1.5e-3 * estimate.value
     assert estimate.agrees(cutoff + a1 / (a0 + beta * a1), within=2e-3)
+
+
+def test_empty_window_keeps_nothing_at_its_diameter():
+    sums = scan_along(solids_of(NOTHING, 1.0), AXES, 0.02, 2.0)
+    assert sums.kept("c")[1].sum() == 0
+    assert sums.void[:, 2].sum() > 0

@@ -246,3 +246,38 @@ def test_pairs_of_an_rv_have_their_middles_in_it(sample):
     inside = window.contains(sample.packing.position, sample.packing)
     assert found.shadow == pytest.approx(np.pi * np.sum(sample.packing.radius[inside] ** 2))
     assert found.volume == pytest.approx(4 / 3 * np.pi * 8)
+
+
+@pytest.mark.parametrize("edges", [(0.5, 0.5, 0.5), (0.7, 2.5, 8.0), (2.9, 2.9, 2.9)])
+def test_cells_thinner_than_a_grain(edges):
+    position = np.random.default_rng(3).random((4, 3)) * edges
+    cell = {"vectors": edges, "periodic": (True, True, True)}
+    assert_those_of_the_slow_twin(position, np.array([0.49, 0.3, 0.1, 0.48]), **cell)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_all_contacts_along_one_axis(axis):
+    """A chain through the cell: n⊗n."""
+    position = np.zeros((5, 3)) + 2.0
+    position[:, axis] = np.arange(5) + 0.5
+    edges = np.where(np.arange(3) == axis, 5.0, 4.0)
+    packing = find_contacts(Packing(position, 0.5, cell=Cell(edges)), TOLERANCE)
+    tensor = contact_fabric(packing.contacts.normal)
+    assert len(packing.contacts) == 5
+    assert tensor.matrix == pytest.approx(np.diag(np.eye(3)[axis]), abs=1e-12)
+    assert tensor.axial(np.eye(3)[axis]) == pytest.approx(1.0)
+
+
+def through_many_images():
+    """Two grains of a cell that is thinner than they are along x and y."""
+    cell = Cell([0.6, 1.5, 9.0], (True, True, False))
+    return find_contacts(Packing([[0.1, 0.1, 4], [0.4, 1.3, 4]], 1.0, cell=cell))
+
+
+def test_a_pair_touches_through_each_image_that_is_near_enough():
+    steps = list(itertools.product(range(-9, 10), repeat=2))
+    near = [(i, j) for i, j in steps if np.hypot(0.3 + 0.6 * i, 1.2 + 1.5 * j) < 2.0]
+    own = [(i, j) for i, j in steps if (i, j) > (0, 0) and np.hypot(0.6 * i, 1.5 * j) < 2.0]
+    expected = {(0, 1, (i, j, 0)) for i, j in near}
+    expected |= {(row, row, (i, j, 0)) for row in (0, 1) for i, j in own}
+    assert canonical(through_many_images().contacts) == expected

@@ -103,3 +103,17 @@ def test_octants_about_a_coordinate_are_those_of_the_coordinates(axis):
     places = np.random.default_rng(1).uniform(-2, 2, (100, 3))
     expected = [naive.octant(place, center) for place in places]
     assert Blocks.about(center, 3.0, axis).of(places).tolist() == expected
+
+
+@pytest.mark.parametrize("place", range(len(CUTOFFS)))
+def test_all_octants_together_are_the_scan_of_the_same_lines(solids, place):
+    gaps = gaps_of(solids, seed=3)
+    sums = scan_lines(solids, RULE, spacing=0.3, cutoff=CUTOFFS[place], replicates=range(3), seed=3)
+    assert np.array_equal(gaps.axes, sums.axes)
+    assert_all_octants_are(sums, gaps, place)
+
+
+def test_threads_change_nothing(solids):
+    one, three = gaps_of(solids), gaps_of(solids, workers=3)
+    assert np.array_equal(one.square, three.square)
+    assert np.array_equal(one.number, three.number)

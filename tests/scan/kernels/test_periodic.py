@@ -210,3 +210,22 @@ def test_without_solids_all_lines_are_channels(corner):
     assert tally[sweep.LINES] == tally[sweep.KEPT] == 0
     assert tally[sweep.VOID] == pytest.approx(tally[sweep.LINE_LENGTH])
     assert tally[sweep.CHANNELS] > 1000
+
+
+def test_without_overlap_the_mean_gap_is_that_of_stereology():
+    """Porosity / (N_V π⟨r²⟩) at cut-off 0, in every direction without channels."""
+    random = np.random.default_rng(3)
+    vectors = np.array([[3.0, 0, 0], [1.0, 3, 0], [-1.0, 0.5, 3]])
+    grid = np.stack(np.meshgrid(*3 * [np.arange(3.0)], indexing="ij"), -1).reshape(-1, 3) / 3
+    position = grid @ vectors + random.uniform(-0.04, 0.04, (27, 3))
+    radius = random.uniform(0.25, 0.42, 27)
+    medium = CellGrains(position, radius, np.zeros(27, bool), vectors, np.ones(3, bool))
+    volume = abs(np.linalg.det(vectors))
+    porosity = 1 - 4 / 3 * np.pi * np.sum(radius**3) / volume
+    expected = porosity * volume / (np.pi * np.sum(radius**2))
+    total = sum(
+        tallies_of(medium, direction(random), random.random(2), 0.04, 0.0, "a")[0]
+        for _ in range(60)
+    )
+    assert total[sweep.LENGTH] / total[sweep.KEPT] == pytest.approx(expected, rel=0.01)
+    assert total[sweep.VOID] / total[sweep.LINE_LENGTH] == pytest.approx(porosity, rel=0.01)
