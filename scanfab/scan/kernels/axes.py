@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.jit import LANES, ZERO, inner, kernel
+from scanfab.base.jit import LANES, ZERO, kernel, part
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.scan.kernels.bins import Bins, bins_along
 from scanfab.scan.kernels.cells import Cells
@@ -67,7 +67,7 @@ class Followed(NamedTuple):
     """
 
 
-@inner()
+@part()
 def scan_strips(
     lines: FloatArray,
     spheres: Spheres,

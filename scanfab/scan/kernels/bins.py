@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.jit import Flag, inner
+from scanfab.base.jit import Flag, inner, part
 from scanfab.base.typing import FloatArray
 from scanfab.scan.kernels.strips import FAR, Counts, Line, Task
 from scanfab.scan.kernels.sweep import add, begins_in, counted, listed_to
@@ -269,7 +269,7 @@ def add_gaps(
             sums[kind, of, place, SQUARE] += last_sum
 
 
-@inner(forceinline=True, error_model="numpy")
+@part(forceinline=True, error_model="numpy")
 def count_gaps(
     task: Task, which: int, line: Line, ends: FloatArray, count: int, sign: float
 ) -> None:

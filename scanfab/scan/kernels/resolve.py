@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.jit import ONE, inner
+from scanfab.base.jit import ONE, inner, part
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.bins import count_gaps
 from scanfab.scan.kernels.cells import Cells, Ray, next_solid, room_for_ray
@@ -102,7 +102,7 @@ def cut(
     return met
 
 
-@inner(error_model="numpy")
+@part(error_model="numpy")
 def chords_of(
     task: Task, spheres: Spheres, chosen: IntArray, which: int, first: IntArray, place_of: IntArray
 ) -> tuple[IntArray, FloatArray]:
@@ -164,7 +164,7 @@ def gaps_of(
     return count, end
 
 
-@inner()
+@part()
 def solve_closed(task: Task, spheres: Spheres, chosen: IntArray, which: int, closed: int) -> None:
     """Replace what the sweep tallied on closed lines by what their lists of chords give."""
     lines, strip = task.lines, task.strip
