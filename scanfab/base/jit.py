@@ -123,7 +123,7 @@ class _Compiler(CompilerBase):
 
 
 class _Part(JITCodeLibrary):
-    """The code of a part: it is optimised, and becomes machine code, with the kernel that has it."""
+    """The code of a part, which is optimised and becomes machine code with its kernel."""
 
     @property
     def codegen(self) -> Any:

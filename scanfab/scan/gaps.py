@@ -126,6 +126,7 @@ def scan_gaps(
     some = partial(
         _binned, solids,
         spacing=spacing, least=least, blocks=blocks, variants=variants, following=following,
+        scans=triads[..., 0, 0].size,
     )  # fmt: skip
     found = in_parts(some, triads, offsets, workers)
     tallies = found[:, :, -2 * TALLY_SIZE :].reshape(*offsets.shape[:2], 2, TALLY_SIZE)
@@ -146,6 +147,7 @@ def _binned(
     blocks: tuple[Blocks, Blocks],
     variants: str,
     following: Following,
+    scans: int,
 ) -> FloatArray:
     """
     Number, length and square of the variants along some axes, (A, V, B, C, 3), and the tallies.
@@ -156,7 +158,9 @@ def _binned(
     # for the whole and for the window the same number of blocks
     axes, kept = len(triads), max(map(len, blocks))
     bins = Bins(partition_of(*blocks), least, np.zeros((axes, 2, 2, kept * len(least), 3)))
-    tallies = tally_triads(solids, triads, offsets, spacing, least[0], variants, bins, following)
+    tallies = tally_triads(
+        solids, triads, offsets, spacing, least[0], variants, bins, following, scans
+    )
     rows = ["abcd".index(variant) for variant in variants]
     sums = bins.sums.reshape(axes, 4, kept, len(least), 3)[:, rows]
     if len(least) > 1:

@@ -207,6 +207,7 @@ def scan_lines(
     some = partial(
         tally_triads, solids,
         spacing=spacing, cutoff=cutoff, variants=variants, following=following,
+        scans=triads[..., 0, 0].size,
     )  # fmt: skip
     sums = sums_of(triads, in_parts(some, triads, offsets, workers), variants, solids.edge)
     following.check(float(sums.steps.sum()))

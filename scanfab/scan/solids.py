@@ -212,9 +212,9 @@ class Solids:
 
 
 def clip_of(window: Convex | None) -> Clip:
-    """The numbers of a window; without one, no line meets it."""
+    """The numbers of a window; without one, nothing clips the lines."""
     if window is None:
-        return Clip(np.zeros((0, 4)), 1.0, np.zeros((3, 3)), 1.0, -1.0, 0.0)
+        return Clip(np.zeros((0, 4)), 1.0, np.zeros((3, 3)), 1.0, np.inf, np.inf)
     isotropic, deviator, level = window.quadric
     size = isotropic + float(np.abs(deviator).max())
     return Clip(window.planes, isotropic, deviator, size, level, window.reach)

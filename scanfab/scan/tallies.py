@@ -7,15 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.jit import Flag
-from scanfab.base.typing import FloatArray
+from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.scan.edges import CLIP, ENDS
 from scanfab.scan.kernels import sweep
 from scanfab.scan.kernels.axes import Axes, Followed, scan_axes, scan_cell
 from scanfab.scan.kernels.bins import OF_WHOLE, OF_WINDOW, Bins, no_bins
 from scanfab.scan.kernels.strips import Counts, Edge
-from scanfab.scan.solids import Inner, Solids, clip_of, shortest_gap
+from scanfab.scan.solids import Solids, clip_of, shortest_gap
 
 # of the spacing and for each variant: spheres of such a radius are scanned as fast row by row as
 # over lists of chords; for the more variants the lists serve, the sooner they pay
@@ -26,6 +27,10 @@ NARROW = 0.3
 SMALLEST = 5e-324
 # what counts at the window's surface by the rules that follow no segment
 CLIPPED, WEIGHED = Edge(None, None, 0.0), Edge(True, None, 0.0)
+# A scan of at most so many chords takes a second or so. Then an open whole is scanned as a window
+# without an end, which takes up to a sixth longer, but needs no kernel of its own: to compile it
+# would take some seconds.
+FEW_CHORDS = 3e7
 # steps of following lines through a periodic medium: more take minutes
 MOST_STEPS = 1e10
 
@@ -89,12 +94,14 @@ def tally_triads(
     variants: str,
     bins: Bins | None = None,
     following: Following | None = None,
+    scans: int = 1,
 ) -> FloatArray:
     """
     Scan along given line triads (D, 3, 3) with given shifts (D, 2), or (D, 1) in a plane.
 
     Returns the tallies of each axis and set of solids, shape (D, 2, TALLY_SIZE); where there are
     bins, the gaps go there instead. ``following`` counts the steps of this and of other parts.
+    ``scans`` is the number of axes in all parts.
 
     Raises
     ------
@@ -102,7 +109,8 @@ def tally_triads(
         If these are too many.
     """
     first, second = ("a" in variants or "c" in variants), ("b" in variants or "d" in variants)
-    whole, window = ("a" in variants or "b" in variants), ("c" in variants or "d" in variants)
+    whole = "a" in variants or "b" in variants
+    window = solids.window is not None and ("c" in variants or "d" in variants)
     lines = _Lines(
         solids,
         Axes(np.ascontiguousarray(triads), offsets, spacing),
@@ -116,12 +124,13 @@ def tally_triads(
     if solids.medium is not None and whole:
         lines.scan_cell()
         whole = False
-    if solids.edge == CLIP and (whole or window):
-        lines.scan(True if whole else None, CLIPPED if window else None)
-    if solids.edge != CLIP and whole:
-        lines.scan_whole()
-    if solids.edge != CLIP and window:
-        lines.scan_window()
+    if solids.edge == CLIP and whole and window:
+        lines.scan(True, CLIPPED, solids.window)
+    else:
+        if whole:
+            lines.scan_whole(has_few=scans * solids.chords(spacing) <= FEW_CHORDS)
+        if window:
+            lines.scan_window()
     if first:
         return lines.tallies
     # without a or c, the solids of b and d are the only ones
@@ -168,60 +177,79 @@ class _Lines(NamedTuple):
         scan_cell(medium, self.axes, counts, by_lists, self.bins, followed, self.tallies)
         self.following.add(float(self.tallies[:, 0, sweep.STEPS].sum()))
 
-    def scan(self, whole: Flag, window: Edge | None, inner: Inner | None = None) -> None:
-        """One pass of the sweep; ``inner`` takes the place of the window."""
-        solids = self.solids
-        position, radius, removed = solids.position, solids.radius, solids.removed
-        shape = solids.window
+    def scan(
+        self,
+        whole: Flag,
+        edge: Edge | None,
+        window: Convex | None,
+        center: FloatArray | None = None,
+        near: BoolArray | None = None,
+    ) -> None:
+        """
+        Sweep the lines through a window about a centre once; without a window all lines.
+
+        If some spheres are ``near``, only these are scanned.
+        """
+        solids, both = self.solids, bool(self.both)
         # a mask of all would copy
-        solid = slice(None) if self.first else ~removed
-        if inner is not None:
-            position, shape = position - inner.center, inner.shape
-            solid = solids.near_inner & (self.first | ~removed)
-        elif window is not None and solids.edge != CLIP:
-            solid = solids.near_window(window.margin) & (self.first | ~removed)
-        passes = (1 + bool(self.both)) * ((whole is not None) + (window is not None))
+        solid = slice(None) if self.first else ~solids.removed
+        if near is not None:
+            solid = near & (self.first | ~solids.removed)
+        position, radius = np.ascontiguousarray(solids.position[solid]), solids.radius[solid]
+        if center is not None:
+            position = position - center
         followed, before = None, float(self.tallies[:, 0, sweep.STEPS].sum())
-        if window is not None and window.start is not None:
+        if edge is not None and edge.start is not None:
             followed = Followed(solids.cells, not self.first, self.following.left)
-        position, radius = np.ascontiguousarray(position[solid]), radius[solid]
         scan_axes(
             position,
             radius,
-            removed[solid],
+            solids.removed[solid],
             solids.bounds if self.first else solids.bounds_left,
             self.axes,
-            clip_of(shape),
-            Counts(self.cutoff, self.both, whole, window, None),
-            self.by_lists(radius, passes),
+            clip_of(window),
+            Counts(self.cutoff, self.both, whole, edge, None),
+            self.by_lists(radius, (1 + both) * ((whole is not None) + (edge is not None))),
             self.bins,
             followed,
             self.tallies,
         )
         self.following.add(float(self.tallies[:, 0, sweep.STEPS].sum()) - before)
 
-    def scan_whole(self) -> None:
-        """The whole of an open sample: up to its outermost solids, or in a window of its own."""
-        inner = self.solids.inner
+    def scan_whole(self, has_few: bool) -> None:
+        """
+        Scan the whole of an open sample.
+
+        By ``ends`` it is an ellipsoid, a window of its own. Else all gaps between the first and the
+        last solid of a line count; if the scan has few chords, as in a window without an end.
+        """
+        inner, found, sums = self.solids.inner, self.tallies, self.bins.sums
+        if self.solids.edge != ENDS and not has_few:
+            self.scan(True, None, None)
+            return
         if self.solids.edge != ENDS:
-            self.scan(True, None)
+            alone = self._replace(bins=self.bins.of_whole(np.zeros(3)))
+            alone.scan(None, CLIPPED, None)
+            # the void and the length of a line without an end mean nothing
+            found[..., [sweep.WINDOW + sweep.VOID, sweep.WINDOW + sweep.LINE_LENGTH]] = 0.0
         elif inner is not None:
-            bins = self.bins.of_whole(inner.center)
-            inside = self._replace(tallies=np.zeros_like(self.tallies), bins=bins)
-            inside.scan(None, WEIGHED, inner)
-            found = inside.tallies
-            self.tallies[..., sweep.WHOLE : sweep.WINDOW] += found[..., sweep.WINDOW : sweep.CHORDS]
-            self.tallies[..., sweep.CHORDS] += found[..., sweep.CHORDS]
-            self.bins.sums[:, OF_WHOLE] += bins.sums[:, OF_WINDOW]
+            alone = self._replace(bins=self.bins.of_whole(inner.center))
+            alone.scan(None, WEIGHED, inner.shape, inner.center, self.solids.near_inner)
+        of_whole, of_window = found[..., : sweep.WINDOW], found[..., sweep.WINDOW : sweep.CHORDS]
+        of_whole[:], of_window[:] = of_window, 0.0
+        sums[:, OF_WHOLE], sums[:, OF_WINDOW] = sums[:, OF_WINDOW], 0.0
 
     def scan_window(self) -> None:
-        """The window, by a rule that knows what is cut."""
+        """Scan the window alone."""
         solids = self.solids
-        if solids.edge == ENDS:
-            self.scan(None, WEIGHED)
+        if solids.edge == CLIP:
+            self.scan(None, CLIPPED, solids.window)
+        elif solids.edge == ENDS:
+            self.scan(None, WEIGHED, solids.window, near=solids.near_window(0.0))
         elif len(solids.grain_radius):
             margin = solids.margin
             if self.by_lists(solids.radius, 1 + bool(self.both)):
                 # but for the cut-off: segments that reach it are known to count
                 margin = min(margin, max(NARROW * margin, 1.01 * self.cutoff))
-            self.scan(None, Edge(None, True, margin))
+            near = solids.near_window(margin)
+            self.scan(None, Edge(None, True, margin), solids.window, near=near)

@@ -67,13 +67,12 @@ class Bins(NamedTuple):
     """
 
     def of_whole(self, center: FloatArray) -> Bins:
-        """Empty bins by the whole's blocks for what lies in a window about a centre."""
+        """The same bins, by the whole's blocks for what lies in a window about a centre."""
         to_block, parts, repeats, form, halves = self.partition
         to_block = to_block[::-1].copy()
         to_block[:, :, 3] += to_block[:, :, :3] @ center
         parts, repeats, form = parts[::-1].copy(), repeats[::-1].copy(), form[::-1].copy()
-        partition = Partition(to_block, parts, repeats, form, halves)
-        return self._replace(partition=partition, sums=np.zeros_like(self.sums))
+        return self._replace(partition=Partition(to_block, parts, repeats, form, halves))
 
 
 def no_bins(axes: int) -> Bins:
@@ -83,7 +82,7 @@ def no_bins(axes: int) -> Bins:
     return Bins(Partition(*numbers, True), np.zeros(0), sums)
 
 
-@inner()
+@part()
 def bins_along(bins: Bins, triad: FloatArray, axis: int) -> Bins:
     """The bins of an axis, for places u, v, depth in its triad."""
     of = bins.partition
@@ -98,7 +97,7 @@ def bins_along(bins: Bins, triad: FloatArray, axis: int) -> Bins:
     return Bins(turned, bins.cutoffs, bins.sums[axis])
 
 
-@inner()
+@part()
 def room_for_gaps(count: int) -> FloatArray:
     """So many gaps, for :func:`list_gap` and :func:`add_gaps`."""
     # rows that lie a power of two apart would drive one another out of the processor's first cache

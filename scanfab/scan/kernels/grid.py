@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.jit import LANES, ONE, inner
+from scanfab.base.jit import LANES, ONE, inner, part
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.kernels.strips import FAR, Sphere, Strip, span
 
@@ -33,7 +33,7 @@ class Grid(NamedTuple):
     """Of each row, up to ``columns``."""
 
 
-@inner()
+@part()
 def cover(
     low_u: float, high_u: float, low_v: float, high_v: float, offset: FloatArray, spacing: float
 ) -> Grid:
@@ -46,11 +46,13 @@ def cover(
         row = int(np.ceil(low_v / spacing - offset_v))
         rows = max(int(np.floor(high_v / spacing - offset_v)) - row + 1, 0)
     first_u, first_v = (column + offset[0]) * spacing, (row + offset_v) * spacing
-    low, high = np.zeros(rows, np.int64), np.full(rows, columns)
+    low, high = np.zeros(rows, np.int64), np.empty(rows, np.int64)
+    for k in range(rows):
+        high[k] = columns
     return Grid(spacing, first_u, first_v, columns, rows, low, high)
 
 
-@inner()
+@part()
 def limit_row(grid: Grid, row: int, low_u: float, high_u: float) -> None:
     """Leave the lines of a row from low_u to high_u."""
     low = int(np.ceil((low_u - grid.first_u) / grid.spacing))
@@ -67,7 +69,7 @@ class Bounds(NamedTuple):
     reach: float
 
 
-@inner()
+@part()
 def shadow(extent: Bounds, side: FloatArray, low: float, high: float) -> tuple[float, float]:
     """Where the spheres may be along a side of the grid, and at least from low to high."""
     middle = half = 0.0
@@ -78,7 +80,7 @@ def shadow(extent: Bounds, side: FloatArray, low: float, high: float) -> tuple[f
     return low, max(high, min(middle + half, extent.reach))
 
 
-@inner()
+@part()
 def open_grid(
     extent: Bounds,
     triad: FloatArray,
@@ -91,10 +93,11 @@ def open_grid(
     The lines that meet the window or, of the whole, any sphere.
 
     ``reach`` is the radius of the ball that holds the window; lines that meet the ball alone are
-    there, too.
+    there, too. A window without an end is met by every line.
     """
-    low_u = low_v = -reach
-    high_u = high_v = reach
+    high_u = high_v = reach if reach < FAR else 0.0
+    low_u = low_v = -high_u
+    whole = whole or reach > FAR
     if whole and extent.reach > 0.0:
         low_u, high_u = shadow(extent, triad[0], low_u, high_u)
         low_v, high_v = shadow(extent, triad[1], low_v, high_v)
@@ -108,7 +111,7 @@ def open_grid(
     return grid
 
 
-@inner()
+@part()
 def sheared_grid(
     low_u: float,
     high_u: float,
@@ -128,7 +131,7 @@ def sheared_grid(
     return grid
 
 
-@inner()
+@part()
 def strip_of(grid: Grid, row: int, rows: int, column: int, columns: int) -> Strip:
     """The strip of so many rows and columns at most, from a row and a column on."""
     rows, columns = min(rows, grid.rows - row), min(columns, grid.columns - column)
@@ -159,7 +162,7 @@ class Spheres(NamedTuple):
     removed: BoolArray
 
 
-@inner()
+@part()
 def room_for_spheres(count: int) -> Spheres:
     """So many spheres, to be filled in."""
     return Spheres(
@@ -214,7 +217,7 @@ def project(
     return in_order(found, int(count))
 
 
-@inner()
+@part()
 def in_order(spheres: Spheres, count: int) -> Spheres:
     """The first spheres, so many, ordered by depth."""
     order, found = order_of(spheres.depth[:count]), room_for_spheres(count)
@@ -279,7 +282,7 @@ def insert(values: FloatArray, members: IntArray, gap: int) -> None:
         members[j] = moving
 
 
-@inner()
+@part()
 def sort_into_strips(spheres: Spheres, grid: Grid, rows: int) -> tuple[IntArray, IntArray]:
     """
     The spheres that each strip of so many rows meets, in their order.

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.jit import LANES, ONE, REORDERED, ZERO, inner
+from scanfab.base.jit import LANES, ONE, REORDERED, ZERO, inner, part
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.bins import add_gaps, list_gap, room_for_gaps
 from scanfab.scan.kernels.grid import Spheres, sphere_at
@@ -79,7 +79,7 @@ class Lists(NamedTuple):
     """Place behind each line's last chord, shape (LISTED_LINES,)."""
 
 
-@inner()
+@part()
 def room_for_lists(wanted: bool) -> Lists:
     """Empty lists, or none at all."""
     count = LISTED_LINES if wanted else 0
@@ -257,7 +257,7 @@ def bin_lists(task: Task, lists: Lists) -> None:
     task.tally[0, CHORDS] += met
 
 
-@inner()
+@part()
 def bin_last_gaps(task: Task, which: int) -> float:
     """
     Put every line's last gap, and the void behind its last solid, in bins.

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.jit import ZERO, inner
+from scanfab.base.jit import ZERO, inner, part
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.scan.kernels.grid import Grid, Spheres, in_order, room_for_spheres, sheared_grid
 from scanfab.scan.kernels.strips import Measured, Section, dot
@@ -60,7 +60,7 @@ class Prism(NamedTuple):
     """Whether lines have no end: all edges repeat, in a plane but the one across it."""
 
 
-@inner()
+@part()
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Vector product."""
     found = np.empty(3)
@@ -70,7 +70,7 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     return found
 
 
-@inner()
+@part()
 def prism_along(
     normal: FloatArray, vectors: FloatArray, periodic: BoolArray, in_plane: bool = False
 ) -> Prism:
@@ -175,7 +175,7 @@ def fill_images(
     return count
 
 
-@inner()
+@part()
 def cell_grid(
     grains: CellGrains, normal: FloatArray, offset: FloatArray, spacing: float
 ) -> tuple[Prism, Spheres, Grid, Measured]:
@@ -204,7 +204,7 @@ def cell_grid(
     return prism, in_order(images, count), grid, measured
 
 
-@inner()
+@part()
 def foot_of(prism: Prism) -> Section:
     """Where the measured length of each line begins: on a plane through the origin."""
     return Section(np.empty((0, 4)), 0.0, 0.0, 0.0, 0.0, prism.rise_u, prism.rise_v)

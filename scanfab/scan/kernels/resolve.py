@@ -48,7 +48,7 @@ from scanfab.scan.kernels.sweep import (
 )
 
 
-@inner()
+@part()
 def closed_lines(task: Task, which: int, closed: int) -> tuple[IntArray, IntArray]:
     """Of each place of a strip the number of closed lines before it, and the places of these."""
     strip = task.strip
@@ -62,7 +62,7 @@ def closed_lines(task: Task, which: int, closed: int) -> tuple[IntArray, IntArra
     return first, place_of
 
 
-@inner(forceinline=True, error_model="numpy")
+@part(forceinline=True, error_model="numpy")
 def cut(
     task: Task,
     sphere: Sphere,
@@ -127,7 +127,7 @@ def chords_of(
     return stop, chords
 
 
-@inner(error_model="numpy")
+@part(error_model="numpy")
 def gaps_of(
     line: Line, chords: FloatArray, order: IntArray, counts: Counts, gaps: FloatArray
 ) -> tuple[int, float]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from scanfab.base.jit import LANES, Flag, inner, kernel
+from scanfab.base.jit import LANES, Flag, inner, kernel, part
 from scanfab.base.typing import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -157,7 +157,7 @@ class Sphere(NamedTuple):
     radius: float
 
 
-@inner()
+@part()
 def form(matrix: FloatArray, one: FloatArray, two: FloatArray) -> float:
     """The bilinear form of a matrix."""
     total = 0.0
@@ -167,13 +167,13 @@ def form(matrix: FloatArray, one: FloatArray, two: FloatArray) -> float:
     return total
 
 
-@inner()
+@part()
 def dot(a: FloatArray, b: FloatArray) -> float:
     """Scalar product."""
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-@inner()
+@part()
 def section_along(clip: Clip, triad: FloatArray) -> Section:
     """
     The section for the lines along the third row of a triad (rows u, v, n).
@@ -252,7 +252,7 @@ def begin(lines: FloatArray, strip: Strip, section: Section, counts: Counts) -> 
                 set_off(lines, i + SET, enters, leaves, is_line, counts)
 
 
-@inner(fastmath={"contract"}, error_model="numpy")
+@part(fastmath={"contract"}, error_model="numpy")
 def cut_row(
     lines: FloatArray, strip: Strip, planes: FloatArray, k: np.uint64, v: float, at: np.uint64
 ) -> None:

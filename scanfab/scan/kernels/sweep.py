@@ -41,7 +41,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scanfab.base.jit import LANES, REORDERED, inner
+from scanfab.base.jit import LANES, REORDERED, inner, part
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.grid import Spheres, sphere_at
 from scanfab.scan.kernels.strips import (
@@ -131,6 +131,9 @@ def window_gap(
     inside = last - first
     void = inside if inside > 0.0 else 0.0
     length, kept, weight = inside, inside >= least, 1.0
+    if edge.ends is None and edge.start is None:
+        # a window without an end is no gap's end
+        kept &= inside < 0.5 * FAR
     if edge.ends is not None:
         weight = ends_inside(low, high, enters, leaves)
         length = inside - least + weight * least
@@ -335,7 +338,7 @@ def visit(task: Task, sphere: Sphere, kept: float) -> None:
         add(task.tally, 1, sums2)
 
 
-@inner()
+@part()
 def visit_all(task: Task, spheres: Spheres, chosen: IntArray, reach: float) -> None:
     """
     Visit the chosen spheres.
@@ -383,7 +386,11 @@ def settle(task: Task, which: int) -> float:
         if counts.window is not None:
             behind = last_gap(lines, k, enters, leaves, counts, counts.window)
             d, e, f = d + behind[0], e + behind[1], f + behind[2]
-            crossing += np.int64(leaves > enters)
+            crosses = leaves > enters
+            if counts.whole is None and counts.window.start is None:
+                # in a window without an end a line has to meet a solid
+                crosses &= end > -FAR
+            crossing += np.int64(crosses)
             length += leaves - enters if leaves > enters else 0.0
         if counts.whole is not None:
             met += 1.0 if end > -FAR else 0.0
