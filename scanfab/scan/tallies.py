@@ -152,10 +152,10 @@ class _Lines(NamedTuple):
     following: Following
     tallies: FloatArray
 
-    def by_lists(self, radius: FloatArray, variants: int) -> bool:
-        """Whether to list chords: for bins, or as most are of spheres that meet but few lines."""
+    def listed(self, radius: FloatArray, variants: int) -> Flag:
+        """Whether to list chords, as most are of spheres that meet few lines; bins do so anyhow."""
         few = np.sum(radius**2) < FEW_LINES * variants * self.axes.spacing * np.sum(radius)
-        return bool(few) or self.bins.cutoffs.size > 0
+        return True if few and not self.bins.cutoffs.size else None
 
     def scan_cell(self) -> None:
         """The whole of a periodic packing, which has no edge."""
@@ -172,9 +172,9 @@ class _Lines(NamedTuple):
         if not len(medium.radius):
             return
         counts = Counts(self.cutoff, self.both, True, None, None)
-        by_lists = self.by_lists(medium.radius, 1 + bool(self.both))
+        listed = self.listed(medium.radius, 1 + bool(self.both))
         followed = Followed(solids.medium_cells, not self.first, self.following.left)
-        scan_cell(medium, self.axes, counts, by_lists, self.bins, followed, self.tallies)
+        scan_cell(medium, self.axes, counts, listed, self.bins, followed, self.tallies)
         self.following.add(float(self.tallies[:, 0, sweep.STEPS].sum()))
 
     def scan(
@@ -209,7 +209,7 @@ class _Lines(NamedTuple):
             self.axes,
             clip_of(window),
             Counts(self.cutoff, self.both, whole, edge, None),
-            self.by_lists(radius, (1 + both) * ((whole is not None) + (edge is not None))),
+            self.listed(radius, (1 + both) * ((whole is not None) + (edge is not None))),
             self.bins,
             followed,
             self.tallies,
@@ -248,7 +248,7 @@ class _Lines(NamedTuple):
             self.scan(None, WEIGHED, solids.window, near=solids.near_window(0.0))
         elif len(solids.grain_radius):
             margin = solids.margin
-            if self.by_lists(solids.radius, 1 + bool(self.both)):
+            if self.bins.cutoffs.size or self.listed(solids.radius, 1 + bool(self.both)):
                 # but for the cut-off: segments that reach it are known to count
                 margin = min(margin, max(NARROW * margin, 1.01 * self.cutoff))
             near = solids.near_window(margin)

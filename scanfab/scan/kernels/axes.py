@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.jit import LANES, ZERO, kernel, part
-from scanfab.base.typing import BoolArray, FloatArray
+from scanfab.base.jit import LANES, ZERO, Flag, kernel, part
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.kernels.bins import Bins, bins_along
 from scanfab.scan.kernels.cells import Cells
 from scanfab.scan.kernels.grid import (
@@ -68,6 +68,24 @@ class Followed(NamedTuple):
 
 
 @part()
+def sweep_strip(
+    task: Task, spheres: Spheres, met: IntArray, reach: float, listed: Flag, lists: Lists
+) -> None:
+    """Let the lines of a strip meet the chords of spheres."""
+    done = ZERO
+    if listed is not None:
+        while done < met.size:
+            done = list_chords(lists, task.strip, spheres, met, done)
+            sweep_lists(task, lists)
+    elif task.bins.cutoffs.size > 0:
+        while done < met.size:
+            done = list_chords(lists, task.strip, spheres, met, done)
+            bin_lists(task, lists)
+    else:
+        visit_all(task, spheres, met, reach)
+
+
+@part()
 def scan_strips(
     lines: FloatArray,
     spheres: Spheres,
@@ -76,13 +94,14 @@ def scan_strips(
     reach: float,
     tally: FloatArray,
     counts: Counts,
+    listed: Flag,
     lists: Lists,
     bins: Bins,
     beyond: Beyond | None,
 ) -> None:
     """Scan a grid strip by strip, so that the lines' state stays in cache."""
-    most = LISTED_LINES if lists.stop.size > 0 else MOST_LINES
     in_bins = bins.cutoffs.size > 0
+    most = LISTED_LINES if listed is not None or in_bins else MOST_LINES
     # a row of lines has to fit a strip
     columns = min(max(grid.columns, 1), most - LANES)
     rows = most // (columns + LANES)
@@ -93,15 +112,7 @@ def scan_strips(
             task = Task(lines, strip, counts, tally, bins)
             begin(lines, strip, section, counts)
             met = chosen[start[number] : start[number + 1]]
-            if lists.stop.size == 0:
-                visit_all(task, spheres, met, reach)
-            done = ZERO
-            while lists.stop.size > 0 and done < met.size:
-                done = list_chords(lists, strip, spheres, met, done)
-                if in_bins:
-                    bin_lists(task, lists)
-                else:
-                    sweep_lists(task, lists)
+            sweep_strip(task, spheres, met, reach, listed, lists)
             for which in range(1 if counts.second is None else 2):
                 closed = bin_last_gaps(task, which) if in_bins else settle(task, which)
                 if closed > 0.0:
@@ -121,7 +132,7 @@ def scan_axes(
     axes: Axes,
     clip: Clip,
     counts: Counts,
-    by_lists: bool,
+    listed: Flag,
     bins: Bins,
     followed: Followed | None,
     tallies: FloatArray,
@@ -143,9 +154,9 @@ def scan_axes(
         The window.
     counts : Counts
         What is counted.
-    by_lists : bool
+    listed : Flag
         Whether to list the chords of each line first, see :mod:`scanfab.scan.kernels.lists`: faster
-        where a sphere meets few lines, and needed for bins.
+        where a sphere meets few lines. For bins they are listed anyhow.
     bins : Bins
         Where every gap is added, instead of to the tallies, if there are any cut-offs.
     followed : Followed or None
@@ -154,7 +165,7 @@ def scan_axes(
         Zeros; the results for each axis and set of solids.
     """
     lines = np.empty(STATE_SIZE)
-    lists = room_for_lists(by_lists)
+    lists = room_for_lists(listed is not None or bins.cutoffs.size > 0)
     left = np.inf if followed is None else followed.most_steps
     for axis in range(axes.triads.shape[0]):
         if left <= 0.0:
@@ -172,7 +183,9 @@ def scan_axes(
         beyond = None
         if followed is not None:
             beyond = Beyond(followed.cells, triad, followed.without_removed, left, False)
-        scan_strips(lines, spheres, grid, section, clip.reach, tally, counts, lists, here, beyond)
+        scan_strips(
+            lines, spheres, grid, section, clip.reach, tally, counts, listed, lists, here, beyond
+        )
         left -= tally[0, STEPS]
 
 
@@ -181,7 +194,7 @@ def scan_cell(
     grains: CellGrains,
     axes: Axes,
     counts: Counts,
-    by_lists: bool,
+    listed: Flag,
     bins: Bins,
     followed: Followed,
     tallies: FloatArray,
@@ -192,7 +205,7 @@ def scan_cell(
     Of the triads only the last rows count. The rest is as in :func:`scan_axes`.
     """
     lines = np.empty(STATE_SIZE)
-    lists = room_for_lists(by_lists)
+    lists = room_for_lists(listed is not None or bins.cutoffs.size > 0)
     left = followed.most_steps
     for axis in range(axes.triads.shape[0]):
         if left <= 0.0:
@@ -205,7 +218,11 @@ def scan_cell(
         if grains.periodic[prism.third]:
             counted = Counts(counts.least, counts.second, True, None, measured)
             beyond = Beyond(followed.cells, triad, followed.without_removed, left, prism.endless)
-            scan_strips(lines, spheres, grid, section, 0.0, tally, counted, lists, here, beyond)
+            scan_strips(
+                lines, spheres, grid, section, 0.0, tally, counted, listed, lists, here, beyond
+            )
         else:
-            scan_strips(lines, spheres, grid, section, 0.0, tally, counts, lists, here, None)
+            scan_strips(
+                lines, spheres, grid, section, 0.0, tally, counts, listed, lists, here, None
+            )
         left -= tally[0, STEPS]
