@@ -192,11 +192,11 @@ def homogeneity_of(
     """
     Test whether blocks scatter more than their errors explain, by an analysis of variance.
 
-    With weights w of the sum W, and x̄ = Σ w x / W, the variance ratio is
-    The statistic is F = Σ w (x - x̄)² / Σ w (1 - w/W) v, with W = Σ w. Both sums have the same
-    expected value if all blocks have the same true value x and the errors are right. F then follows
-    Fisher's distribution (Fisher 1925). Its degrees of freedom are B - 1 and those of the pooled
-    errors, by Satterthwaite (1946), doi:10.2307/3002019.
+    With weights w, W = Σ w and x̄ = Σ w x / W, the statistic is the variance ratio
+    F = Σ w (x - x̄)² / Σ w (1 - w/W) v. Both sums have the same expected value if all blocks have
+    the same true value x and the errors are right. F then follows Fisher's distribution (Fisher
+    1925). Its degrees of freedom are B - 1 and those of the pooled errors, by Satterthwaite (1946),
+    doi:10.2307/3002019.
 
     Parameters
     ----------

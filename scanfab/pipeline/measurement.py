@@ -18,7 +18,7 @@ from scanfab.fabric.measured import BlockedSums, void_scatter
 from scanfab.packing.sample import Sample, Variant
 from scanfab.packing.window import Window, inner_ellipsoid
 from scanfab.pipeline.plan import NOISE, Plan
-from scanfab.pipeline.tolerance import scan_to_tolerance
+from scanfab.pipeline.tolerance import is_quick, scan_to_tolerance
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import DirectionRule, design_of, usual_rule
 from scanfab.scan.edges import CLIP, ENDS, START
@@ -162,7 +162,9 @@ def _scan_octants(
     scan = partial(gap_scan(solids, plan, blocks, plan.cutoffs), most_steps=most)
     while True:
         try:
-            return scan(rule, spacing=spacing, replicates=range(BLOCK_REPLICATES)), rule
+            quick = is_quick(solids, spacing, BLOCK_REPLICATES * len(rule))
+            words = {"spacing": spacing, "replicates": range(BLOCK_REPLICATES), "quick": quick}
+            return scan(rule, **words), rule
         except FollowedTooFarError:
             # only a scan can tell how far lines run through a periodic medium
             if solids.chords(2.0 * spacing) < 1.0:

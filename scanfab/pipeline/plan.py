@@ -81,9 +81,9 @@ class Plan:
     rule: DirectionRule
     rvs: tuple[RV, ...]
     """
-    The RVs in ascending order, as they lie in the reference frame, or, after :meth:`in_frame`, in
-    another frame. The first RV that is not empty is scanned until its tolerance is met; the others
-    are scanned along the same lines.
+    The RVs in ascending order, as they lie in the reference frame. After :meth:`in_frame`: as they
+    lie in that frame, and those without a void fabric last. The first RV is scanned until its
+    tolerance is met; the others are scanned along the same lines.
     """
     cutoffs: tuple[float, ...]
     """Cut-offs of the table's rows, in ascending order."""

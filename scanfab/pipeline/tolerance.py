@@ -46,6 +46,8 @@ MARGIN, SIGMAS = 1.1, 2.5
 CLOSEST = 0.05
 # lines are set closer if a larger fraction of the axes of a replicate keeps no segment
 MOST_EMPTY = 0.005
+# chords of a scan that takes a second or so
+QUICK_CHORDS = 3e7
 # without rattlers, what is left of a sample with a larger fraction of them is hardly a packing
 MOST_REMOVED = 0.9
 
@@ -69,11 +71,17 @@ def scan_variants(
     solids: Solids, plan: Plan, replicates: range, most_steps: float = math.inf
 ) -> ScanSums:
     """Scan some replicates; maps use a function of their own, which also sums block by block."""
+    quick = is_quick(solids, plan.spacing, len(plan.rule) * len(replicates))
     return scan_lines(
         solids, plan.rule, spacing=plan.spacing, cutoff=plan.cutoff, variants=plan.variants,
         replicates=replicates, seed=plan.settings.seed, workers=plan.workers,
-        most_steps=most_steps,
+        most_steps=most_steps, quick=quick,
     )  # fmt: skip
+
+
+def is_quick(solids: Solids, spacing: float, axes: int) -> bool:
+    """Whether a scan along so many axes takes less time than to compile a kernel for it."""
+    return solids.chords(spacing) * axes <= QUICK_CHORDS
 
 
 def variant_errors(sums: ScanSums, plan: Plan, variant: str) -> Errors:
@@ -109,7 +117,7 @@ def missing_work(errors: Iterable[Errors], plan: Plan, replicates: int) -> float
     # a scan that ended at its first low value would report too small an error.
     if max(missing, expected) <= 1.0:
         return 1.0
-    return max(expected, min(missing, 1.1))
+    return max(expected, min(missing, SMALLEST_ROUND))
 
 
 def scan_to_tolerance(

@@ -79,7 +79,7 @@ class Length:
 
 def as_written(value: Any) -> Any:
     """
-    The text or numbers that users would write for a value of an option.
+    The text or numbers that users would write for a value of an option; None for ``auto``.
 
     Examples
     --------

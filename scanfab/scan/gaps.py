@@ -96,13 +96,14 @@ def scan_gaps(
     seed: int = 0,
     workers: int = 1,
     most_steps: float = MOST_STEPS,
+    quick: bool = False,
 ) -> GapSums:
     """
     Scan as :func:`scanfab.scan_lines` does, with the same lines, and keep more.
 
     Parameters
     ----------
-    solids, rule, spacing, variants, replicates, seed, workers, most_steps
+    solids, rule, spacing, variants, replicates, seed, workers, most_steps, quick
         As for :func:`scanfab.scan_lines`.
     cutoffs : sequence of float
         In ascending order, dump's length unit.
@@ -126,7 +127,7 @@ def scan_gaps(
     some = partial(
         _binned, solids,
         spacing=spacing, least=least, blocks=blocks, variants=variants, following=following,
-        scans=triads[..., 0, 0].size,
+        quick=quick,
     )  # fmt: skip
     found = in_parts(some, triads, offsets, workers)
     tallies = found[:, :, -2 * TALLY_SIZE :].reshape(*offsets.shape[:2], 2, TALLY_SIZE)
@@ -147,7 +148,7 @@ def _binned(
     blocks: tuple[Blocks, Blocks],
     variants: str,
     following: Following,
-    scans: int,
+    quick: bool,
 ) -> FloatArray:
     """
     Number, length and square of the variants along some axes, (A, V, B, C, 3), and the tallies.
@@ -159,7 +160,7 @@ def _binned(
     axes, kept = len(triads), max(map(len, blocks))
     bins = Bins(partition_of(*blocks), least, np.zeros((axes, 2, 2, kept * len(least), 3)))
     tallies = tally_triads(
-        solids, triads, offsets, spacing, least[0], variants, bins, following, scans
+        solids, triads, offsets, spacing, least[0], variants, bins, following, quick
     )
     rows = ["abcd".index(variant) for variant in variants]
     sums = bins.sums.reshape(axes, 4, kept, len(least), 3)[:, rows]

@@ -27,10 +27,6 @@ NARROW = 0.3
 SMALLEST = 5e-324
 # what counts at the window's surface by the rules that follow no segment
 CLIPPED, WEIGHED = Edge(None, None, 0.0), Edge(True, None, 0.0)
-# A scan of at most so many chords takes a second or so. Then an open whole is scanned as a window
-# without an end, which takes up to a sixth longer, but needs no kernel of its own: to compile it
-# would take some seconds.
-FEW_CHORDS = 3e7
 # steps of following lines through a periodic medium: more take minutes
 MOST_STEPS = 1e10
 
@@ -94,14 +90,14 @@ def tally_triads(
     variants: str,
     bins: Bins | None = None,
     following: Following | None = None,
-    scans: int = 1,
+    quick: bool = False,
 ) -> FloatArray:
     """
     Scan along given line triads (D, 3, 3) with given shifts (D, 2), or (D, 1) in a plane.
 
     Returns the tallies of each axis and set of solids, shape (D, 2, TALLY_SIZE); where there are
     bins, the gaps go there instead. ``following`` counts the steps of this and of other parts.
-    ``scans`` is the number of axes in all parts.
+    If ``quick``, an open whole is scanned as a window without an end.
 
     Raises
     ------
@@ -128,7 +124,7 @@ def tally_triads(
         lines.scan(True, CLIPPED, solids.window)
     else:
         if whole:
-            lines.scan_whole(has_few=scans * solids.chords(spacing) <= FEW_CHORDS)
+            lines.scan_whole(quick)
         if window:
             lines.scan_window()
     if first:
@@ -216,15 +212,15 @@ class _Lines(NamedTuple):
         )
         self.following.add(float(self.tallies[:, 0, sweep.STEPS].sum()) - before)
 
-    def scan_whole(self, has_few: bool) -> None:
+    def scan_whole(self, quick: bool) -> None:
         """
         Scan the whole of an open sample.
 
         By ``ends`` it is an ellipsoid, a window of its own. Else all gaps between the first and the
-        last solid of a line count; if the scan has few chords, as in a window without an end.
+        last solid of a line count; if ``quick``, as in a window without an end.
         """
         inner, found, sums = self.solids.inner, self.tallies, self.bins.sums
-        if self.solids.edge != ENDS and not has_few:
+        if self.solids.edge != ENDS and not quick:
             self.scan(True, None, None)
             return
         if self.solids.edge != ENDS:

@@ -16,6 +16,7 @@ from scanfab.scan.kernels.grid import (
     Spheres,
     open_grid,
     project,
+    room_to_project,
     sort_into_strips,
     strip_of,
 )
@@ -166,6 +167,8 @@ def scan_axes(
     """
     lines = np.empty(STATE_SIZE)
     lists = room_for_lists(listed is not None or bins.cutoffs.size > 0)
+    # kept from axis to axis: to get the pages of large arrays anew takes long
+    room = room_to_project(radius.size)
     left = np.inf if followed is None else followed.most_steps
     for axis in range(axes.triads.shape[0]):
         if left <= 0.0:
@@ -177,7 +180,7 @@ def scan_axes(
         if counts.window is not None and counts.window.start is not None:
             # other spheres change no line
             reach, margin = clip.reach, counts.window.margin
-        spheres = project(position, radius, removed, triad, grid, reach, margin)
+        spheres = project(position, radius, removed, triad, grid, reach, margin, room)
         section = section_along(clip, triad)
         here = bins_along(bins, triad, axis)
         beyond = None

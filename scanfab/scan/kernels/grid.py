@@ -180,6 +180,32 @@ def sphere_at(spheres: Spheres, k: int | np.uint64) -> Sphere:
     return Sphere(spheres.u[k], spheres.v[k], spheres.depth[k], spheres.radius[k])
 
 
+class Room(NamedTuple):
+    """Arrays in which spheres are projected and ordered, along one axis after the other."""
+
+    spheres: Spheres
+    member: IntArray
+    """Which spheres may meet a line, shape (N,)."""
+    depth: FloatArray
+    """Their depths, shape (N,)."""
+    order: IntArray
+    """See :func:`fill_order`, shape (N,)."""
+    stop: IntArray
+    """See :func:`fill_order`, shape (N + 1,)."""
+
+
+@part()
+def room_to_project(count: int) -> Room:
+    """Room for so many spheres."""
+    return Room(
+        room_for_spheres(count),
+        np.empty(count, np.int64),
+        np.empty(count),
+        np.empty(count, np.int64),
+        np.empty(count + 1, np.int64),
+    )
+
+
 @inner(error_model="numpy")
 def project(
     position: FloatArray,
@@ -189,38 +215,58 @@ def project(
     grid: Grid,
     reach: float,
     margin: float,
+    room: Room,
 ) -> Spheres:
     """
     The spheres that may meet a line, ordered by depth, in the triad with rows u, v, n.
 
-    Without those that lie aside of a ball about the origin, or more than the margin before or
-    behind it.
+    Spheres that lie aside of a ball about the origin are left out, and so are those that lie more
+    than the margin before or behind it. The result lies in the room.
     """
     u_x, u_y, u_z = triad[0, 0], triad[0, 1], triad[0, 2]
     v_x, v_y, v_z = triad[1, 0], triad[1, 1], triad[1, 2]
     n_x, n_y, n_z = triad[2, 0], triad[2, 1], triad[2, 2]
-    found, count = room_for_spheres(radius.size), np.uint64(0)
-    per_spacing = 1.0 / grid.spacing
+    spheres, member, depths, order = room.spheres, room.member, room.depth, room.order
+    count, per_spacing = np.uint64(0), 1.0 / grid.spacing
     for k in range(np.uint64(radius.size)):
         x, y, z = position[k, 0], position[k, 1], position[k, 2]
-        found.u[count] = u = u_x * x + u_y * y + u_z * z
-        found.v[count] = v = v_x * x + v_y * y + v_z * z
-        found.depth[count] = depth = n_x * x + n_y * y + n_z * z
-        found.radius[count], found.removed[count] = radius[k], removed[k]
+        u, v = u_x * x + u_y * y + u_z * z, v_x * x + v_y * y + v_z * z
+        member[count], depths[count] = k, n_x * x + n_y * y + n_z * z
         # a row and a column within reach; whether they cross there, the visit will see
         column, row = (u - grid.first_u) * per_spacing, (v - grid.first_v) * per_spacing
         away = radius[k] * per_spacing
         meets = (np.floor(row + away) >= row - away) & (np.floor(column + away) >= column - away)
-        beyond, near = max(abs(depth) - margin, 0.0), reach + radius[k]
+        beyond, near = max(abs(depths[count]) - margin, 0.0), reach + radius[k]
         meets &= u * u + v * v + beyond * beyond <= near * near
         count += np.uint64(meets)
-    return in_order(found, int(count))
+    fill_order(depths[:count], order, room.stop)
+    for i in range(count):
+        place = np.uint64(order[i])
+        j = np.uint64(member[place])
+        x, y, z = position[j, 0], position[j, 1], position[j, 2]
+        spheres.u[i], spheres.v[i] = u_x * x + u_y * y + u_z * z, v_x * x + v_y * y + v_z * z
+        spheres.depth[i], spheres.radius[i] = depths[place], radius[j]
+        spheres.removed[i] = removed[j]
+    return first_spheres(spheres, count)
+
+
+@part()
+def first_spheres(spheres: Spheres, count: int | np.uint64) -> Spheres:
+    """The first spheres, so many."""
+    return Spheres(
+        spheres.u[:count],
+        spheres.v[:count],
+        spheres.depth[:count],
+        spheres.radius[:count],
+        spheres.removed[:count],
+    )
 
 
 @part()
 def in_order(spheres: Spheres, count: int) -> Spheres:
     """The first spheres, so many, ordered by depth."""
-    order, found = order_of(spheres.depth[:count]), room_for_spheres(count)
+    order, found = np.empty(count, np.int64), room_for_spheres(count)
+    fill_order(spheres.depth[:count], order, np.empty(count + 1, np.int64))
     for i in range(np.uint64(count)):
         k = np.uint64(order[i])
         found.u[i], found.v[i], found.depth[i] = spheres.u[k], spheres.v[k], spheres.depth[k]
@@ -229,8 +275,12 @@ def in_order(spheres: Spheres, count: int) -> Spheres:
 
 
 @inner(error_model="numpy")
-def order_of(values: FloatArray) -> IntArray:
-    """Indices that sort values: by buckets, in linear time unless most crowd in a few."""
+def fill_order(values: FloatArray, order: IntArray, stop: IntArray) -> None:
+    """
+    Fill in the indices that sort K values: by buckets, in linear time unless most crowd in a few.
+
+    ``order`` and ``stop`` have room for at least K and K + 1 numbers.
+    """
     count = values.size
     low, high = np.inf, -np.inf
     for value in values:
@@ -238,13 +288,13 @@ def order_of(values: FloatArray) -> IntArray:
     per_width = (count - 1) / (high - low)
     # all of them may be equal, or nearly
     per_width = per_width if per_width < FAR else 0.0
-    stop = np.zeros(count + 1, np.int64)
+    for bucket in range(np.uint64(count + 1)):
+        stop[bucket] = 0
     for value in values:
         stop[np.uint64((value - low) * per_width) + np.uint64(1)] += 1
     for bucket in range(np.uint64(count)):
         stop[bucket + np.uint64(1)] += stop[bucket]
     # from starts of the buckets to their ends, while they fill
-    order = np.empty(count, np.int64)
     for k in range(np.uint64(count)):
         its_bucket = np.uint64((values[k] - low) * per_width)
         order[np.uint64(stop[its_bucket])] = k
@@ -254,8 +304,7 @@ def order_of(values: FloatArray) -> IntArray:
         if stop[bucket] - start > FEW:
             sort_by(values, order[start : stop[bucket]])
         start = stop[bucket]
-    insert(values, order, ONE)
-    return order
+    insert(values, order[:count], ONE)
 
 
 @inner()
