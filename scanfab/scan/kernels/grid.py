@@ -183,11 +183,8 @@ def sphere_at(spheres: Spheres, k: int | np.uint64) -> Sphere:
 class Room(NamedTuple):
     """Arrays in which spheres are projected and ordered, along one axis after the other."""
 
-    spheres: Spheres
-    member: IntArray
-    """Which spheres may meet a line, shape (N,)."""
-    depth: FloatArray
-    """Their depths, shape (N,)."""
+    found: Spheres
+    ordered: Spheres
     order: IntArray
     """See :func:`fill_order`, shape (N,)."""
     stop: IntArray
@@ -197,13 +194,8 @@ class Room(NamedTuple):
 @part()
 def room_to_project(count: int) -> Room:
     """Room for so many spheres."""
-    return Room(
-        room_for_spheres(count),
-        np.empty(count, np.int64),
-        np.empty(count),
-        np.empty(count, np.int64),
-        np.empty(count + 1, np.int64),
-    )
+    found, ordered = room_for_spheres(count), room_for_spheres(count)
+    return Room(found, ordered, np.empty(count, np.int64), np.empty(count + 1, np.int64))
 
 
 @inner(error_model="numpy")
@@ -226,52 +218,39 @@ def project(
     u_x, u_y, u_z = triad[0, 0], triad[0, 1], triad[0, 2]
     v_x, v_y, v_z = triad[1, 0], triad[1, 1], triad[1, 2]
     n_x, n_y, n_z = triad[2, 0], triad[2, 1], triad[2, 2]
-    spheres, member, depths, order = room.spheres, room.member, room.depth, room.order
-    count, per_spacing = np.uint64(0), 1.0 / grid.spacing
+    found, count, per_spacing = room.found, np.uint64(0), 1.0 / grid.spacing
     for k in range(np.uint64(radius.size)):
         x, y, z = position[k, 0], position[k, 1], position[k, 2]
-        u, v = u_x * x + u_y * y + u_z * z, v_x * x + v_y * y + v_z * z
-        member[count], depths[count] = k, n_x * x + n_y * y + n_z * z
+        found.u[count] = u = u_x * x + u_y * y + u_z * z
+        found.v[count] = v = v_x * x + v_y * y + v_z * z
+        found.depth[count] = depth = n_x * x + n_y * y + n_z * z
+        found.radius[count], found.removed[count] = radius[k], removed[k]
         # a row and a column within reach; whether they cross there, the visit will see
         column, row = (u - grid.first_u) * per_spacing, (v - grid.first_v) * per_spacing
         away = radius[k] * per_spacing
         meets = (np.floor(row + away) >= row - away) & (np.floor(column + away) >= column - away)
-        beyond, near = max(abs(depths[count]) - margin, 0.0), reach + radius[k]
+        beyond, near = max(abs(depth) - margin, 0.0), reach + radius[k]
         meets &= u * u + v * v + beyond * beyond <= near * near
         count += np.uint64(meets)
-    fill_order(depths[:count], order, room.stop)
-    for i in range(count):
-        place = np.uint64(order[i])
-        j = np.uint64(member[place])
-        x, y, z = position[j, 0], position[j, 1], position[j, 2]
-        spheres.u[i], spheres.v[i] = u_x * x + u_y * y + u_z * z, v_x * x + v_y * y + v_z * z
-        spheres.depth[i], spheres.radius[i] = depths[place], radius[j]
-        spheres.removed[i] = removed[j]
-    return first_spheres(spheres, count)
+    return in_order(room, int(count))
 
 
 @part()
-def first_spheres(spheres: Spheres, count: int | np.uint64) -> Spheres:
-    """The first spheres, so many."""
-    return Spheres(
-        spheres.u[:count],
-        spheres.v[:count],
-        spheres.depth[:count],
-        spheres.radius[:count],
-        spheres.removed[:count],
-    )
-
-
-@part()
-def in_order(spheres: Spheres, count: int) -> Spheres:
-    """The first spheres, so many, ordered by depth."""
-    order, found = np.empty(count, np.int64), room_for_spheres(count)
-    fill_order(spheres.depth[:count], order, np.empty(count + 1, np.int64))
+def in_order(room: Room, count: int) -> Spheres:
+    """The first spheres that are found, so many, ordered by depth."""
+    spheres, found, order = room.found, room.ordered, room.order
+    fill_order(spheres.depth[:count], order, room.stop)
     for i in range(np.uint64(count)):
         k = np.uint64(order[i])
         found.u[i], found.v[i], found.depth[i] = spheres.u[k], spheres.v[k], spheres.depth[k]
         found.radius[i], found.removed[i] = spheres.radius[k], spheres.removed[k]
-    return found
+    return Spheres(
+        found.u[:count],
+        found.v[:count],
+        found.depth[:count],
+        found.radius[:count],
+        found.removed[:count],
+    )
 
 
 @inner(error_model="numpy")

@@ -16,7 +16,7 @@ import numpy as np
 
 from scanfab.base.jit import ZERO, inner, part
 from scanfab.base.typing import BoolArray, FloatArray
-from scanfab.scan.kernels.grid import Grid, Spheres, in_order, room_for_spheres, sheared_grid
+from scanfab.scan.kernels.grid import Grid, Spheres, in_order, room_to_project, sheared_grid
 from scanfab.scan.kernels.strips import Measured, Section, dot
 
 # how far beyond the prism solids are listed at once, in mean radii; longer gaps are followed alone
@@ -189,11 +189,11 @@ def cell_grid(
     shell = 1.0 + beyond + 2.0 * mean * prism.slope
     shell *= (1.0 + 2.0 * mean / prism.base_u) * (1.0 + 2.0 * mean / prism.base_v)
     room, count = 0, int(1.1 * shell * grains.radius.size)
-    images = room_for_spheres(ZERO)
+    images = room_to_project(ZERO)
     while room < count:
         room = count
-        images = room_for_spheres(room)
-        count = fill_images(grains, prism, beyond, extent, images)
+        images = room_to_project(room)
+        count = fill_images(grains, prism, beyond, extent, images.found)
     if grains.periodic[prism.second]:
         extent[0], extent[1] = 0.0, prism.base_v
     if grains.periodic[prism.first]:
