@@ -55,16 +55,16 @@ class Axes(NamedTuple):
 
 
 class Followed(NamedTuple):
-    """Where lines are followed beyond what is listed of the solids."""
+    """What lines are followed through where solids are not listed."""
 
     cells: Cells
     without_removed: bool
     """Whether the first set of solids lacks the removed grains, too."""
     most_steps: float
     """
-    Of following, all directions together.
+    Most steps of following, all directions together.
 
-    Then the scan ends, and its tallies are worth nothing.
+    A scan that needs more ends early, and its tallies mean nothing.
     """
 
 
@@ -148,9 +148,9 @@ def scan_axes(
     removed : shape (N,)
         Spheres that are not solid in the second set of solids.
     extent : Bounds
-        Of the spheres.
+        Bounds of the spheres.
     axes : Axes
-        And the lines along them.
+        The axes and the lines along them.
     clip : Clip
         The window.
     counts : Counts
@@ -159,7 +159,7 @@ def scan_axes(
         Whether to list the chords of each line first, see :mod:`scanfab.scan.kernels.lists`: faster
         where a sphere meets few lines. For bins they are listed anyhow.
     bins : Bins
-        Where every gap is added, instead of to the tallies, if there are any cut-offs.
+        If there are any cut-offs, every gap is added here and not to the tallies.
     followed : Followed or None
         What lies beyond the window, for a rule that follows segments there.
     tallies : shape (D, 2, TALLY_SIZE)
@@ -203,9 +203,9 @@ def scan_cell(
     tallies: FloatArray,
 ) -> None:
     """
-    Scan a periodic medium along several directions: the whole of it, that has no edge.
+    Scan the whole of a periodic medium, which has no edge, along several directions.
 
-    Of the triads only the last rows count. The rest is as in :func:`scan_axes`.
+    Only the last row of each triad is used. The other parameters are those of :func:`scan_axes`.
     """
     lines = np.empty(STATE_SIZE)
     lists = room_for_lists(listed is not None or bins.cutoffs.size > 0)

@@ -1,7 +1,7 @@
 """
-Void segments one by one: by the block of their middle and by cut-off, with their squares.
+Void segments one by one: sorted by the block of their middle and by cut-off, with their squares.
 
-What sums for one cut-off cannot tell.
+Sums over all segments above one cut-off cannot tell this.
 """
 
 from __future__ import annotations
@@ -15,35 +15,35 @@ from scanfab.base.typing import FloatArray
 from scanfab.scan.kernels.strips import FAR, Counts, Line, Task
 from scanfab.scan.kernels.sweep import add, begins_in, counted, listed_to
 
-# what is added up of the gaps of a block and bin
+# sums over the gaps of a block and bin
 NUMBER, LENGTH, SQUARE = range(3)
-# whose gaps they are
+# kinds of gaps: those of the whole sample and those of the window
 OF_WHOLE, OF_WINDOW = 0, 1
-# of a list of gaps its rows: the line's place along u; where the gap starts in the whole and,
-# behind that, in the window; likewise where it ends, its length if it counts, its bin. By the rules
-# that weigh segments a half for its beginning if that is in the window, then for its end; and where
-# it is followed beyond, its full length
+# Rows of a list of gaps. LINE_U is the line's place along u. A gap runs from GAP_LOW to GAP_HIGH,
+# COUNTED is its length if it counts, PLACE is its bin: each has a row for the whole and, behind it,
+# a row for the window. For rules that weigh segments, LOW_END and HIGH_END are a half for an end in
+# the window, and FULL is the full length of a gap that is followed beyond the window.
 LINE_U, GAP_LOW, GAP_HIGH, COUNTED, PLACE = 0, 1, 3, 5, 7
 LOW_END, HIGH_END, FULL = 9, 10, 11
 
 
 class Partition(NamedTuple):
-    """Blocks of space as numbers, for the whole and for the window; each array has a row a kind."""
+    """Blocks of space as numbers; each array has a row for the whole and one for the window."""
 
     to_block: FloatArray
     """Affine maps of places to three coordinates, shape (2, 3, 4)."""
     parts: FloatArray
-    """How many equal parts of 0 to 1 each has, and how many shells there are, shape (2, 4)."""
+    """Number of equal parts of each coordinate, and number of shells, shape (2, 4)."""
     repeats: FloatArray
     """1 where the fractional part of a coordinate counts, else 0, shape (2, 3)."""
     form: FloatArray
     """
-    The square of the distance from the middle as a form of the coordinates less ½, shape (2, 6).
+    Quadratic form of the coordinates minus ½ that gives the squared distance from the middle.
 
-    The outermost shell ends at 1. Zeros where there are no shells.
+    Shape (2, 6). The outermost shell ends at the distance 1. Zeros if there are no shells.
     """
     halves: Flag
-    """True for halves of coordinates that repeat: octants, which are found in less time."""
+    """True for octants, that is halves of coordinates that repeat, which are found faster."""
 
 
 class Bins(NamedTuple):
@@ -53,17 +53,18 @@ class Bins(NamedTuple):
     """In which block a gap's middle lies."""
     cutoffs: FloatArray
     """
-    In ascending order, shape (C,); a gap goes to the bin of the largest that it reaches.
+    Cut-offs in ascending order, shape (C,); a gap goes to the bin of the largest that it reaches.
 
-    None at all: gaps are to be tallied instead.
+    If there is none, gaps are tallied instead.
     """
     sums: FloatArray
     """
-    Number, length, squared length, shape (D, 2, 2, B * C, 3) with B blocks.
+    Number, length and squared length of the gaps in B blocks, shape (D, 2, 2, B * C, 3).
 
-    Weighted by the rule at the window's surface; of ``ends`` half the number of ends, the length
-    inside, and the number of those that are kept. For each axis, whole or window, and set of
-    solids; without D those of one axis.
+    The axes of the array are: direction, whole or window, set of solids, block and cut-off, sum. A
+    kernel sees one direction, without D. Gaps are weighted by the rule at the window's surface. For
+    ``ends`` the three sums are half the number of ends, the length inside, and the number of gaps
+    that are kept.
     """
 
     def of_whole(self, center: FloatArray) -> Bins:
@@ -76,7 +77,7 @@ class Bins(NamedTuple):
 
 
 def no_bins(axes: int) -> Bins:
-    """For so many axes, none: a kernel that takes these is compiled once, with bins or without."""
+    """Bins without a cut-off: with them a kernel is compiled once, whether it uses bins or not."""
     sums = np.zeros((axes, 2, 2, 0, 3))
     numbers = np.zeros((2, 3, 4)), np.ones((2, 4)), np.ones((2, 3)), np.zeros((2, 6))
     return Bins(Partition(*numbers, True), np.zeros(0), sums)
@@ -99,8 +100,8 @@ def bins_along(bins: Bins, triad: FloatArray, axis: int) -> Bins:
 
 @part()
 def room_for_gaps(count: int) -> FloatArray:
-    """So many gaps, for :func:`list_gap` and :func:`add_gaps`."""
-    # rows that lie a power of two apart would drive one another out of the processor's first cache
+    """Room for a list of so many gaps, for :func:`list_gap` and :func:`add_gaps`."""
+    # rows a power of two apart would evict one another from the processor's first cache
     return np.empty((12, count + 24))
 
 
@@ -108,7 +109,7 @@ def room_for_gaps(count: int) -> FloatArray:
 def list_gap(
     gaps: FloatArray, k: int | np.uint64, line: Line, low: float, high: float, counts: Counts
 ) -> None:
-    """List a gap as number k, as it is and clipped to the window; NaN where it does not count."""
+    """List a gap as number k, unclipped and clipped to the window; NaN if it does not count."""
     u, _, enters, leaves = line
     gaps[LINE_U, k] = u
     if counts.whole is not None:
@@ -135,10 +136,10 @@ def upper_half(x: float) -> float:
 
 @inner(inline="always")
 def part_of(x: float, parts: float) -> float:
-    """In which of so many equal parts of 0 to 1 a coordinate lies, from 0; outside in some."""
+    """Number of the part of 0 to 1 that holds a coordinate; any part if it lies outside."""
     part = np.floor(x * parts)
-    # rounding makes a whole period of what is just below 0; and NaN, of a line that misses the
-    # window, must have some place, too
+    # Rounding turns a coordinate just below 0 into 1, a whole period. NaN, from a line that misses
+    # the window, needs some valid part as well.
     part = part if part < parts - 1.0 else parts - 1.0
     return part if part > 0.0 else 0.0
 
@@ -154,9 +155,10 @@ def find_bins(
     rows: tuple[np.uint64, np.uint64],
 ) -> None:
     """
-    Of gaps on a row of lines, the lengths, 0 where they do not count, and the bins.
+    Find the lengths of gaps on a row of lines, 0 if they do not count, and their bins.
 
-    By the middle between what stands in two rows of their list: their ends, or one of these twice.
+    The bin is that of the middle between the places in two ``rows`` of the list: both ends of the
+    gap, or one end twice.
     """
     cutoffs, of = bins.cutoffs, bins.partition
     to_block, parts = of.to_block[kind], of.parts[kind]
@@ -210,10 +212,10 @@ def add_ends(
     v: float,
 ) -> None:
     """
-    Add the first gaps of a list half to the block of each end that is in the window.
+    Add the first gaps of a list, one half to the block of each end that is in the window.
 
-    By the rule ``start`` a segment counts by its ends; dealt by the middle of what is inside of it,
-    long ones would go to the blocks at the window's surface.
+    By the rule ``start`` a segment counts by its ends. By the middle of its part inside, long
+    segments would go to the blocks at the window's surface.
     """
     sums, of, kind = bins.sums, np.uint64(which), np.uint64(OF_WINDOW)
     for end in range(2):
@@ -239,7 +241,7 @@ def add_gaps(
     which: int,
     v: float,
 ) -> None:
-    """Add the first gaps of a list, all on one row of lines, where they count; or take them off."""
+    """Add the first gaps of a list, all on one row of lines, to the bins; sign -1 removes them."""
     window = counts.window
     if window is not None and window.start is not None and bins.partition.halves is None:
         add_ends(bins, counts, gaps, count, sign, which, v)
@@ -251,7 +253,7 @@ def add_gaps(
         find_bins(bins, counts, gaps, count, kind, v, rows)
     sums, of = bins.sums, np.uint64(which)
     for k in range(count):
-        # both in turns, as a gap has to wait for the one before it if they share a bin
+        # whole and window in turns, since a gap must wait for the one before it if they share a bin
         for kind in range(first, last):
             length = gaps[np.uint64(COUNTED) + kind, k]
             place = np.uint64(gaps[np.uint64(PLACE) + kind, k])
@@ -261,7 +263,7 @@ def add_gaps(
                 number *= gaps[LOW_END, k] + gaps[HIGH_END, k]
                 weighted, last_sum = number, number * length * length
             if window is not None and window.ends is not None:
-                # squares of what is inside say nothing: in their place all that are kept
+                # squares of lengths inside mean nothing: their place takes the number of kept gaps
                 weighted, last_sum = number * (gaps[LOW_END, k] + gaps[HIGH_END, k]), number
             sums[kind, of, place, NUMBER] += weighted
             sums[kind, of, place, LENGTH] += number * length
@@ -273,9 +275,9 @@ def count_gaps(
     task: Task, which: int, line: Line, ends: FloatArray, count: int, sign: float
 ) -> None:
     """
-    Add the first gaps of a list, all on one line, to the tallies or the bins, or take them off.
+    Add the first gaps of a list, all on one line, to the tallies or the bins; sign -1 removes them.
 
-    ``ends``: where they start and end, shape (2, M). With a sign of -1 they are taken off.
+    ``ends`` holds where gaps start and end, shape (2, M).
     """
     counts = task.counts
     if task.bins.cutoffs.size > 0:

@@ -19,10 +19,10 @@ from scanfab.scan.kernels.strips import FAR
 
 Int32Array = npt.NDArray[np.int32]
 
-# what lets the compiler make vector instructions of a loop that looks for the least number
+# allows vector instructions in a loop that looks for the smallest number
 LEAST = {"nnan", "nsz", "contract"}
 
-# of a cell: nearer to the grid than that a ray is in it, but for rounding
+# a ray that misses the grid by less than this fraction of a cell is in it, but for rounding
 SLIGHT = 1e-9
 
 
@@ -33,24 +33,23 @@ class Cells(NamedTuple):
     """
     Centre and radius of each entry, shape (4, K).
 
-    Entries of a cell lie together, as to look up each grain elsewhere would take longer than all
-    else.
+    The entries of a cell lie together: looking up each grain elsewhere would take most of the time.
     """
     removed: BoolArray
-    """Of each entry, shape (K,)."""
+    """Whether each entry is removed, shape (K,)."""
     vectors: FloatArray
-    """Rows: the edges of the whole grid; those along which grains repeat are the periods."""
+    """Edges of the whole grid as rows; edges along which grains repeat are the periods."""
     inverse: FloatArray
     corner: FloatArray
     periodic: BoolArray
     parts: IntArray
     """Cells along each edge, shape (3,)."""
     start: IntArray
-    """First entry of each cell, and behind the last one, first edge fastest."""
+    """First entry of each cell, first edge fastest, and the end of the last cell."""
     farthest: float
-    """Rays that have met nothing so far stay in a channel; of periodic grains, a length."""
+    """A ray that has met nothing after this length stays in a channel of the periodic grains."""
     farthest_kept: float
-    """Likewise, of rays that meet no grain that is removed."""
+    """The same for rays that pass through removed grains."""
 
 
 @inner(inline="always")
@@ -70,10 +69,11 @@ def fill_cells(
     image: Int32Array,
 ) -> None:
     """
-    Count what each cell holds or, if there is room for it, list it.
+    Count the entries of each cell or, if ``grain`` has room for them, list them.
 
-    ``low`` and ``high`` are the first and last cells that each grain reaches, shape (N, 3), beyond
-    the periods, too. ``start`` counts, shape (cells + 1,), or tells where the next entry goes.
+    ``low`` and ``high`` are the first and last cells that each grain reaches, shape (N, 3), also
+    beyond the periods. ``start``, shape (cells + 1,), holds the counts, or where the next entry of
+    each cell goes.
     """
     counts = grain.size == 0
     for g in range(low.shape[0]):
@@ -93,20 +93,20 @@ def fill_cells(
 
 
 class Ray(NamedTuple):
-    """A half line on its way through the cells; room for one, used again and again."""
+    """A half line on its way through the cells; its arrays are used for one ray after the other."""
 
     place: FloatArray
     """Where it begins, in the void, shape (3,); moved by periods as the ray crosses their faces."""
     along: FloatArray
     """Unit vector."""
     cell: IntArray
-    """In which it is."""
+    """The cell that holds it, shape (3,)."""
     step: IntArray
-    """1 or -1: to which side it leaves its cell, along each edge of the grid."""
+    """1 or -1: the side on which it leaves its cell, along each edge of the grid."""
     out: FloatArray
-    """How far from its beginning it meets the next face, across each edge of the grid."""
+    """Distance from its beginning to the next face across each edge of the grid."""
     width: FloatArray
-    """From one such face to the next."""
+    """Distance from one of these faces to the next."""
 
 
 @inner()
@@ -122,17 +122,17 @@ def room_for_ray() -> Ray:
     )
 
 
-# Of a ray: these functions are made part of their caller, as to count the references to all these
-# arrays in a call would take longer than what it does.
+# The functions of a ray are inlined: counting references to all its arrays in each call would take
+# longer than the work itself.
 
 
 @inner(forceinline=True, fastmath=LEAST, error_model="numpy")
 def first_in_cell(cells: Cells, ray: Ray, number: int, without_removed: bool) -> float:
     """
-    How far the first solid is of those that reach into a cell.
+    Distance to the first solid that reaches into a cell.
 
-    As the ray begins in void, each of its chords is before or behind that; by its middle, as that
-    of a solid that ends there may lie before it by rounding.
+    The ray begins in void, so each chord lies before or behind its beginning. The chord's middle
+    decides which: the end of a solid that the ray leaves may lie ahead by rounding.
     """
     # no array is looked up in the loop
     sphere, removed, start = cells.sphere, cells.removed, cells.start
@@ -145,7 +145,7 @@ def first_in_cell(cells: Cells, ray: Ray, number: int, without_removed: bool) ->
         radius = sphere[3, entry]
         reach2 = radius * radius - (x * x + y * y + z * z - depth * depth)
         is_met = (depth > 0.0) & (reach2 > 0.0) & (not (without_removed & removed[entry]))
-        # choices instead of branches, which would be guessed wrong
+        # selections in place of branches, which would be predicted badly
         distance = depth - np.sqrt(reach2 if reach2 > 0.0 else 0.0)
         distance = distance if is_met else FAR
         found = distance if distance < found else found
@@ -155,9 +155,9 @@ def first_in_cell(cells: Cells, ray: Ray, number: int, without_removed: bool) ->
 @inner(forceinline=True, error_model="numpy")
 def to_grid(cells: Cells, ray: Ray) -> float:
     """
-    How far from its beginning the ray is in the grid, which has no end where grains repeat, or FAR.
+    Distance at which the ray enters the grid, which has no end where grains repeat; FAR if never.
 
-    Fills in where it begins, counted in cells, as ``out``, and what it rises as ``width``.
+    Fills in the ray's beginning, counted in cells, as ``out``, and its slope as ``width``.
     """
     first = 0.0
     for i in range(3):
@@ -169,7 +169,7 @@ def to_grid(cells: Cells, ray: Ray) -> float:
         at, rise = at * parts, rise * parts
         ray.out[i], ray.width[i] = at, rise
         if not cells.periodic[i] and not 0.0 <= at <= parts:
-            # else it only gets further away
+            # otherwise it only moves away
             comes = rise > 0.0 if at < 0.0 else rise < 0.0
             first = max(first, ((0.0 if at < 0.0 else parts) - at) / rise if comes else FAR)
     for i in range(3):
@@ -181,7 +181,7 @@ def to_grid(cells: Cells, ray: Ray) -> float:
 
 @inner(forceinline=True, error_model="numpy")
 def begins_inside(cells: Cells, ray: Ray) -> bool:
-    """Let the ray begin in its first cell; whether it has one."""
+    """Put the ray into its first cell; returns whether there is one."""
     first = to_grid(cells, ray)
     if first == FAR:
         return False
@@ -204,7 +204,7 @@ def begins_inside(cells: Cells, ray: Ray) -> bool:
 
 @inner(forceinline=True, error_model="numpy")
 def enters_next(cells: Cells, ray: Ray, through: int) -> bool:
-    """Let the ray enter its next cell, through that pair of faces; whether it is in the grid."""
+    """Move the ray into its next cell; returns whether it is still in the grid."""
     step = ray.step[through]
     ray.out[through] += ray.width[through]
     ray.cell[through] += step
@@ -221,9 +221,9 @@ def next_solid(
     cells: Cells, ray: Ray, without_removed: bool, most_steps: float
 ) -> tuple[float, float]:
     """
-    How far from its place in the void a ray meets the next solid; FAR if there is none.
+    Distance from a ray's beginning in void to the next solid, FAR if there is none.
 
-    And the steps that this took: one for each cell and each grain in it.
+    Also returns the number of steps: one for each cell, and one for each grain in it.
     """
     found, steps = FAR, 0.0
     parts, out = cells.parts, ray.out
@@ -237,7 +237,7 @@ def next_solid(
         through = 0 if out[0] < out[1] else 1
         through = through if out[through] < out[2] else 2
         nearest = out[through]
-        # what is found behind the cell may have others before it
+        # a solid found beyond this cell may lie behind others
         goes_on = found > nearest and nearest <= farthest and steps <= most_steps
         goes_on = goes_on and enters_next(cells, ray, through)
     return found, steps

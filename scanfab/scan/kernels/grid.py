@@ -1,8 +1,8 @@
 """
 The grid of scan lines along one direction, its strips, and the spheres projected onto it.
 
-In a plane, whose normal is the grid's v, it is one row at v = 0: its shift is one number, along u.
-The spheres are ordered by their depth along the direction.
+In a plane, whose normal is the grid's v, the grid is one row at v = 0, and its shift is one number,
+along u. The spheres are ordered by their depth along the direction.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from scanfab.base.jit import LANES, ONE, inner, part
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.kernels.strips import FAR, Sphere, Strip, span
 
-# a bucket with more indices is sorted by itself, and not with all others
+# a bucket with more indices is sorted on its own first
 FEW = 16
 
 
@@ -28,9 +28,9 @@ class Grid(NamedTuple):
     columns: int
     rows: int
     low: IntArray
-    """Of each row, from 0."""
+    """First column of each row, from 0."""
     high: IntArray
-    """Of each row, up to ``columns``."""
+    """End of the columns of each row, up to ``columns``."""
 
 
 @part()
@@ -54,7 +54,7 @@ def cover(
 
 @part()
 def limit_row(grid: Grid, row: int, low_u: float, high_u: float) -> None:
-    """Leave the lines of a row from low_u to high_u."""
+    """Keep only the lines of a row from low_u to high_u."""
     low = int(np.ceil((low_u - grid.first_u) / grid.spacing))
     high = int(np.floor((high_u - grid.first_u) / grid.spacing)) + 1
     grid.low[row] = min(max(low, 0), grid.columns)
@@ -71,7 +71,7 @@ class Bounds(NamedTuple):
 
 @part()
 def shadow(extent: Bounds, side: FloatArray, low: float, high: float) -> tuple[float, float]:
-    """Where the spheres may be along a side of the grid, and at least from low to high."""
+    """The range of the spheres along a side of the grid; at least from low to high."""
     middle = half = 0.0
     for i in range(3):
         middle += extent.centre[i] * side[i]
@@ -90,10 +90,10 @@ def open_grid(
     whole: bool,
 ) -> Grid:
     """
-    The lines that meet the window or, of the whole, any sphere.
+    The lines that meet the window or, for the whole, any sphere.
 
-    ``reach`` is the radius of the ball that holds the window; lines that meet the ball alone are
-    there, too. A window without an end is met by every line.
+    ``reach`` is the radius of the ball that holds the window; lines that meet only the ball are
+    included. Every line meets a window without an end.
     """
     high_u = high_v = reach if reach < FAR else 0.0
     low_u = low_v = -high_u
@@ -105,7 +105,7 @@ def open_grid(
     if not whole:
         for row in range(grid.rows):
             v = grid.first_v + row * spacing
-            # one more on either side, against rounding
+            # one more line on either side, because of rounding
             half = np.sqrt(max(reach * reach - v * v, 0.0)) + spacing
             limit_row(grid, row, -half, half)
     return grid
@@ -121,7 +121,7 @@ def sheared_grid(
     offset: FloatArray,
     spacing: float,
 ) -> Grid:
-    """The lines in a parallelogram: those in v, and in u - skew * v."""
+    """The lines in a parallelogram, which is given by the ranges of u - skew * v and of v."""
     aside_u, aside_v = skew * low_v, skew * high_v
     low, high = low_u + min(aside_u, aside_v), high_u + max(aside_u, aside_v)
     grid = cover(low, high, low_v, high_v, offset, spacing)
@@ -133,7 +133,7 @@ def sheared_grid(
 
 @part()
 def strip_of(grid: Grid, row: int, rows: int, column: int, columns: int) -> Strip:
-    """The strip of so many rows and columns at most, from a row and a column on."""
+    """The strip that starts at a row and a column, with at most so many rows and columns."""
     rows, columns = min(rows, grid.rows - row), min(columns, grid.columns - column)
     low, high = np.empty(rows, np.int64), np.empty(rows, np.int64)
     for k in range(rows):
@@ -225,7 +225,7 @@ def project(
         found.v[count] = v = v_x * x + v_y * y + v_z * z
         found.depth[count] = depth = n_x * x + n_y * y + n_z * z
         found.radius[count], found.removed[count] = radius[k], removed[k]
-        # a row and a column within reach; whether they cross there, the visit will see
+        # a row and a column lie within reach; whether they cross there, the visit finds out
         column, row = (u - grid.first_u) * per_spacing, (v - grid.first_v) * per_spacing
         away = radius[k] * per_spacing
         meets = (np.floor(row + away) >= row - away) & (np.floor(column + away) >= column - away)
@@ -237,7 +237,7 @@ def project(
 
 @part()
 def in_order(room: Room, count: int) -> Spheres:
-    """The first spheres that are found, so many, ordered by depth."""
+    """The first ``count`` spheres that were found, ordered by depth."""
     spheres, found, order = room.found, room.ordered, room.order
     fill_order(spheres.depth[:count], order, room.stop)
     for i in range(np.uint64(count)):
@@ -256,16 +256,17 @@ def in_order(room: Room, count: int) -> Spheres:
 @inner(error_model="numpy")
 def fill_order(values: FloatArray, order: IntArray, stop: IntArray) -> None:
     """
-    Fill in the indices that sort K values: by buckets, in linear time unless most crowd in a few.
+    Fill in the indices that sort K values, by buckets.
 
-    ``order`` and ``stop`` have room for at least K and K + 1 numbers.
+    This takes linear time unless most values crowd in a few buckets. ``order`` and ``stop`` have
+    room for at least K and K + 1 numbers.
     """
     count = values.size
     low, high = np.inf, -np.inf
     for value in values:
         low, high = min(low, value), max(high, value)
     per_width = (count - 1) / (high - low)
-    # all of them may be equal, or nearly
+    # all values may be equal, or nearly so
     per_width = per_width if per_width < FAR else 0.0
     for bucket in range(np.uint64(count + 1)):
         stop[bucket] = 0
@@ -273,7 +274,7 @@ def fill_order(values: FloatArray, order: IntArray, stop: IntArray) -> None:
         stop[np.uint64((value - low) * per_width) + np.uint64(1)] += 1
     for bucket in range(np.uint64(count)):
         stop[bucket + np.uint64(1)] += stop[bucket]
-    # from starts of the buckets to their ends, while they fill
+    # while the buckets fill, ``stop`` moves from their starts to their ends
     for k in range(np.uint64(count)):
         its_bucket = np.uint64((values[k] - low) * per_width)
         order[np.uint64(stop[its_bucket])] = k
@@ -288,7 +289,7 @@ def fill_order(values: FloatArray, order: IntArray, stop: IntArray) -> None:
 
 @inner()
 def sort_by(values: FloatArray, members: IntArray) -> None:
-    """Order some indices by their values, in place (Shell's sort, which suits few of them)."""
+    """Sort some indices by their values, in place, by Shell's sort, which suits small numbers."""
     gap = 1
     while gap < members.size // 9:
         gap = 3 * gap + 1
@@ -299,7 +300,7 @@ def sort_by(values: FloatArray, members: IntArray) -> None:
 
 @inner()
 def insert(values: FloatArray, members: IntArray, gap: int) -> None:
-    """Sort members that are a multiple of the gap apart; fast if few are far from their place."""
+    """Sort members that are multiples of the gap apart; fast if few are far from their place."""
     step = np.uint64(gap)
     for i in range(step, np.uint64(members.size)):
         moving, j = members[i], np.uint64(i)
@@ -313,19 +314,19 @@ def insert(values: FloatArray, members: IntArray, gap: int) -> None:
 @part()
 def sort_into_strips(spheres: Spheres, grid: Grid, rows: int) -> tuple[IntArray, IntArray]:
     """
-    The spheres that each strip of so many rows meets, in their order.
+    List the spheres that each strip of so many rows meets, in their order.
 
-    Returns the start of each strip's list (one entry more than there are strips) and the lists.
+    Returns the start of each strip's list, with the end of the last list behind, and the lists.
     """
     start, chosen = np.zeros(-(-grid.rows // rows) + 2, np.int64), np.empty(0, np.int64)
     if grid.rows <= rows:
-        # all of them
+        # one strip meets all spheres
         chosen = np.empty(spheres.u.size, np.int64)
         for k in range(chosen.size):
             chosen[k] = k
         start[1] = chosen.size
         return start[:2], chosen
-    # first they are counted; where lists begin while they are filled, they end at last
+    # first pass: count; second pass: fill, while each start moves to the end of its list
     for fill in range(2):
         for k in range(spheres.u.size):
             v, radius = spheres.v[k], spheres.radius[k]

@@ -44,44 +44,46 @@ from scanfab.scan.kernels.sweep import (
     reaches_in,
 )
 
-# lines swept side by side; their lists lie together, first the first chord of each line
+# Lines that are swept side by side. Their lists lie together: the first chord of each line comes
+# first, then the second chord of each, and so on.
 ABREAST = 64
-# chords that a list has room for; as soon as one is in the second half, whose places have a bit of
-# their own, all lists are swept
+# Chords that a list has room for. As soon as a chord lies in the second half, which a bit of its
+# place tells, all lists are swept.
 ROOM = 64
 NEXT = 2 * ABREAST
 TILE = ROOM * NEXT
 SECOND_HALF = TILE // 2
-# samples of ten thousand grains have one strip, mostly: to sort spheres into smaller ones, whose
-# lists fit the second cache, takes longer than it saves
+# Samples of ten thousand grains mostly have one strip. Smaller strips, whose lists fit the second
+# cache, would cost more for sorting spheres than they save.
 LISTED_LINES = 16_384
-# more than nothing, and its square root too little to matter
+# above 0, but its square root is too small to matter
 LEAST_REACH2 = 1e-300
-# gaps to be put in bins together
+# gaps that are put in bins together
 TOGETHER = 512
 ALMOST = np.uint64(TOGETHER - ROOM)
 
-# where a chord starts and stops; the solid's end on a line, and where its last gap starts and ends
+# Chord: where it starts and stops. State: the end of the solid on a line, and the ends of its last
+# gap.
 Chord = tuple[float, float]
 State = tuple[float, float, float]
 
 
 class Lists(NamedTuple):
-    """Of the lines of a strip, each a list of chords in the order of their spheres' depths."""
+    """A list of chords for each line of a strip, in the order of their spheres' depths."""
 
     chords: FloatArray
     """
-    The depth of each chord's middle and, ABREAST places on, the square of half its length.
+    The depth of each chord's middle and, ABREAST places behind it, the square of half its length.
 
-    That square is below 0 where the sphere is not in the second set of solids.
+    The square is negative if the sphere is not in the second set of solids.
     """
     stop: IntArray
-    """Place behind each line's last chord, shape (LISTED_LINES,)."""
+    """Place behind the last chord of each line, shape (LISTED_LINES,)."""
 
 
 @part()
 def room_for_lists(wanted: bool) -> Lists:
-    """Empty lists, or none at all."""
+    """Empty lists; arrays without entries if none are wanted."""
     count = LISTED_LINES if wanted else 0
     lists = Lists(np.empty(count // ABREAST * TILE), np.empty(count, np.int64))
     for line in range(count):
@@ -91,18 +93,18 @@ def room_for_lists(wanted: bool) -> Lists:
 
 @inner(inline="always")
 def first_place(line: int) -> int:
-    """Where the list of a line begins."""
+    """Place where the list of a line begins."""
     return line // ABREAST * TILE + line % ABREAST
 
 
 @inner(fastmath=REORDERED, error_model="numpy")
 def list_chords(lists: Lists, strip: Strip, spheres: Spheres, chosen: IntArray, done: int) -> int:
     """
-    Add the chords that spheres cut from a strip, until some list is half full.
+    List the chords that spheres cut from a strip, until some list is half full.
 
-    Of the chosen spheres from number ``done`` on; returns the number of the next one.
+    Starts at number ``done`` of the chosen spheres; returns the number of the next sphere.
     """
-    # no array is handed on in the loop: to count its references would take longer than all else
+    # no array is passed on in the loop: counting references would take most of the time
     chords, stop, removed = lists.chords, lists.stop, spheres.removed
     spacing, per_spacing = strip.spacing, strip.per_spacing
     for number in range(done, chosen.size):
@@ -111,8 +113,9 @@ def list_chords(lists: Lists, strip: Strip, spheres: Spheres, chosen: IntArray, 
         radius, depth = sphere.radius, sphere.depth
         sign = -1.0 if removed[k] else 1.0
         rows = span(sphere.v, radius, strip.first_v, per_spacing, 0, strip.rows)
-        # of the widest row: to find those of each would take longer than the corners; and places
-        # where no line is, at the ends of the strip's rows, get lists, too, of which nothing comes
+        # The columns of the widest row serve for all rows: finding those of each row would take
+        # longer than visiting the corners. Places without a line, at the ends of rows, also get
+        # lists, which are dropped.
         first, last = span(sphere.u, radius, strip.first_u, per_spacing, 0, strip.columns)
         columns = np.uint64(max(last - first, 0))
         from_v = strip.first_v - sphere.v
@@ -126,7 +129,7 @@ def list_chords(lists: Lists, strip: Strip, spheres: Spheres, chosen: IntArray, 
                 du = first_du + spacing * np.int32(j)
                 rest2 = reach2 - du * du
                 place = stop[at + j]
-                # listed anyhow, and overwritten if it is none: no branch to be guessed wrong
+                # written in any case, and overwritten if it is no chord: this needs no branch
                 chords[np.uint64(place)] = depth
                 chords[np.uint64(place + ABREAST)] = sign * max(rest2, LEAST_REACH2)
                 stop[at + j] = place + (NEXT if rest2 >= 0.0 else 0)
@@ -140,7 +143,7 @@ def list_chords(lists: Lists, strip: Strip, spheres: Spheres, chosen: IntArray, 
 def sweep_abreast(
     task: Task, lists: Lists, first: np.uint64, place: np.uint64, vectors: np.uint64
 ) -> None:
-    """Let so many vectors of lines from the first on meet one chord each."""
+    """Let vectors of lines, from the first line on, meet one chord each."""
     lines, counts = task.lines, task.counts
     sums = sums2 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for j in range(np.uint64(vectors * LANES)):
@@ -164,7 +167,7 @@ def sweep_abreast(
 
 @inner()
 def sweep_lists(task: Task, lists: Lists) -> None:
-    """Sweep the lines of a strip over their lists, tally the gaps, and empty the lists."""
+    """Sweep the lines of a strip over their lists, tally the gaps and empty the lists."""
     lines, stop, count = task.lines, lists.stop, task.strip.rows * task.strip.pitch
     chords = 0
     for begin in range(0, count, ABREAST):
@@ -175,7 +178,7 @@ def sweep_lists(task: Task, lists: Lists) -> None:
             is_line = lines[i + END] == lines[i + END]
             chords += (stop[begin + k] - place) // NEXT if is_line else 0
         while True:
-            # lines at either end that have no more chords are left out, at last all
+            # drop lines at either end that have no more chords, until none is left
             while first < last and stop[begin + first] <= place + first:
                 first += 1
             while first < last and stop[begin + last - 1] <= place + last - 1:
@@ -203,9 +206,10 @@ def list_settled(
     count: np.uint64,
 ) -> tuple[State, np.uint64]:
     """
-    Let a line meet a chord, and list the gap that this settles; returns its state and their number.
+    Let a line meet a chord, and list the gap that this settles.
 
-    ``k`` is where the line's state begins. A chord of NaN settles none.
+    ``k`` is where the line's state begins. Returns the new state and the number of listed gaps. A
+    chord of NaN settles no gap.
     """
     lines, counts = task.lines, task.counts
     (start, stop), (end, low, high), (_, _, enters, leaves) = chord, state, line
@@ -215,7 +219,7 @@ def list_settled(
         is_met = reaches_in(start, stop, enters, leaves)
         first = begins_at(low, lines[k + BEFORE])
     if is_met:
-        # listed anyhow, as chords are
+        # written in any case, as chords are
         list_gap(gaps, count, line, first, high, counts)
         count += np.uint64((start > end) & (high - first >= counts.least))
         state = moved(start, stop, end, low, high)
@@ -224,7 +228,7 @@ def list_settled(
 
 @inner(error_model="numpy")
 def bin_lists(task: Task, lists: Lists) -> None:
-    """Sweep the lines of a strip over their lists, put the gaps in bins, and empty the lists."""
+    """Sweep the lines of a strip over their lists, put the gaps in bins and empty the lists."""
     lines, strip, counts, stops = task.lines, task.strip, task.counts, lists.stop
     gaps, gaps2, met = room_for_gaps(TOGETHER), room_for_gaps(TOGETHER), 0
     for row in range(strip.rows):
@@ -260,9 +264,9 @@ def bin_lists(task: Task, lists: Lists) -> None:
 @part()
 def bin_last_gaps(task: Task, which: int) -> float:
     """
-    Put every line's last gap, and the void behind its last solid, in bins.
+    Put the last gap of each line, and the void behind its last solid, in bins.
 
-    Returns the number of closed lines, of which there is nothing put.
+    Returns the number of closed lines, whose gaps are not put in bins here.
     """
     lines, strip, counts = task.lines, task.strip, task.counts
     gaps, closed = room_for_gaps(2 * strip.columns), 0.0
@@ -280,7 +284,7 @@ def bin_last_gaps(task: Task, which: int) -> float:
                 first, behind = begins_at(first, lines[k + BEFORE]), lines[k + BEHIND]
             for low, high in ((first, lines[k + GAP_END]), (end, behind)):
                 list_gap(gaps, count, line, low, high, counts)
-                # behind the last solid there is void in the window alone
+                # void behind the last solid counts only in the window
                 count += (high - low > 0.0) & ((high < FAR) | (low < line[3]))
         add_gaps(task.bins, counts, gaps, np.uint64(count), 1.0, which, v)
     return closed

@@ -1,5 +1,5 @@
 """
-Scan lines through a periodic medium, of which the cell is one period.
+Scan lines through a periodic medium, whose period is the cell.
 
 The lines of a direction n start on a face of the cell, spread evenly over it, and run to the
 opposite face: face and direction span a prism that fills space as the cell does. A gap counts if it
@@ -19,7 +19,7 @@ from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.scan.kernels.grid import Grid, Spheres, in_order, room_to_project, sheared_grid
 from scanfab.scan.kernels.strips import Measured, Section, dot
 
-# how far beyond the prism solids are listed at once, in mean radii; longer gaps are followed alone
+# solids are listed up to so many mean radii beyond the prism; longer gaps are followed one by one
 BEYOND = 16.0
 
 
@@ -31,7 +31,7 @@ class CellGrains(NamedTuple):
     radius: FloatArray
     removed: BoolArray
     vectors: FloatArray
-    """Rows: the cell's edges; in a plane the last one stands across it, and does not repeat."""
+    """Edges of the cell as rows; for discs the last one is normal to the plane and not periodic."""
     periodic: BoolArray
 
 
@@ -45,7 +45,7 @@ class Prism(NamedTuple):
 
     triad: FloatArray
     first: int
-    """Which of the cell's edges is (base_u, 0), which the other of the face, which leads away."""
+    """Number of the cell's edge (base_u, 0); then the face's other edge, and the third edge."""
     second: int
     third: int
     base_u: float
@@ -55,9 +55,9 @@ class Prism(NamedTuple):
     rise_v: float
     length: float
     slope: float
-    """By how much the height changes over a length of 1, at most."""
+    """Largest change of the height over a length of 1."""
     endless: bool
-    """Whether lines have no end: all edges repeat, in a plane but the one across it."""
+    """Whether lines have no end, because all edges are periodic (in a plane its two edges)."""
 
 
 @part()
@@ -106,7 +106,7 @@ def prism_along(
 
 @inner(error_model="numpy")
 def shifts(position: float, reach: float, low: float, high: float, step: float) -> tuple[int, int]:
-    """The whole numbers k for which position + k * step is within reach of low to high."""
+    """The range of whole numbers k with position + k * step within reach of low to high."""
     per_step = 1.0 / step
     return (
         int(np.ceil((low - reach - position) * per_step)),
@@ -119,10 +119,10 @@ def fill_images(
     grains: CellGrains, prism: Prism, beyond: float, extent: FloatArray, spheres: Spheres
 ) -> int:
     """
-    The images of grains that may meet a line of the prism, as many as there is room for.
+    Fill in the images of grains that may meet a line of the prism, as far as there is room.
 
-    Returns their number, also of those without room. ``extent`` (least and greatest v, least and
-    greatest u along the skew) becomes what bounds the face where an axis is not periodic.
+    Returns the number of all these images. ``extent``, the smallest and largest v and the smallest
+    and largest u along the skew, becomes the bounds of the face along axes that are not periodic.
     """
     # no array is handed on in the loop: to count its references would take longer than all else
     triad, position = prism.triad, grains.position
@@ -183,9 +183,9 @@ def cell_grid(
     prism = prism_along(normal, grains.vectors, grains.periodic, offset.size == 1)
     mean = grains.radius.mean()
     beyond = BEYOND * mean / prism.length
-    # least and greatest v, least and greatest u along the skew
+    # smallest and largest v, smallest and largest u along the skew
     extent = np.array([np.inf, -np.inf, np.inf, -np.inf])
-    # a good guess for small grains; where it is too low, the second round has enough
+    # a good estimate for small grains; if it is too low, the second round has enough room
     shell = 1.0 + beyond + 2.0 * mean * prism.slope
     shell *= (1.0 + 2.0 * mean / prism.base_u) * (1.0 + 2.0 * mean / prism.base_v)
     room, count = 0, int(1.1 * shell * grains.radius.size)
@@ -206,5 +206,5 @@ def cell_grid(
 
 @part()
 def foot_of(prism: Prism) -> Section:
-    """Where the measured length of each line begins: on a plane through the origin."""
+    """The plane through the origin on which the measured length of each line begins."""
     return Section(np.empty((0, 4)), 0.0, 0.0, 0.0, 0.0, prism.rise_u, prism.rise_v)

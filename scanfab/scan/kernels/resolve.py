@@ -1,8 +1,8 @@
 """
-What the sweep of a strip leaves: closed lines, and segments longer than what is listed of solids.
+What the sweep of a strip leaves: closed lines, and segments that reach beyond the listed solids.
 
-Closed lines are solved from lists of their chords: slow, and always exact. Long segments are
-followed to their ends through the cells of a grid.
+Closed lines are solved from lists of their chords, which is slow and always exact. Long segments
+are followed to their ends through the cells of a grid.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from scanfab.scan.kernels.sweep import (
 
 @part()
 def closed_lines(task: Task, which: int, closed: int) -> tuple[IntArray, IntArray]:
-    """Of each place of a strip the number of closed lines before it, and the places of these."""
+    """The number of closed lines before each place of a strip, and the places of closed lines."""
     strip = task.strip
     first, place_of = np.zeros(strip.rows * strip.pitch + 1, np.int64), np.empty(closed, np.int64)
     count = 0
@@ -72,10 +72,10 @@ def cut(
     chords: FloatArray,
 ) -> int:
     """
-    List the chords that a sphere cuts from closed lines; with no room, count them.
+    List the chords that a sphere cuts from closed lines; without room for them, count them.
 
-    Line k's chords are counted in ``stop[k + 2]``; its list ends at ``stop[k + 1]``. Returns the
-    number of chords.
+    The chords of line k are counted in ``stop[k + 2]``, and its list ends at ``stop[k + 1]``.
+    Returns the number of chords.
     """
     strip, met = task.strip, 0
     rows = span(sphere.v, sphere.radius, strip.first_v, strip.per_spacing, 0, strip.rows)
@@ -107,10 +107,10 @@ def chords_of(
     task: Task, spheres: Spheres, chosen: IntArray, which: int, first: IntArray, place_of: IntArray
 ) -> tuple[IntArray, FloatArray]:
     """
-    The chords of closed lines, in lists one after the other, each in the order of depth.
+    List the chords of closed lines, line by line, each list in the order of depth.
 
-    Returns the start of each line's list (and the end of the last), and where chords start and
-    stop, shape (2, M).
+    Returns the start of each line's list, with the end of the last list behind, and where the
+    chords start and stop, shape (2, M).
     """
     stop, chords = np.zeros(place_of.size + 2, np.int64), np.empty((2, 0))
     hit, hits = np.empty_like(chosen), 0
@@ -121,7 +121,7 @@ def chords_of(
     for line in range(2, stop.size):
         stop[line] += stop[line - 1]
     chords = np.empty((2, stop[-1]))
-    # where a list begins while it is filled, the one before it ends at last
+    # while a list fills, its start moves to its end
     for k in hit[:hits]:
         cut(task, sphere_at(spheres, k), first, place_of, stop, chords)
     return stop, chords
@@ -132,11 +132,11 @@ def gaps_of(
     line: Line, chords: FloatArray, order: IntArray, counts: Counts, gaps: FloatArray
 ) -> tuple[int, float]:
     """
-    List the gaps that the sweep settles on one line, where they start and end, shape (2, M).
+    List where the gaps that the sweep settles on one line start and end, shape (2, M).
 
-    Returns their number and where the line's last solid ends. Chords ordered by their middles: as
-    the sweep does it, and nothing more once the line is closed. Chords ordered by their starts:
-    exact, as none of them can reach back.
+    Returns their number and where the line's last solid ends. With chords ordered by their middles,
+    these are the gaps that the sweep has counted, none after the line was closed. With chords
+    ordered by their starts, they are exact, since no chord can reach back.
     """
     _, _, enters, leaves = line
     end, low, high = -FAR, -FAR, -FAR
@@ -166,7 +166,7 @@ def gaps_of(
 
 @part()
 def solve_closed(task: Task, spheres: Spheres, chosen: IntArray, which: int, closed: int) -> None:
-    """Replace what the sweep tallied on closed lines by what their lists of chords give."""
+    """Replace what the sweep has tallied on closed lines by the gaps of their lists of chords."""
     lines, strip = task.lines, task.strip
     first, place_of = closed_lines(task, which, closed)
     stop, chords = chords_of(task, spheres, chosen, which, first, place_of)
@@ -189,23 +189,23 @@ def solve_closed(task: Task, spheres: Spheres, chosen: IntArray, which: int, clo
 
 
 class Beyond(NamedTuple):
-    """All grains, as the lines along one axis meet them."""
+    """All grains, for following lines along one axis."""
 
     cells: Cells
     triad: FloatArray
     without_removed: bool
     """Whether the first set of solids lacks the removed grains, too."""
     most_steps: float
-    """Of following lines; then the scan ends, and what it has found is worth nothing."""
+    """Most steps of following; a scan that needs more ends early, and its sums mean nothing."""
     endless: bool
-    """Whether a line that meets nothing any more stays in a channel of a periodic medium."""
+    """Whether a line that meets no further solid stays in a channel of a periodic medium."""
 
 
 @inner(forceinline=True, error_model="numpy")
 def followed(
     line: Line, beyond: Beyond, which: int, ray: Ray, depth: float, sign: float
 ) -> tuple[float, float]:
-    """How far from a place of a line the next solid is, along it or back; FAR if there is none."""
+    """Distance from a place on a line to the next solid, ahead or back; FAR if there is none."""
     triad = beyond.triad
     for i in range(3):
         ray.place[i] = line[0] * triad[0, i] + line[1] * triad[1, i] + depth * triad[2, i]
@@ -216,20 +216,20 @@ def followed(
 
 @inner(forceinline=True, error_model="numpy")
 def add_followed(task: Task, which: int, line: Line, low: float, high: float, sign: float) -> None:
-    """Count a segment, or take it off; one without an end is among those that are left out."""
+    """Count a segment, with sign -1 remove it; a segment without an end is counted as left out."""
     if high - low > 0.5 * FAR:
         task.tally[which, LEFT] += 0.5
         return
     ends, void = np.empty((2, 1)), task.tally[which, WINDOW + VOID]
     ends[0, 0], ends[1, 0] = low, high
     count_gaps(task, which, line, ends, ONE, sign)
-    # the sweep has counted all void in the window
+    # the sweep has already counted all void in the window
     task.tally[which, WINDOW + VOID] = void
 
 
 @inner(error_model="numpy")
 def follow_measured(task: Task, which: int, measured: Measured, beyond: Beyond) -> None:
-    """Tally the gaps that start in the measured length and end beyond what is listed of it."""
+    """Tally the gaps that start in the measured length and end beyond the listed solids."""
     lines, strip, tally, ray = task.lines, task.strip, task.tally, room_for_ray()
     for row in range(strip.rows):
         v = strip.first_v + row * strip.spacing
@@ -256,18 +256,18 @@ def follow_measured(task: Task, which: int, measured: Measured, beyond: Beyond) 
 @inner(error_model="numpy")
 def follow_beyond(task: Task, which: int, edge: Edge, beyond: Beyond) -> None:
     """
-    Tally the segments with one end in the window that reach further than solids are listed.
+    Tally the segments with one end in the window that reach beyond the listed solids.
 
-    A line has two of them at most, one at either end. The first one has been counted as if it began
-    where the list does. Those that meet no solid any more leave the sample: only their number is
-    known.
+    A line has at most two of them, one at either end. The sweep has counted the first one as if it
+    began where the list does. Segments that meet no further solid leave the sample; only their
+    number is known.
     """
     lines, strip, tally, counts = task.lines, task.strip, task.tally, task.counts
     ray, margin = room_for_ray(), listed_to(edge)
-    # to it every place of a segment's end is known
+    # with a margin of FAR, the end of every segment is known
     every = Counts(counts.least, counts.second, None, Edge(edge.ends, edge.start, FAR), None)
     known = Task(lines, strip, every, tally, task.bins)
-    # what is listed of a first segment suffices to count it
+    # the listed part of a first segment is long enough to count it
     adds_on = task.bins.cutoffs.size == 0 and margin > counts.least
     for row in range(strip.rows):
         v = strip.first_v + row * strip.spacing
