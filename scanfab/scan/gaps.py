@@ -29,15 +29,15 @@ from scanfab.scan.tallies import MOST_STEPS, Following, tally_triads
 @dataclass(frozen=True, eq=False)
 class GapSums:
     """
-    Sums over the gaps of replicate r, variant v, axis d, block b, at each cut-off c.
+    Sums over the gaps of replicate r, variant v, axis d and block b, at each cut-off c.
 
-    Of the gaps not shorter than the cut-off; lengths in the dump's unit.
+    A gap counts if it is not shorter than the cut-off. Lengths have the dump's unit.
     """
 
     axes: FloatArray
     """Unit vectors, shape (R, D, 3)."""
     variants: str
-    """Which variants, in this order."""
+    """The variants, in the order of the arrays."""
     number: FloatArray
     """Number of gaps, shape (R, V, D, B, C)."""
     length: FloatArray
@@ -45,13 +45,13 @@ class GapSums:
     square: FloatArray
     """Sum of their squared lengths, same shape."""
     scan: ScanSums
-    """Of the same lines all but what was put in blocks: lines, chords, steps, what is left out."""
+    """Other sums of the same lines: lines, chords, steps, and segments that are left out."""
 
     def in_blocks(
         self, variant: str, cutoff: int = 0, moment: int = 1
     ) -> tuple[FloatArray, FloatArray]:
         """
-        Numerator and denominator of ℓ in each block, shapes (R, D, B).
+        Numerator and denominator of the mean length ℓ in each block, shapes (R, D, B).
 
         Parameters
         ----------
@@ -70,14 +70,14 @@ class GapSums:
         self, variant: str, cutoff: int = 0, moment: int = 1, without: int | None = None
     ) -> tuple[FloatArray, FloatArray]:
         """
-        The same of all blocks together, shapes (R, D).
+        Numerator and denominator of ℓ of all blocks together, shapes (R, D).
 
         Parameters
         ----------
         variant, cutoff, moment
-            As of :meth:`in_blocks`.
+            As for :meth:`in_blocks`.
         without : int, optional
-            A block to leave out.
+            Number of a block to leave out.
         """
         blocks = np.arange(self.number.shape[3]) != without
         over, under = self.in_blocks(variant, cutoff, moment)
@@ -99,22 +99,22 @@ def scan_gaps(
     quick: bool = False,
 ) -> GapSums:
     """
-    Scan as :func:`scanfab.scan_lines` does, with the same lines, and keep more.
+    Scan the lines of :func:`scanfab.scan_lines`, and sort gaps by block and cut-off.
 
     Parameters
     ----------
     solids, rule, spacing, variants, replicates, seed, workers, most_steps, quick
         As for :func:`scanfab.scan_lines`.
     cutoffs : sequence of float
-        In ascending order, dump's length unit.
+        Cut-offs in ascending order, dump's length unit.
     blocks : two Blocks
-        Of the whole sample and of the window, in the coordinates of ``solids``; if one has fewer,
-        nothing is in its last ones.
+        Blocks of the whole sample and of the window, in the coordinates of ``solids``. If their
+        numbers differ, the last sums of the smaller number are 0.
 
     Raises
     ------
     SettingsError
-        If the spacing asks for more lines than can be scanned in reasonable time, if following
+        If the spacing makes more lines than can be scanned in reasonable time, if following
         lines through a periodic medium takes more steps than allowed, or if the axes do not lie in
         the plane of the solids.
     """
@@ -153,10 +153,10 @@ def _binned(
     """
     Number, length and square of the variants along some axes, (A, V, B, C, 3), and the tallies.
 
-    In one array of the shape (A, ...), as the parts of a scan come together. ``least``: the
-    cut-offs.
+    Both come in one array of the shape (A, ...), so that parts of a scan can be joined. ``least``
+    holds the cut-offs.
     """
-    # for the whole and for the window the same number of blocks
+    # the same number of blocks for the whole and for the window
     axes, kept = len(triads), max(map(len, blocks))
     bins = Bins(partition_of(*blocks), least, np.zeros((axes, 2, 2, kept * len(least), 3)))
     tallies = tally_triads(
@@ -165,12 +165,12 @@ def _binned(
     rows = ["abcd".index(variant) for variant in variants]
     sums = bins.sums.reshape(axes, 4, kept, len(least), 3)[:, rows]
     if len(least) > 1:
-        # what reaches a cut-off reaches all below it
+        # a gap that reaches a cut-off reaches all smaller ones
         sums = np.flip(np.cumsum(np.flip(sums, axis=3), axis=3), axis=3)
     if solids.edge == ENDS:
         number, length, square = np.moveaxis(sums, -1, 0)
         weighed = [solids.medium is None or variant in "cd" for variant in variants]
-        # the third sum is the number of the kept, see kernels/bins
+        # the third sum is the number of kept gaps, see kernels/bins
         length[:, weighed] -= least * (square - number)[:, weighed]
         square[:, weighed] = np.nan
     return np.concatenate([sums.reshape(axes, -1), tallies.reshape(axes, -1)], axis=1)

@@ -25,10 +25,10 @@ JOBS_A_THREAD, MOST_AXES = 4, 16
 @dataclass(frozen=True, eq=False)
 class ScanSums:
     """
-    What a scan adds up, for replicate r, variant v (a, b, c, d) and axis d.
+    The sums of a scan for replicate r, variant v (a, b, c, d) and axis d.
 
-    A segment counts in ``length`` and ``segments`` if it is kept, that is not shorter than the
-    cut-off; ``void`` is the length of all. Lengths in the dump's unit.
+    A segment that is not shorter than the cut-off is kept, and counts in ``length`` and
+    ``segments``. All segments count in ``void``. Lengths have the dump's unit.
 
     Attributes
     ----------
@@ -37,28 +37,29 @@ class ScanSums:
     length : ndarray
         Sum of the lengths of the kept segments, shape (R, 4, D).
     segments : ndarray
-        Number of the kept segments, shape (R, 4, D). By the rules ``start`` and ``ends`` half the
-        number of their ends in the window; then ``length`` is weighted, too, so that the ratio of
-        the two is the mean length.
+        Number of the kept segments, shape (R, 4, D). By the rules ``start`` and ``ends`` it is half
+        the number of their ends in the window; ``length`` is then weighted as well, so that the
+        ratio of the two is the mean length.
     lines : ndarray of int
-        Lines that meet the window (for the whole: any solid), shape (R, 4, D).
+        Number of lines that meet the window (for the whole: any solid), shape (R, 4, D).
     void : ndarray
-        Length of all void in the window, kept or not, shape (R, 4, D). For a periodic whole that in
-        the measured length of its lines; 0 for an open one.
+        Length of all void in the window, kept or not, shape (R, 4, D). For a periodic whole it is
+        the void in the measured length of its lines; for an open whole it is 0.
     line_length : ndarray
-        Length of the lines in the window, shape (R, 4, D); for the whole likewise.
+        Length of the lines in the window, shape (R, 4, D). For a periodic whole it is the measured
+        length of its lines; for an open whole it is 0.
     chords : ndarray of int
-        Chords that all spheres together cut from the lines, shape (R,); of spheres that few lines
-        meet, at times as many as are to be expected.
+        Number of chords that all spheres cut from the lines, shape (R,). For spheres that few lines
+        meet, this may be the expected number, not the counted one.
     channels : ndarray of int
-        Lines of the whole that meet no grain however far they go, shape (R, 4, D).
+        Number of lines of a periodic whole that never meet a grain, shape (R, 4, D).
     steps : ndarray of int
-        Steps of following lines through a periodic medium, beyond what is listed of it, shape (R,).
-        A line makes one for each grain of each cell that it crosses; a step costs about as much as
-        a chord.
+        Number of steps of following lines through a periodic medium where solids are not listed,
+        shape (R,). A line takes a step for each cell that it crosses and each grain in the cell; a
+        step costs about as much as a chord.
     left_out : ndarray
-        Number of segments that leave the sample, and so are not counted, shape (R, 4, D): by the
-        rule ``start``, each by half the number of its ends in the window; else 0.
+        Number of segments that are not counted because they leave the sample, shape (R, 4, D). By
+        the rule ``start`` each counts half the number of its ends in the window; otherwise it is 0.
 
     Examples
     --------
@@ -92,7 +93,7 @@ class ScanSums:
 
     @property
     def work(self) -> IntArray:
-        """What takes time beside the lines themselves: chords and steps, shape (R,)."""
+        """Chords and steps, which take most of the time, shape (R,)."""
         return self.chords + self.steps
 
     @property
@@ -102,7 +103,7 @@ class ScanSums:
 
     def kept(self, variant: str) -> tuple[FloatArray, FloatArray | IntArray]:
         """
-        What is kept of one variant, as :func:`scanfab.void_fabric` takes it.
+        The sums of the kept segments of one variant, as :func:`scanfab.void_fabric` takes them.
 
         Parameters
         ----------
@@ -122,12 +123,12 @@ class ScanSums:
     @classmethod
     def concatenate(cls, parts: Iterable[ScanSums]) -> ScanSums:
         """
-        All replicates of several scans.
+        Join the replicates of several scans.
 
         Parameters
         ----------
         parts : iterable of ScanSums
-            Along as many axes each.
+            Sums of scans with the same number of axes.
 
         Returns
         -------
@@ -151,30 +152,30 @@ def scan_lines(
     quick: bool = False,
 ) -> ScanSums:
     """
-    Scan with one square grid of lines for each axis and replicate; in a plane with one row.
+    Scan with one square grid of lines for each axis and replicate (in a plane, one row of lines).
 
-    In each replicate the rule is turned at random and the grid of every axis is shifted at random.
-    The random numbers depend on the seed and the replicate's number alone.
+    In each replicate the rule is turned at random, and the grid of each axis is shifted at random.
+    The random numbers depend only on the seed and on the replicate's number.
 
     Parameters
     ----------
     solids : Solids
-        What the lines meet.
+        The spheres and the window that the lines meet.
     rule : DirectionRule
-        The axes.
+        The axes of the lines.
     spacing : float
         Distance between neighbouring lines of one axis and replicate, dump's length unit.
     cutoff : float
-        Segments shorter than this are not kept, dump's length unit; nor, at 0, are those below 1e-9
-        of the smallest radius, which rounding makes between surfaces that coincide.
+        Segments shorter than this are not kept, dump's length unit. Segments shorter than 1e-9 of
+        the smallest radius are never kept: they are rounding between surfaces that coincide.
     variants : str, optional
-        Which of a, b, c, d to scan; the sums of the others are 0.
+        Letters out of abcd; the sums of the other variants are 0.
     replicates : iterable of int, optional
         Numbers of the replicates.
     seed, workers : int, optional
         Seed of the random numbers; threads to use. The result does not depend on the threads.
     most_steps : float, optional
-        Of following lines through a periodic medium, see :attr:`ScanSums.steps`.
+        Most steps of following lines through a periodic medium, see :attr:`ScanSums.steps`.
     quick : bool, optional
         Whether to scan an open whole with the kernel of a window. A first scan then waits some
         seconds less for the compiler, but each chord takes up to a sixth longer.
@@ -187,8 +188,8 @@ def scan_lines(
     Raises
     ------
     SettingsError
-        If the spacing asks for more lines than can be scanned in reasonable time, or following
-        lines takes more steps than allowed, or the axes do not lie in the plane of the solids.
+        If the spacing makes more lines than can be scanned in reasonable time, if following lines
+        takes more steps than allowed, or if the axes do not lie in the plane of the solids.
 
     Examples
     --------
@@ -225,10 +226,10 @@ def in_parts(
     workers: int,
 ) -> FloatArray:
     """
-    Scan along the axes of all replicates, a few in each job of several threads, or of workers.
+    Scan along the axes of all replicates, in jobs of a few axes that threads share.
 
-    ``scan`` takes the triads and shifts of some axes, (A, 3, 3) and (A, 2) or (A, 1), and returns
-    what it adds up for each, (A, ...); the result has the shape (R, D, ...).
+    ``scan`` takes the triads and shifts of some axes, shapes (A, 3, 3) and (A, 2) or (A, 1), and
+    returns its sums for each axis, shape (A, ...). The result has the shape (R, D, ...).
     """
     count = offsets.shape[0] * offsets.shape[1]
     triads, shifts = triads.reshape(count, 3, 3), offsets.reshape(count, -1)
@@ -247,7 +248,7 @@ def in_parts(
 
 
 def sums_of(triads: FloatArray, tallies: FloatArray, variants: str, edge: str = CLIP) -> ScanSums:
-    """The sums of replicates from their line triads and tallies, shape (R, D, 2, TALLY_SIZE)."""
+    """Make the sums of replicates from line triads and tallies, shape (R, D, 2, TALLY_SIZE)."""
     wanted = np.array([variant in variants for variant in "abcd"])[:, None]
     # replicate, set of solids, axis
     entries = np.moveaxis(tallies, (3, 2), (0, 2))

@@ -1,4 +1,4 @@
-"""What some axes of a scan add up: the passes over whole and window, by the rule at its surface."""
+"""The sums of some axes of a scan: passes over whole and window, by the edge rule."""
 
 from __future__ import annotations
 
@@ -18,28 +18,29 @@ from scanfab.scan.kernels.bins import OF_WHOLE, OF_WINDOW, Bins, no_bins
 from scanfab.scan.kernels.strips import Counts, Edge
 from scanfab.scan.solids import Solids, clip_of, shortest_gap
 
-# of the spacing and for each variant: spheres of such a radius are scanned as fast row by row as
-# over lists of chords; for the more variants the lists serve, the sooner they pay
+# Spheres whose radius is this fraction of the spacing, for each variant, are scanned as fast row by
+# row as over lists of chords. Lists pay off sooner if they serve more variants.
 FEW_LINES = 0.5
-# of the margin beyond a window: in lists each chord takes longer, so that more is followed alone
+# Fraction of the margin beyond a window: a chord in a list takes longer, so that it pays to list
+# fewer solids and to follow more segments.
 NARROW = 0.3
-# a gap of no length at all never counts
+# a gap without length never counts
 SMALLEST = 5e-324
-# what counts at the window's surface by the rules that follow no segment
+# edge rules that follow no segment: clip and ends
 CLIPPED, WEIGHED = Edge(None, None, 0.0), Edge(True, None, 0.0)
-# steps of following lines through a periodic medium: more take minutes
+# most steps of following lines through a periodic medium: more would take minutes
 MOST_STEPS = 1e10
 
 
 class FollowedTooFarError(SettingsError):
-    """To follow the lines of a scan through a periodic medium takes more steps than allowed."""
+    """Following the lines of a scan through a periodic medium takes more steps than allowed."""
 
 
 class Following:
     """
-    The steps that following the lines of a scan has taken, of all its threads together.
+    The steps that a scan has taken to follow lines, in all its threads together.
 
-    Whether they are too many does not depend on the threads: no part of a scan takes any back.
+    Whether they are too many does not depend on the threads, because steps are only ever added.
     """
 
     def __init__(self, most: float) -> None:
@@ -49,7 +50,7 @@ class Following:
 
     @property
     def left(self) -> float:
-        """How many more are allowed."""
+        """Number of further steps that are allowed."""
         return self.most - self._taken
 
     def add(self, steps: float) -> None:
@@ -59,18 +60,18 @@ class Following:
         Raises
         ------
         FollowedTooFarError
-            If they are too many.
+            If the scan has taken too many steps.
         """
         with self._lock:
             self._taken += steps
         self.check(self._taken)
 
     def __reduce__(self) -> tuple[type, tuple[float]]:
-        # another process counts its own; whoever adds up all parts checks their sum
+        # another process counts its own steps; the caller checks the sum of all parts
         return Following, (self.most,)
 
     def check(self, taken: float) -> None:
-        """FollowedTooFarError if so many steps are too many."""
+        """Raise FollowedTooFarError if so many steps are too many."""
         if taken >= self.most:
             raise FollowedTooFarError(
                 f"void segments that leave the cell are long: following them through its images "
@@ -95,14 +96,14 @@ def tally_triads(
     """
     Scan along given line triads (D, 3, 3) with given shifts (D, 2), or (D, 1) in a plane.
 
-    Returns the tallies of each axis and set of solids, shape (D, 2, TALLY_SIZE); where there are
-    bins, the gaps go there instead. ``following`` counts the steps of this and of other parts.
-    If ``quick``, an open whole is scanned as a window without an end.
+    Returns the tallies of each axis and set of solids, shape (D, 2, TALLY_SIZE). If there are bins,
+    the gaps go there instead. ``following`` counts the steps of this part and of other parts. If
+    ``quick``, an open whole is scanned as a window without an end.
 
     Raises
     ------
     FollowedTooFarError
-        If these are too many.
+        If following lines takes more steps than allowed.
     """
     first, second = ("a" in variants or "c" in variants), ("b" in variants or "d" in variants)
     whole = "a" in variants or "b" in variants
@@ -136,13 +137,13 @@ def tally_triads(
 
 
 class _Lines(NamedTuple):
-    """The lines of some axes through the solids, and what they add up."""
+    """The lines of some axes through the solids, and their sums."""
 
     solids: Solids
     axes: Axes
     cutoff: float
     first: bool
-    """Whether the first set of solids has all of them; else it is that of b and d."""
+    """Whether the first set of solids has all of them; otherwise it is the set of b and d."""
     both: Flag
     bins: Bins
     following: Following
@@ -154,7 +155,7 @@ class _Lines(NamedTuple):
         return True if few and not self.bins.cutoffs.size else None
 
     def scan_cell(self) -> None:
-        """The whole of a periodic packing, which has no edge."""
+        """Scan the whole of a periodic packing, which has no edge."""
         solids = self.solids
         assert solids.medium is not None
         medium = solids.medium
@@ -187,7 +188,7 @@ class _Lines(NamedTuple):
         If some spheres are ``near``, only these are scanned.
         """
         solids, both = self.solids, bool(self.both)
-        # a mask of all would copy
+        # a mask of all spheres would copy them
         solid = slice(None) if self.first else ~solids.removed
         if near is not None:
             solid = near & (self.first | ~solids.removed)
@@ -245,7 +246,7 @@ class _Lines(NamedTuple):
         elif len(solids.grain_radius):
             margin = solids.margin
             if self.bins.cutoffs.size or self.listed(solids.radius, 1 + bool(self.both)):
-                # but for the cut-off: segments that reach it are known to count
+                # not below the cut-off: segments that reach it are known to count
                 margin = min(margin, max(NARROW * margin, 1.01 * self.cutoff))
             near = solids.near_window(margin)
             self.scan(None, Edge(None, True, margin), solids.window, near=near)

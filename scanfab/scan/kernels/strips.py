@@ -18,60 +18,60 @@ from scanfab.base.typing import FloatArray, IntArray
 if TYPE_CHECKING:
     from scanfab.scan.kernels.bins import Bins
 
-# along u and v where a line is, and the depths at which it enters and leaves the window
+# place of a line along u and v, and the depths at which it enters and leaves the window
 Line = tuple[float, float, float, float]
 
 # infinity
 FAR = 1e300
-# The state of a strip's lines fits a core's cache. Its planes lie at a fixed distance, by which the
+# The state of a strip's lines fits a core's cache. Its planes lie at a fixed distance, so that the
 # compiler sees that they do not overlap.
 MOST_LINES = 24_576
 PLANE = np.uint64(MOST_LINES + 24)
-# First places of the planes: the running end and the last gap; SET places on the same for the
-# second set of solids; then where the line enters the window, or where its measured length begins,
-# and where it leaves the window.
+# First places of the planes. END, GAP_START and GAP_END are the running end and the last gap; SET
+# places behind them are those of the second set of solids. ENTRY is where the line enters the
+# window, or where its measured length begins; EXIT is where it leaves the window.
 END, GAP_START, GAP_END = np.uint64(0), PLANE, np.uint64(2) * PLANE
 SET = np.uint64(3) * PLANE
 ENTRY, EXIT = np.uint64(6) * PLANE, np.uint64(7) * PLANE
-# Of the rule `start`: where the last solid before the window ends, with a minus, and where the
-# first one behind it begins. The second set's planes are SET behind; the one between is not used.
+# For the rule `start`: minus the end of the last solid before the window, and the beginning of the
+# first solid behind it. The planes of the second set are SET behind; the one between is not used.
 BEFORE, BEHIND = np.uint64(8) * PLANE, np.uint64(9) * PLANE
 STATE_SIZE = int(13 * PLANE)
 ONE = np.uint64(1)
-# A sphere that is no more lines wide is visited as a square: to find where its chords begin and end
-# in each row would take longer than the corners.
+# A sphere of at most so many lines in width is visited as a square: to find where its chords begin
+# and end in each row would take longer than to visit the corners.
 NARROW = 12
-# Of a quadric's own size: along a line for which it changes less than that by rounding alone, it
-# does not change at all. A line of this kind, along a cylinder's axis, leaves it far beyond the
-# planes.
+# A quadric that changes along a line by less than this fraction of its size changes by rounding
+# alone. Such a line, along a cylinder's axis, leaves the quadric far beyond the planes.
 FLAT, LEAST = 1e-15, 1e-300
-# of the unit normal of a plane, along a line: where it is less, the line is taken for parallel
+# a line is parallel to a plane if the component of the plane's unit normal along it is smaller
 GRAZING = 1e-100
 
 
 class Edge(NamedTuple):
-    """A rule of what counts at the window's surface, see :mod:`scanfab.scan.kernels.sweep`."""
+    """The edge rule: what counts at the window's surface, see :mod:`scanfab.scan.kernels.sweep`."""
 
     ends: Flag
     start: Flag
     margin: float
-    """Of ``start``: how far beyond the window solids are listed; else 0."""
+    """For ``start``: how far beyond the window solids are listed; otherwise 0."""
 
 
 class Measured(NamedTuple):
     """The measured length of a line through a periodic medium."""
 
     length: float
-    """Gaps that begin in it count."""
+    """Gaps that begin within this length count."""
     known: float
-    """Chords that begin further behind its beginning may not be listed, and are left out."""
+    """Chords that begin further than this behind its beginning may not be listed: left out."""
 
 
 class Counts(NamedTuple):
     """
-    What a scan counts; where a field is None, kernels are compiled without what it asks for.
+    What a scan counts.
 
-    The fields are explained in :mod:`scanfab.scan.kernels.sweep`.
+    If a field is None, kernels are compiled without the code for it. The fields are explained in
+    :mod:`scanfab.scan.kernels.sweep`.
     """
 
     least: float
@@ -90,7 +90,7 @@ class Clip(NamedTuple):
     isotropic: float
     deviator: FloatArray
     size: float
-    """That of the quadric: no element of its matrix is greater."""
+    """Size of the quadric: no element of its matrix is larger."""
     level: float
     reach: float
 
@@ -99,15 +99,15 @@ class Section(NamedTuple):
     """
     A window as the lines along one axis meet it.
 
-    Those through (u, v) are inside at depths within √(level - a u² - 2 b u v - c v²) of
-    rise_u u + rise_v v, and on the inner side of all planes.
+    A line through (u, v) is inside at depths within √(level - a u² - 2 b u v - c v²) of
+    rise_u u + rise_v v that lie on the inner side of all planes.
     """
 
     planes: FloatArray
     """
     Rows h, p, q, side: the plane is met at the depth side * (h - p u - q v), shape (P, 4).
 
-    On the side 1 a line leaves the window there, on the side -1 it enters.
+    If side is 1, a line leaves the window there; if it is -1, it enters.
     """
     level: float
     a: float
@@ -119,9 +119,9 @@ class Section(NamedTuple):
 
 class Strip(NamedTuple):
     """
-    Lines at (first_u + column * spacing, first_v + row * spacing), of each row low to before high.
+    Lines at (first_u + column * spacing, first_v + row * spacing) with low <= column < high.
 
-    A row takes ``pitch`` places of a plane, at least LANES more than there are columns.
+    Each row takes ``pitch`` places of a plane, at least LANES more than there are columns.
     """
 
     spacing: float
@@ -136,16 +136,16 @@ class Strip(NamedTuple):
 
 
 class Task(NamedTuple):
-    """The lines of a strip, what is counted on them, and where to."""
+    """The lines of a strip, what is counted on them, and where the sums go."""
 
     lines: FloatArray
-    """Their state, shape (STATE_SIZE,)."""
+    """State of the lines, shape (STATE_SIZE,)."""
     strip: Strip
     counts: Counts
     tally: FloatArray
-    """Of the two sets of solids, shape (2, TALLY_SIZE)."""
+    """Sums for the two sets of solids, shape (2, TALLY_SIZE)."""
     bins: Bins
-    """Where every gap is added instead, if it has cut-offs."""
+    """If they have cut-offs, every gap is added here and not to the tally."""
 
 
 class Sphere(NamedTuple):
@@ -176,7 +176,7 @@ def dot(a: FloatArray, b: FloatArray) -> float:
 @part()
 def section_along(clip: Clip, triad: FloatArray) -> Section:
     """
-    The section for the lines along the third row of a triad (rows u, v, n).
+    The section of a window for lines along the third row of a triad (rows u, v, n).
 
     On a line the quadric x·(m I + D) x = L is a quadratic equation in the depth t. With q the
     matrix in the triad,
@@ -195,7 +195,7 @@ def section_along(clip: Clip, triad: FloatArray) -> Section:
     planes = np.empty_like(clip.planes)
     for k in range(planes.shape[0]):
         normal = clip.planes[k]
-        # along a plane a line meets it far beyond all others, in front or behind
+        # a line parallel to a plane meets it far beyond all other planes, in front or behind
         steep = max(abs(dot(n, normal)), GRAZING)
         planes[k, 0], planes[k, 1] = normal[3] / steep, dot(u, normal) / steep
         planes[k, 2], planes[k, 3] = dot(v, normal) / steep, -1.0 if dot(n, normal) < 0.0 else 1.0
@@ -213,10 +213,10 @@ def section_along(clip: Clip, triad: FloatArray) -> Section:
 @inner(fastmath={"contract"}, error_model="numpy")
 def begin(lines: FloatArray, strip: Strip, section: Section, counts: Counts) -> None:
     """
-    Lines that have met nothing yet, and where they enter and leave the window.
+    Start the lines of a strip, which have met nothing yet, and find where they cross the window.
 
-    Rows lose the lines at their ends that miss its planes, if they serve the window alone. Places
-    of a row where no lines are hold NaN: nothing is ever greater or less.
+    Rows that serve only the window lose lines at their ends that miss its planes. Places of a row
+    without a line hold NaN, which is neither larger nor smaller than any number.
     """
     a, rise_u = section.a, section.rise_u
     for row in range(strip.rows):
@@ -233,7 +233,7 @@ def begin(lines: FloatArray, strip: Strip, section: Section, counts: Counts) -> 
             cut_row(lines, strip, section.planes, np.uint64(k), v, at)
         low, high = np.uint64(strip.low[row]), np.uint64(strip.high[row])
         if counts.whole is None and section.planes.shape[0] > 0:
-            # lines that miss the window at either end of the row need not be visited
+            # lines at either end of the row that miss the window need no visit
             while low < high and not lines[at + low + ENTRY] < lines[at + low + EXIT]:
                 low += ONE
             while low < high and not lines[at + high - ONE + ENTRY] < lines[at + high - ONE + EXIT]:
@@ -243,7 +243,7 @@ def begin(lines: FloatArray, strip: Strip, section: Section, counts: Counts) -> 
             i = at + j
             is_line = (j >= low) & (j < high)
             enters, leaves = lines[i + ENTRY], lines[i + EXIT]
-            # those of a periodic medium are where the line's measured length begins
+            # in a periodic medium, both are where the line's measured length begins
             is_met = is_line & (enters <= leaves)
             enters, leaves = enters if is_met else np.nan, leaves if is_met else np.nan
             lines[i + ENTRY], lines[i + EXIT] = enters, leaves
@@ -256,7 +256,7 @@ def begin(lines: FloatArray, strip: Strip, section: Section, counts: Counts) -> 
 def cut_row(
     lines: FloatArray, strip: Strip, planes: FloatArray, k: np.uint64, v: float, at: np.uint64
 ) -> None:
-    """Let the lines of a row enter and leave no further out than at plane k."""
+    """Cut the lines of a row at plane k."""
     slope, rest, enter = planes[k, 1], planes[k, 0] - planes[k, 2] * v, planes[k, 3] < 0.0
     for j in range(np.uint64(strip.pitch)):
         i = at + j
@@ -277,7 +277,7 @@ def set_off(
     is_line: bool | np.bool,
     counts: Counts,
 ) -> None:
-    """Let a line, which has met nothing yet, begin: before all, or where it enters the window."""
+    """Start a line that has met nothing yet: before all solids or where it enters the window."""
     lines[i + GAP_START] = lines[i + GAP_END] = -FAR
     if counts.window is not None and counts.window.start is not None:
         # NaN, a line that misses the window, stays NaN
@@ -293,10 +293,10 @@ def set_off(
 @kernel
 def spans(clip: Clip, triad: FloatArray, points: FloatArray, ends: FloatArray) -> None:
     """
-    Where a few lines enter and leave a window, to be looked at; NaN where they miss it.
+    Find where a few lines enter and leave a window; NaN if they miss it.
 
-    They run along the third row of a triad through ``points`` along the other two, shape (L, 2);
-    ``ends`` has the same shape.
+    The lines run along the third row of a triad, through ``points`` along its other rows, shape
+    (L, 2). The result goes into ``ends``, of the same shape.
     """
     section, lines = section_along(clip, triad), np.empty(STATE_SIZE)
     for k in range(points.shape[0]):
@@ -310,7 +310,7 @@ def spans(clip: Clip, triad: FloatArray, points: FloatArray, ends: FloatArray) -
 def span(
     centre: float, reach: float, first: float, per_spacing: float, low: int, high: int
 ) -> tuple[int, int]:
-    """Which lines along one side of the grid, of a range, are within ``reach`` of a centre."""
+    """The lines from low to high, along one side of the grid, within ``reach`` of a centre."""
     start = int(np.ceil((centre - reach - first) * per_spacing))
     stop = int(np.floor((centre + reach - first) * per_spacing)) + 1
     return max(start, low), min(stop, high)
@@ -321,9 +321,9 @@ def columns_of_row(
     strip: Strip, sphere: Sphere, row: int, reach2: float, first: int, last: int
 ) -> tuple[int, int, float]:
     """
-    The first of the columns to visit in a row, how many, and how many chords are expected there.
+    The first column to visit in a row, the number of columns, and the expected number of chords.
 
-    ``reach2`` is the square of half the circle's width in the row; the sphere reaches from column
+    ``reach2`` is the square of half the circle's width in the row. The sphere reaches from column
     ``first`` to before ``last``.
     """
     low, high = strip.low[row], strip.high[row]

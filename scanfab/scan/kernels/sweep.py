@@ -1,40 +1,42 @@
 """
-The depth-ordered sweep: void segments on all scan lines of a strip, without any list.
+The depth-ordered sweep: void segments on all scan lines of a strip, without lists of chords.
 
-The spheres are visited in the order of their centres along the direction. A chord's middle lies at
-its sphere's depth, so on every line the chords arrive ordered by their middles, and three numbers a
-line suffice: the running end of the solid, and the two ends of the last gap, which is not counted
-yet. A chord that begins behind the running end settles the last gap and opens a new one; one that
-begins earlier can only shorten the last gap. That is exact unless a chord reaches back past the
-last gap: such a line is closed (its solid never ends), and is solved again from its list of chords.
+Spheres are visited in the order of their centres along the direction. A chord's middle lies at its
+sphere's depth, so on every line the chords arrive ordered by their middles. Three numbers per line
+are enough: the running end of the solid, and the two ends of the last gap, which is not counted
+yet. A chord that begins behind the running end settles the last gap and opens a new one. A chord
+that begins earlier can only shorten the last gap. This is exact unless a chord reaches back past
+the last gap. Such a line is closed (its solid never ends), and is solved again from a list of its
+chords.
 
 What is counted is chosen by the fields of :class:`scanfab.scan.kernels.strips.Counts`:
 
 ``whole``     gaps as they are, between the first and the last solid of the line
 ``measured``  with ``whole``: only gaps that start in the line's measured length
 ``window``    gaps in the window, from where the line enters it to where it leaves it, by one of
-              the rules below; lines that miss it carry NaN
-``second``    all this again for a second set of solids, from which some spheres are removed
+              the edge rules below; lines that miss it carry NaN
+``second``    the same for a second set of solids, from which some spheres are removed
 
-A gap that reaches FAR never counts in the whole.
+In the whole, a gap that reaches FAR never counts.
 
-A segment [low, high] on a line that is inside the window from ``enters`` to ``leaves`` adds a
-length and a number to the sums of its direction. With L = high - low, I the part of it inside, e
-the number of its ends inside (0, 1, 2), where a place at which the window cuts it is no end, and c
-the cut-off::
+A line is inside the window from ``enters`` to ``leaves``. A segment [low, high] on it adds a length
+and a number to the sums of its direction. L = high - low is its full length, I is the length of its
+part inside, and c is the cut-off. e is the number of its ends inside (0, 1 or 2); a place at which
+the window cuts it is no end::
 
     rule    counts if   length                number
     clip    I >= c      I                     1
     start   L >= c      L e/2                 e/2
     ends    I >= c      (I - c) + c e/2       e/2
 
-The mean length is the ratio of the sums; of ``ends`` it is c + Σ (I - c) / Σ e/2, as one ratio.
+The mean length is the ratio of the sums; for ``ends`` it is c + Σ (I - c) / Σ e/2, as one ratio.
 
-By ``start`` only chords that reach into the window change a line. Of all others it keeps where the
-last solid before the window ends and where the first one behind it begins, in any order: there its
-first segment begins and its last one ends. The place before the window is kept with a minus: seen
-from behind, it is the least. Solids are listed as far as a margin beyond the window. A line that
-met none there keeps the margin's end, and is followed (:mod:`scanfab.scan.kernels.resolve`).
+By ``start``, only chords that reach into the window change a line. Of the other chords a line keeps
+the end of the last solid before the window and the beginning of the first solid behind it: there
+its first segment begins and its last segment ends. The former is kept with a minus, so that both
+are found as a minimum, whatever the order of the chords. Solids are listed up to a margin beyond
+the window. A line that meets none there keeps the margin's end, and is followed further
+(:mod:`scanfab.scan.kernels.resolve`).
 """
 
 from __future__ import annotations
@@ -66,33 +68,33 @@ from scanfab.scan.kernels.strips import (
 
 Sums = tuple[float, float, float, float, float, float]
 
-# the compiler leaves out what adds it: unlike 0, it changes no number, not even -0
+# Adding -0 changes no number, not even -0 itself, so the compiler drops the addition.
 NOTHING = -0.0
-# entries of a tally, of the whole and, behind them, of the window; and the chords of all solids;
-# and the lines that stay in a channel of a periodic medium, the steps of following lines, and the
-# number of segments that leave the sample
+# Entries of a tally: five sums of the whole and, behind them, of the window; then the chords of all
+# solids, the lines that stay in a channel of a periodic medium, the steps of following lines, and
+# the number of segments that leave the sample.
 LENGTH, KEPT, VOID, LINES, LINE_LENGTH = range(5)
 WHOLE, WINDOW, CHORDS, CHANNELS, STEPS, LEFT = 0, 5, 10, 11, 12, 13
 TALLY_SIZE = 14
-# Of the margin: segments that reach so far are followed, whatever rounding says of its very end.
+# Segments that reach this fraction of the margin are followed: rounding at its end has no effect.
 NEARLY = 1.0 - 1e-6
 
 
 @inner(forceinline=True, error_model="numpy")
 def ends_inside(low: float, high: float, enters: float, leaves: float) -> float:
-    """Half the number of ends in the window of a segment that has a part there."""
+    """Half the number of ends that lie in the window, for a segment with a part in it."""
     return (0.5 if low > enters else 0.0) + (0.5 if high < leaves else 0.0)
 
 
 @inner(forceinline=True, error_model="numpy")
 def listed_to(edge: Edge) -> float:
-    """From where on solids beyond the window may not be listed."""
+    """Distance beyond the window from which on solids may not be listed."""
     return edge.margin * NEARLY
 
 
 @inner(forceinline=True, error_model="numpy")
 def is_listed(start: float, enters: float, counts: Counts) -> bool:
-    """Whether a chord begins where all of them are listed; others are left out."""
+    """Whether a chord begins where all chords are listed; other chords are left out."""
     known = True
     if counts.measured is not None:
         known = start - enters < counts.measured.known
@@ -101,7 +103,7 @@ def is_listed(start: float, enters: float, counts: Counts) -> bool:
 
 @inner(forceinline=True, error_model="numpy")
 def begins_in(low: float, enters: float, measured: Measured) -> bool:
-    """Whether a gap begins in the measured length of its line; not for NaN, where no line is."""
+    """Whether a gap begins in the measured length of its line; False for NaN, that is no line."""
     return (low - enters >= 0.0) & (low - enters < measured.length)
 
 
@@ -122,17 +124,17 @@ def whole_gap(
 def window_gap(
     low: float, high: float, least: float, enters: float, leaves: float, counts: Counts, edge: Edge
 ) -> tuple[float, float, float]:
-    """Length and number that a gap adds to the window's sums, and the length of it inside."""
+    """Length and number that a gap adds to the window's sums, and the length of its part inside."""
     last = high if high < leaves else leaves
     first = low
     if counts.whole is not None or edge.start is not None:
-        # else no line begins before the window
+        # otherwise no line begins before the window
         first = low if low > enters else enters
     inside = last - first
     void = inside if inside > 0.0 else 0.0
     length, kept, weight = inside, inside >= least, 1.0
     if edge.ends is None and edge.start is None:
-        # a window without an end is no gap's end
+        # a window without an end ends no gap
         kept &= inside < 0.5 * FAR
     if edge.ends is not None:
         weight = ends_inside(low, high, enters, leaves)
@@ -140,7 +142,7 @@ def window_gap(
     if edge.start is not None:
         weight = ends_inside(low, high, enters, leaves)
         length = weight * (high - low)
-        # the others are followed
+        # other segments are followed
         known = (high < leaves + listed_to(edge)) & (high - low < 0.5 * FAR)
         kept = (inside > 0.0) & (high - low >= least) & known
     return length if kept else 0.0, weight if kept else 0.0, void
@@ -153,7 +155,7 @@ def counted(
     """What a gap adds to the tallies of the whole and of the window, if it is settled."""
     length = kept = void = NOTHING
     inside = inside_kept = inside_void = NOTHING
-    # no gap is longer
+    # no gap is as long as that
     least = counts.least if settles else 2.0 * FAR
     if counts.whole is not None:
         length, kept, gap = whole_gap(low, high, least, enters, counts)
@@ -172,7 +174,7 @@ def moved(
 ) -> tuple[float, float, float]:
     """The state of a line after a chord; a chord of NaN leaves it as it is."""
     opens = start > end
-    # the sum keeps the compiler from storing this with a mask, which is slow to read again
+    # adding 0 keeps the compiler from a masked store, which is slow to read again
     low = (end if opens else low) + 0.0
     high = FAR if opens else high
     high = start if start < high else high
@@ -185,7 +187,7 @@ def moved(
 def met_beyond(
     lines: FloatArray, i: np.uint64, start: float, stop: float, enters: float, leaves: float
 ) -> None:
-    """Let a line keep what a chord makes of the solids beyond the window; of NaN it is nothing."""
+    """Update the solids beyond the window that a line keeps; a chord of NaN changes nothing."""
     before, behind = lines[i + BEFORE], lines[i + BEHIND]
     place = -stop if start <= enters else before
     lines[i + BEFORE] = place if place < before else before
@@ -201,20 +203,20 @@ def reaches_in(start: float, stop: float, enters: float, leaves: float) -> bool:
 
 @inner(forceinline=True, error_model="numpy")
 def begins_at(low: float, before: float) -> float:
-    """Where a gap begins; the first one of a line at the last solid before the window."""
+    """Where a gap begins; a line's first gap begins at the last solid before the window."""
     return low if low > -before else -before
 
 
 @inner(forceinline=True, error_model="numpy")
 def settled_gap(settles: bool, low: float, high: float, before: float, counts: Counts) -> Sums:
     """
-    What a gap adds by the rule ``start`` that ends in the window, if it is settled.
+    What a gap that ends in the window adds by the rule ``start``, if it is settled.
 
-    The length of a first gap is too long by what lies before the window, see :func:`last_gap`.
+    The void of a first gap includes its part before the window, which :func:`last_gap` subtracts.
     """
     length = high - begins_at(low, before)
     weight = 0.5 if low < -before else 1.0
-    # no gap is longer
+    # no gap is as long as that
     kept = length >= (counts.least if settles else 2.0 * FAR)
     void = length if length > 0.0 else 0.0
     inside = weight * length if kept else 0.0, weight if kept else 0.0, void if settles else 0.0
@@ -228,7 +230,7 @@ def last_gap(
     """
     Length and number that the void behind a line's last solid adds, and its length in the window.
 
-    By the rule ``start`` less what its first gap has before the window.
+    By the rule ``start``, the latter is without the part of the first gap before the window.
     """
     end = lines[i + END]
     if edge.start is None:
@@ -251,9 +253,9 @@ def meet(
     lines: FloatArray, i: np.uint64, line: Line, start: float, stop: float, counts: Counts
 ) -> Sums:
     """
-    Let the line whose state begins at a place meet a chord, and count the gap that this settles.
+    Let a line, whose state begins at place i, meet a chord, and count the gap that this settles.
 
-    A chord of NaN settles none, and leaves the line as it is.
+    A chord of NaN settles no gap and leaves the line as it is.
     """
     _, _, enters, leaves = line
     end, low, high = lines[i + END], lines[i + GAP_START], lines[i + GAP_END]
@@ -271,7 +273,7 @@ def meet(
 
 @inner(forceinline=True, error_model="numpy")
 def both(first: Sums, second: Sums) -> Sums:
-    """The sums of two."""
+    """Add two sets of sums."""
     return (
         first[0] + second[0],
         first[1] + second[1],
@@ -298,10 +300,10 @@ def visit(task: Task, sphere: Sphere, kept: float) -> None:
     """
     Visit the chords that a sphere cuts from a strip, and tally the gaps that they settle.
 
-    ``kept`` is NaN for a sphere that is not in the second set of solids, else NOTHING.
+    ``kept`` is NaN for a sphere that is not in the second set of solids, otherwise NOTHING.
 
-    The compiler makes vector instructions of the inner loop because rows are contiguous, indices
-    cannot be negative, planes cannot overlap, and there are choices instead of branches.
+    The compiler turns the inner loop into vector instructions, because rows are contiguous, indices
+    cannot be negative, planes cannot overlap, and selections take the place of branches.
     """
     lines, strip, counts = task.lines, task.strip, task.counts
     sums = sums2 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -315,7 +317,7 @@ def visit(task: Task, sphere: Sphere, kept: float) -> None:
         reach2 = radius * radius - dv * dv
         first, met, cut = columns_of_row(strip, sphere, row, reach2, columns[0], columns[1])
         chords += cut
-        # whole vectors, also beyond the last chord, where square roots are NaN
+        # whole vectors, also behind the last chord, where square roots are NaN
         vectors = (met + LANES - 1) // LANES
         first_du = from_u + first * strip.spacing
         at = np.uint64(row * strip.pitch + first)
@@ -343,7 +345,7 @@ def visit_all(task: Task, spheres: Spheres, chosen: IntArray, reach: float) -> N
     """
     Visit the chosen spheres.
 
-    ``reach`` is the radius of the ball that holds the window. Spheres aside of it meet no line that
+    ``reach`` is the radius of the ball that holds the window. Spheres beside it meet no line that
     meets the window.
     """
     counts = task.counts
@@ -362,9 +364,9 @@ def visit_all(task: Task, spheres: Spheres, chosen: IntArray, reach: float) -> N
 @inner(fastmath=REORDERED, error_model="numpy")
 def settle(task: Task, which: int) -> float:
     """
-    Tally every line's last gap, and in the window the void behind its last solid.
+    Tally the last gap of each line and, in the window, the void behind its last solid.
 
-    Returns the number of closed lines, of which nothing is tallied here but that they are there.
+    Returns the number of closed lines. Here they are only counted; their gaps are solved later.
     """
     lines, strip, tally = task.lines, task.strip, task.tally
     counts = task.counts
