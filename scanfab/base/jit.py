@@ -37,8 +37,8 @@ from numba.misc import appdirs
 
 from scanfab.base.files import whole_file
 
-# numbers that the compiler's vector instructions take at a time: 256 bits of them, also on
-# processors that have wider ones, but for these
+# Numbers that a vector instruction takes: 256 bits, except on these processors, which have wider
+# instructions that are fast.
 LANES = 8 if get_host_cpu_name() in ("znver4", "znver5") else 4
 
 # its types leave out some of its options
@@ -51,7 +51,7 @@ ONE: int = np.int64(1)  # type: ignore[assignment]
 # what lets the compiler make vector instructions of a loop with sums: any order of the terms
 REORDERED = {"reassoc", "contract"}
 
-# an argument that is there or not: for each choice a kernel is compiled with nothing else in it
+# an argument that is True or None: a kernel is compiled for each of the two, without the other code
 Flag = Literal[True] | None
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -65,10 +65,10 @@ _announcements: list[Callable[[], object]] = []
 @register_pass(mutates_CFG=False, analysis_only=False)  # type: ignore[no-untyped-call]
 class _KnownFlags(FunctionPass):
     """
-    Answer ``is None`` and ``is not None`` of arguments, and of fields of their NamedTuples.
+    Decide ``is None`` and ``is not None`` by the types of arguments and of fields of NamedTuples.
 
-    Their types say it. Numba then compiles nothing of the branch that is not taken; by itself it
-    does so only where an argument is None.
+    Numba then compiles nothing of the branch that is not taken. By itself it does so only for
+    arguments that are None, not for fields.
     """
 
     _name = "scanfab_known_flags"
@@ -96,7 +96,7 @@ class _KnownFlags(FunctionPass):
 
 
 def _type_of(state: Any, variable: Any) -> Any:
-    """The type of an argument, of a field of one or of None; else None."""
+    """The type of an argument, of a field of an argument, or of None; None if it is unknown."""
     found = guard(get_definition, state.func_ir, variable)  # type: ignore[no-untyped-call]
     if isinstance(found, ir.Arg):
         return state.args[found.index]
@@ -110,13 +110,13 @@ def _type_of(state: Any, variable: Any) -> Any:
 
 
 class _Compiler(CompilerBase):
-    """Numba's own passes, and flags before the branches that they choose."""
+    """Numba's own passes, and the pass for flags before branches are pruned."""
 
     def define_pipelines(self) -> list[Any]:
         define: Any = DefaultPassBuilder.define_nopython_pipeline
         passes = define(self.state)
         passes.add_pass_after(_KnownFlags, IRProcessing)
-        # also for those of functions that have become part of this one
+        # once more for functions that have been inlined
         passes.add_pass_after(_KnownFlags, InlineInlinables)
         passes.finalize()
         return [passes]
@@ -161,10 +161,10 @@ def kernel(function: Function, **options: Any) -> Function:
 
 def inner(**options: Any) -> Callable[[Function], Function]:
     """
-    Compile a function that only kernels call.
+    Compile a function that only kernels call, without the code that Python needs to call it.
 
-    Without what Python needs to call it, which would take a sixth of the time to compile it all:
-    called from Python it ends the process, so tests call it in a kernel of their own.
+    That code would take a sixth of the time. A call from Python ends the process, so tests call
+    such a function in a kernel of their own.
     """
     return partial(kernel, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
 

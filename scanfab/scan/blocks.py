@@ -1,4 +1,4 @@
-"""Blocks of space: to which of them a place belongs, where they are, and how large."""
+"""Blocks of space: the block that holds a place, and the positions and sizes of blocks."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class Blocks:
     """
     Blocks of space: parts of a parallelepiped, of a periodic cell, or of shells about a centre.
 
-    A place x has coordinates f with x = corner + f E, and E the edges. Where one repeats, its
-    fractional part counts; where it does not, places with f outside 0 to 1 are in no block. Of the
-    axis i, a place lies in the part ⌊p_i f_i⌋. With s shells about the middle, it also lies in the
-    shell ⌊s d / R⌋, if its distance d from the middle is not above R. Block numbers from 0 count
-    the first axis fastest, and shells last.
+    A place x has the coordinates f with x = corner + f E, where E are the edges. Along a periodic
+    edge only the fractional part of f counts; along another edge, places with f outside 0 to 1 lie
+    in no block. Along edge i a place lies in the part ⌊p_i f_i⌋. If there are s shells about the
+    middle, it also lies in the shell ⌊s d / R⌋, provided that its distance d from the middle is at
+    most R. Blocks are numbered from 0, the first edge fastest and shells last.
 
     Examples
     --------
@@ -37,17 +37,17 @@ class Blocks:
     """
 
     corner: FloatArray
-    """From which the edges run, dump's length unit, shape (3,)."""
+    """Corner at which the edges begin, dump's length unit, shape (3,)."""
     edges: FloatArray
-    """Of the parallelepiped, as rows, shape (3, 3)."""
+    """Edges of the parallelepiped as rows, shape (3, 3)."""
     parts: tuple[int, ...] = (2, 2, 2)
-    """p: how many parts there are along each edge."""
+    """p: number of parts along each edge."""
     repeats: Sequence[bool] | BoolArray = (False, False, False)
-    """Along which edges it is the period of a periodic medium."""
+    """Which edges are periods of a periodic medium."""
     radius: float = 0.0
-    """R of the outermost shell; 0 without shells."""
+    """R: radius of the outermost shell; 0 without shells."""
     shells: int = 1
-    """s: how many shells of equal thickness there are."""
+    """s: number of shells of equal thickness."""
 
     def __len__(self) -> int:
         return math.prod(self.parts) * self.shells
@@ -61,16 +61,16 @@ class Blocks:
         space: Space = SPACE,
     ) -> Blocks:
         """
-        The octants about a centre, of places within a reach of it; in a plane quadrants.
+        The octants about a centre (in a plane, quadrants), for places within a reach of it.
 
-        One of the axes that part them is the given one: then they are mirror images of one another
-        with respect to it, as they must be in order to differ by chance alone.
+        One of the axes that divide them is the given axis. They are then mirror images of one
+        another with respect to it, so that they differ by chance alone.
         """
         along = np.asarray(axis, dtype=np.float64)
-        # about x, y or z the octants are those of the coordinates
+        # for x, y or z these are the octants of the coordinates
         is_coordinate = np.count_nonzero(along) == 1
         parting = np.eye(3) if is_coordinate else line_triads(along[None], space)[0]
-        # coordinates from a quarter to three quarters of a period
+        # places within reach have coordinates from a quarter to three quarters of a period
         edges = 4.0 * reach * parting
         return cls._halves(center - 0.5 * edges.sum(axis=0), edges, space)
 
@@ -84,54 +84,54 @@ class Blocks:
         space: Space = SPACE,
     ) -> Blocks:
         """
-        Halves of a cell's periods; along its other vectors, of what the positions take.
+        Halves of a cell's periods; along its other vectors, halves of the extent of positions.
 
         Parameters
         ----------
         vectors, origin, periodic : ndarray, shapes (3, 3), (3,), (3,)
-            The cell: lattice vectors as rows, its corner, and which vectors repeat.
+            The cell: lattice vectors as rows, its corner, and which vectors are periodic.
         position : ndarray, shape (N, 3)
-            Of the grains, dump's length unit.
+            Positions of the grains, dump's length unit.
         space : Space, optional
-            The plane in which they lie, if they do: across it there are no halves.
+            For discs: their plane, across which there are no halves.
         """
         along = (position - origin) @ np.linalg.inv(vectors)
         low, high = along.min(axis=0), along.max(axis=0)
-        # far more than the positions take, about their middle
+        # far more than the extent of the positions, about their middle
         length = np.where(periodic, 1.0, 4.0 * (1.0 + high - low))
         start = np.where(periodic, 0.0, 0.5 * (low + high - length))
         return cls._halves(origin + start @ vectors, length[:, None] * vectors, space)
 
     @classmethod
     def _halves(cls, corner: FloatArray, edges: FloatArray, space: Space) -> Blocks:
-        """Two parts along each edge but the one across a plane; all repeat, so none is outside."""
+        """Two parts along each edge (not across a plane); all repeat, so no place is outside."""
         across = space.across
         parts = tuple(2 if across is None or not edge[across] else 1 for edge in edges)
         return cls(corner, edges, parts, (True, True, True))
 
     def moved(self, origin: FloatArray) -> Blocks:
-        """Blocks of the dump's coordinates as blocks of places from an origin."""
+        """The same blocks, for places relative to an origin."""
         return replace(self, corner=self.corner - origin)
 
     @cached_property
     def splits(self) -> tuple[int, ...]:
-        """In how many parts along each edge a block is split in eight, the longest edge first."""
+        """Parts along each edge that split a block in eight; the longest edges are split first."""
         if self.radius:
             return 2, 2, 2
         length = np.linalg.norm(self.edges, axis=1) / self.parts
         splits = np.ones(3, np.int64)
         for _ in range(3):
-            # of edges that are equal but for rounding the first
+            # the first one of edges that are equal but for rounding
             left = length / splits
             splits[np.argmax(left > 0.999 * left.max())] *= 2
         return tuple(splits.tolist())
 
     def finer(self) -> Blocks:
-        """The eight parts of each block as blocks."""
+        """Blocks that are the eight parts of each block."""
         return replace(self, parts=tuple(np.multiply(self.parts, self.splits).tolist()))
 
     def by_part(self, values: FloatArray) -> FloatArray:
-        """Values of the blocks of :meth:`finer`, (..., 8 B), by block and part, (..., B, 8)."""
+        """Values of the blocks of :meth:`finer`, (..., 8 B), as (..., B, 8): by block and part."""
         shape = values.shape[:-1]
         counts = zip(reversed(self.parts), reversed(self.splits), strict=True)
         apart = values.reshape(*shape, self.shells, *(n for pair in counts for n in pair))
@@ -164,7 +164,7 @@ class Blocks:
         along = places @ self.matrix.T + self.shift
         along -= np.where(self.repeats, np.floor(along), 0.0)
         none = np.any((along < 0.0) | (along > 1.0), axis=1)
-        # rounding makes a whole period of what is just below 0
+        # rounding turns a coordinate just below 0 into 1, a whole period
         part = np.clip(along * parts, 0, parts - 1).astype(np.int64)
         numbers = part @ np.cumprod([1, *self.parts[:2]])
         if self.radius:
@@ -175,31 +175,31 @@ class Blocks:
 
     @property
     def heights(self) -> FloatArray:
-        """How thick the blocks are between opposite faces; of shells each the same; shape (3,)."""
+        """Distances between opposite faces of a block; for shells the thickness; shape (3,)."""
         if self.radius:
             return np.full(3, self.radius / self.shells)
         return np.asarray(1.0 / np.linalg.norm(self.matrix, axis=1) / self.parts)
 
     @property
     def middles(self) -> FloatArray:
-        """Of the blocks; of shells their centre; shape (B, 3)."""
+        """Middles of the blocks; for shells their common centre; shape (B, 3)."""
         steps = (_steps(self.parts) + 0.5) / self.parts
         return np.tile(self.corner + steps @ self.edges, (self.shells, 1))
 
     @property
     def corners(self) -> FloatArray:
-        """Of the blocks of a grid, shape (B, 8, 3), the first axis fastest."""
+        """Corners of the blocks of a grid, the first edge fastest, shape (B, 8, 3)."""
         steps = _steps(self.parts)[:, None] + _steps((2, 2, 2))
         return np.asarray(self.corner + steps / self.parts @ self.edges)
 
     @property
     def bounds(self) -> FloatArray:
-        """Radii that begin and end the shells, from 0 to the outermost, shape (S + 1,)."""
+        """Radii at which the shells begin and end, from 0 to the outermost, shape (S + 1,)."""
         return np.asarray(self.radius * np.arange(self.shells + 1) / self.shells)
 
     @property
     def volumes(self) -> FloatArray:
-        """Of the blocks of a grid, or of whole shells, shape (B,)."""
+        """Volumes of the blocks of a grid, or of whole shells, shape (B,)."""
         whole = np.full(self.shells, abs(np.linalg.det(self.edges)))
         if self.radius:
             whole = 4.0 / 3.0 * np.pi * np.diff(self.bounds**3)
@@ -208,12 +208,12 @@ class Blocks:
 
 
 def _steps(parts: Sequence[int]) -> FloatArray:
-    """The numbers of all parts along three edges, the first fastest, shape (N, 3)."""
+    """Numbers of all parts along three edges, the first edge fastest, shape (N, 3)."""
     return np.indices(parts[::-1]).reshape(3, -1)[::-1].T.astype(np.float64)
 
 
 def partition_of(whole: Blocks, window: Blocks) -> Partition:
-    """Blocks as the numbers that kernels take."""
+    """The numbers of the blocks of whole and window, for kernels."""
     both = whole, window
     octants = all(one.parts == (2, 2, 2) and all(one.repeats) and not one.radius for one in both)
     i, j = np.array([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]).T
@@ -223,7 +223,7 @@ def partition_of(whole: Blocks, window: Blocks) -> Partition:
         to_block=np.array([np.column_stack([one.matrix, one.shift]) for one in both]),
         parts=np.array([[*one.parts, one.shells] for one in both], dtype=np.float64),
         repeats=np.array([one.repeats for one in both], dtype=np.float64),
-        # in rows: kernels are compiled once more for an array in another order
+        # contiguous rows: kernels would be compiled once more for an array in another order
         form=np.ascontiguousarray(square[:, i, j] * np.where(i == j, 1.0, 2.0)),
         halves=True if octants else None,
     )

@@ -24,8 +24,8 @@ LARGEST_PRODUCT = 999
 MOST_STEPS = 100_000
 # degree of the largest design in designs.csv that is in use
 FINEST = 21
-# Of a scan that chooses its directions itself: equal weights and few axes, as the random turns of
-# the replicates do the rest; in a plane so many equal steps.
+# Directions of an auto scan: nearly equal weights and few axes, since the random turns of the
+# replicates do the rest; in a plane, the number of equal steps.
 AUTO_RULE, AUTO_STEPS = "icosahedral:9", 16
 LEBEDEV_DEGREES = (*range(3, 32, 2), *range(35, 132, 6))
 
@@ -35,24 +35,24 @@ class DirectionRule:
     """
     A set of axes with weights that sum to 1: a quadrature rule for even functions on the sphere.
 
-    n and -n are one line, so an axis stands for both.
+    A line runs along n and -n, so an axis stands for both.
 
     Parameters
     ----------
     name : str
-        As users write it, for instance ``lebedev:11``.
+        The name that users write, for instance ``lebedev:11``.
     axes : ndarray
         Unit vectors, shape (D, 3), dimensionless.
     weights : ndarray
         Weights, shape (D,), sum 1, dimensionless.
     degree : int or None
-        Exact for polynomials to this degree; None if for no degree worth the name.
+        The rule is exact for polynomials up to this degree; None if it is exact for none.
     turned : bool, optional
         Whether replicates turn the rule at random; a literal grid is only shifted.
     space : Space, optional
-        That in which the axes lie: in a plane replicates turn them about its normal.
+        Space of the axes; in a plane, replicates turn them about its normal.
     asked : int, optional
-        The number of axes that was asked for, where no rule was named.
+        The number of axes that the user gave, if the user named no rule.
 
     Examples
     --------
@@ -93,24 +93,24 @@ class DirectionRule:
 
     @property
     def asked_as(self) -> str:
-        """What asks for it: its name, or the number of axes that was asked for."""
+        """What the user wrote: the name of the rule, or a number of axes."""
         return self.name if self.asked is None else str(self.asked)
 
     @cached_property
     def isotropic_tensor(self) -> FloatArray:
-        """The fabric tensor that the rule gives to a mean length equal in all directions."""
+        """The fabric tensor that the rule gives for a mean length equal in all directions."""
         tensor: FloatArray = np.einsum("d,di,dj->ij", self.weights, self.axes, self.axes)
         return tensor
 
     @property
     def bias(self) -> float:
-        """α of that tensor, largest minus smallest principal value; 0 for a sound rule."""
+        """Anisotropy α of the isotropic tensor, which is 0 for a good rule."""
         values = np.linalg.eigvalsh(self.isotropic_tensor)
         return float(values[-1] - values[-self.space.dimension])
 
     @property
     def is_flat(self) -> bool:
-        """Whether all axes lie in one plane, or along one line; those of a plane along a line."""
+        """Whether all axes lie in one plane (for axes in a plane: along one line)."""
         return bool(np.linalg.eigvalsh(self.isotropic_tensor)[-self.space.dimension] < 1e-9)
 
 
@@ -130,7 +130,7 @@ def direction_rule(text: str | int) -> DirectionRule:
     Returns
     -------
     DirectionRule
-        Its axes, their weights, and to which degree it is exact.
+        The axes, their weights, and the degree up to which the rule is exact.
 
     Raises
     ------
@@ -184,24 +184,25 @@ def direction_rule(text: str | int) -> DirectionRule:
 
 def plane_rule(count: int, plane: Space) -> DirectionRule:
     """
-    So many equal steps over the half circle of a plane.
+    The rule of N equal steps over the half circle of a plane.
 
     Parameters
     ----------
     count : int
-        Number N of axes: exact to degree 2 N - 2, so two give an isotropic ℓ an isotropic tensor.
+        Number N of axes. The rule is exact to degree 2 N - 2, so two axes give an isotropic tensor
+        for an isotropic mean length.
     plane : Space
-        In which they lie.
+        Plane of the axes.
 
     Returns
     -------
     DirectionRule
-        Its name is the number, by which users choose it.
+        A rule whose name is the number N, as users write it.
 
     Raises
     ------
     SettingsError
-        If these are too few, or far too many.
+        If N is less than 2, or above 100,000.
 
     Examples
     --------
@@ -222,12 +223,12 @@ def plane_rule(count: int, plane: Space) -> DirectionRule:
 
 
 def usual_rule(space: Space) -> DirectionRule:
-    """The first rule of a scan that chooses its directions itself."""
+    """The first rule of an auto scan."""
     return plane_rule(AUTO_STEPS, space) if space.is_plane else direction_rule(AUTO_RULE)
 
 
 def rule_of(count: int, space: Space) -> DirectionRule:
-    """The smallest rule that has so many axes."""
+    """The smallest rule that has at least so many axes."""
     return plane_rule(max(count, 2), space) if space.is_plane else direction_rule(count)
 
 
@@ -250,7 +251,7 @@ def _at_least(count: int) -> DirectionRule:
 
 
 def lebedev(degree: float) -> DirectionRule:
-    """Lebedev's rule of this degree or the next that SciPy has (of positive weights)."""
+    """Lebedev's rule of this degree, or of the next degree with positive weights in SciPy."""
     from scipy.integrate import lebedev_rule
 
     found = next(d for d in LEBEDEV_DEGREES if d >= degree and d not in NEGATIVE_LEBEDEV)
@@ -260,7 +261,7 @@ def lebedev(degree: float) -> DirectionRule:
 
 
 def design_of(axes: float, space: Space = SPACE) -> DirectionRule:
-    """Equal weights for about so many axes: a spherical design, as far as they go; equal steps."""
+    """A rule of equal weights and about so many axes: a spherical design, or equal steps."""
     if space.is_plane:
         return plane_rule(min(math.ceil(axes), MOST_STEPS), space)
     # a design of odd degree t has about ((t + 1) / 2)² axes
@@ -268,7 +269,7 @@ def design_of(axes: float, space: Space = SPACE) -> DirectionRule:
 
 
 def design(degree: float) -> DirectionRule:
-    """The antipodal spherical design of this degree or the next that the package has."""
+    """The antipodal spherical design of this degree, or of the next degree in designs.csv."""
     table = np.loadtxt(str(files("scanfab.scan") / "designs.csv"), delimiter=",", comments="#")
     chosen = int(table[table[:, 0] >= degree, 0].min())
     axes = table[table[:, 0] == chosen, 1:]
@@ -331,8 +332,8 @@ def angle_grid(name: str, end: float, step: float) -> DirectionRule:
     return _normalised(f"{name}:{step:g}", axes, np.ones(len(axes)), None, turned=False)
 
 
-# what makes each rule, what it takes, and from where to where; Eq. 1 of the paper as printed has
-# the range of `equal-angle`
+# For each rule: the function that makes it, what its argument is, and the argument's range. Eq. 1
+# of the paper, as printed, has the ranges of `equal-angle`.
 RULES: dict[str, tuple[Callable[[float], DirectionRule], str, float, float]] = {
     "lebedev": (lebedev, "DEGREE", 1, LEBEDEV_DEGREES[-1]),
     "design": (design, "DEGREE", 1, FINEST),
@@ -345,7 +346,7 @@ RULES: dict[str, tuple[Callable[[float], DirectionRule], str, float, float]] = {
 
 
 def _upper_half(points: FloatArray) -> npt.NDArray[np.bool_]:
-    """Which of an antipodal set of points to keep so that n and -n occur once."""
+    """Which points of an antipodal set to keep, so that n and -n occur once."""
     x, y, z = np.where(np.abs(points) < 1e-12, 0.0, points).T
     half: npt.NDArray[np.bool_] = (z > 0) | ((z == 0) & (y > 0)) | ((z == 0) & (y == 0) & (x > 0))
     return half

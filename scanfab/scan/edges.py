@@ -1,8 +1,8 @@
 """
-The rules of what counts at a window's surface, and the columns that say how a sample was scanned.
+Edge rules: what counts at a window's surface; and columns that say how a sample was scanned.
 
-What a segment counts by each rule stands in :mod:`scanfab.scan.kernels.sweep`, their theory in
-docs/details/edges.md; `VariantColumns` has the values of the columns.
+:mod:`scanfab.scan.kernels.sweep` says how each rule counts a segment, and docs/details/edges.md has
+the theory. ``VariantColumns`` computes the values of the columns.
 """
 
 from __future__ import annotations

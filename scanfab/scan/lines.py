@@ -16,7 +16,7 @@ def line_triads(axes: FloatArray, space: Space = SPACE) -> FloatArray:
     """
     Orthonormal triads (rows u, v, n) whose third row is each axis, shape (D, 3, 3).
 
-    Axes in a plane have its normal as v: their lines lie side by side along u.
+    Axes in a plane have its normal as v, so that their lines lie side by side along u.
 
     Examples
     --------
@@ -40,9 +40,9 @@ def drawn_lines(
     rule: DirectionRule, seed: int, replicates: Iterable[int]
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Line triads of all replicates, shape (R, D, 3, 3), and shifts of their grids.
+    Draw the line triads of all replicates, shape (R, D, 3, 3), and the shifts of their grids.
 
-    The latter have the shape (R, D, 2), or (R, D, 1) in a plane.
+    The shifts have the shape (R, D, 2), or (R, D, 1) in a plane.
     """
     triads = line_triads(rule.axes, rule.space)
     drawn = [turned_triads(rule, triads, seed, replicate) for replicate in replicates]
@@ -56,10 +56,10 @@ def turned_triads(
     rule: DirectionRule, triads: FloatArray, seed: int, replicate: int
 ) -> tuple[FloatArray, FloatArray]:
     """
-    The lines of one replicate.
+    Draw the lines of one replicate.
 
-    Returns the rule's line triads (shape (D, 3, 3)), turned, and the shifts of the grids in units
-    of the spacing (shape (D, 2), or (D, 1) in a plane).
+    Returns the rule's line triads, turned at random, shape (D, 3, 3), and the shifts of the grids
+    in units of the spacing, shape (D, 2), or (D, 1) in a plane.
     """
     random = np.random.default_rng([seed, replicate])
     rotation = _random_turn(random, rule.space)
@@ -68,7 +68,7 @@ def turned_triads(
 
 
 def _random_turn(random: np.random.Generator, space: Space) -> FloatArray:
-    """A rotation matrix out of all that leave the space what it is."""
+    """A random rotation matrix; in a plane, a rotation about its normal."""
     if not space.is_plane:
         return _random_rotation(random)
     angle = 2.0 * np.pi * random.random()
@@ -79,8 +79,8 @@ def _random_turn(random: np.random.Generator, space: Space) -> FloatArray:
 
 
 def _random_rotation(random: np.random.Generator) -> FloatArray:
-    """A rotation matrix out of all, each as likely: from a random unit quaternion."""
-    # SciPy has this too, but takes as long to import as a small triad to compute
+    """A uniformly distributed rotation matrix, from a random unit quaternion."""
+    # SciPy has this too, but importing it takes as long as a small table
     quaternion = random.normal(size=4)
     x, y, z, w = quaternion / np.linalg.norm(quaternion)
     return np.array(

@@ -1,4 +1,4 @@
-"""A few scan lines cut into their solid and void segments, exactly, by sorting their chords."""
+"""Cut a few scan lines into solid and void segments, exactly, by sorting their chords."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from scanfab.scan.solids import clip_of
 
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """Pieces of scan lines; lengths in the dump's unit, positions as those of the spheres."""
+    """Pieces of scan lines; lengths in the dump's unit, positions with the spheres' origin."""
 
     ends: FloatArray
     """Both end points, shape (K, 2, 3)."""
@@ -27,13 +27,13 @@ class Segments:
 
     @property
     def length(self) -> FloatArray:
-        """Shape (K,)."""
+        """Length of each piece, shape (K,)."""
         length: FloatArray = np.linalg.norm(self.ends[:, 1] - self.ends[:, 0], axis=1)
         return length
 
     @classmethod
     def concatenate(cls, parts: Iterable[Segments]) -> Segments:
-        """The pieces of several sets of lines, which are numbered on."""
+        """Join the pieces of several sets of lines; line numbers go on from set to set."""
         ends, void, line, first = [np.zeros((0, 2, 3))], [np.zeros(0, bool)], [np.arange(0)], 0
         for part in parts:
             ends.append(part.ends)
@@ -53,26 +53,26 @@ def cut_lines(
     """
     Cut parallel lines into solid and void segments.
 
-    This is for hundreds of lines, to be looked at; the scan itself does millions.
+    This is for figures of hundreds of lines; a scan cuts millions of lines by kernels.
 
     Parameters
     ----------
     position : ndarray, shape (N, 3)
         Centres of the solids; the window, if there is one, lies about the origin.
     radius : ndarray, shape (N,)
-        Their radii, dump's length unit.
+        Radii of the solids, dump's length unit.
     triad : ndarray, shape (3, 3)
         Orthonormal rows u, v, n; the lines run along n.
     points : ndarray, shape (L, 2)
-        Where the lines pierce the plane through the origin, along u and v.
+        Coordinates u and v of the points where the lines pass the plane through the origin.
     window : Convex, optional
-        Clip the lines to it: its surface bounds the first and last segment. Without one only what
-        lies between the first and the last solid of a line counts.
+        Window that clips the lines: its surface bounds the first and the last segment. Without a
+        window, a line runs from its first to its last solid.
 
     Returns
     -------
     Segments
-        In the order of the lines, and along each line.
+        Pieces in the order of the lines, and along each line.
 
     Examples
     --------
@@ -107,10 +107,10 @@ def _cut(
     """
     Solid and void pieces of one line, (K, 2) bounds and (K,) flags, from its chords.
 
-    ``clip`` is where it enters and leaves a window, NaN if it misses it.
+    ``clip`` holds where the line enters and leaves a window, NaN if it misses the window.
     """
     if clip is not None:
-        # what lies outside the window is solid
+        # everything outside the window counts as solid
         start = np.concatenate([[-np.inf, clip[1]], start])
         stop = np.concatenate([[clip[0], np.inf], stop])
     if len(start) == 0 or (clip is not None and np.isnan(clip[0])):
@@ -133,7 +133,7 @@ def grid_points(reach: float, lines: int, space: Space = SPACE) -> FloatArray:
     """
     A square grid of about so many points in a circle of this radius, shape (L, 2).
 
-    In a plane points along a line.
+    In a plane the points lie on a line.
     """
     if space.is_plane:
         steps = reach * (2.0 * (np.arange(lines) + 0.5) / lines - 1.0)
@@ -154,9 +154,9 @@ def sample_segments(
     space: Space = SPACE,
 ) -> Segments:
     """
-    Cut about so many lines, a grid of them for each of several line triads (D, 3, 3).
+    Cut about so many lines, in a grid for each of several line triads (D, 3, 3).
 
-    Parameters as for :func:`cut_lines`; in a plane each triad has its normal as second row.
+    The parameters are those of :func:`cut_lines`. In a plane its normal is each triad's second row.
     """
     reach = 0.0 if window is None else window.reach
     if window is None and len(position):

@@ -21,34 +21,34 @@ from scanfab.scan.kernels.grid import Bounds
 from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.kernels.strips import FAR, Clip
 
-# lines of one axis and replicate: more take minutes, even those that meet nothing
+# most lines of one axis and replicate: more would take minutes, even if they meet nothing
 MAX_LINES = 50_000_000
-# Of the smallest radius: what lies between surfaces that coincide but for rounding is no gap.
+# a gap below this fraction of the smallest radius is rounding between surfaces that coincide
 SHORTEST = 1e-9
-# of the mean radius: the wider, the more chords are swept, and the fewer segments followed alone
+# Margin in mean radii. With a wider margin more chords are swept, and fewer segments are followed.
 MARGIN = 5.0
 
-# A ray through periodic grains that has met nothing along so many periods and mean free paths stays
-# in a channel.
+# a ray through periodic grains that meets nothing along so many periods and mean free paths stays in
+# a channel
 MOST_PERIODS, MOST_FREE_PATHS = 64.0, 20.0
-# cells of the grid that grains are sorted into, for each of them at most
+# most cells per grain, in the grid that grains are sorted into
 MOST_CELLS = 4.0
 
 
 class Inner(NamedTuple):
-    """A window of its own for the whole."""
+    """A window for the whole of an open sample."""
 
     shape: Convex
     center: FloatArray
-    """In the coordinates of the solids, shape (3,)."""
+    """Its centre in the coordinates of the solids, shape (3,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solids:
     """
-    The spheres that lines meet, and the window; lengths in the dump's unit.
+    The spheres and the window that lines meet; lengths in the dump's unit.
 
-    Positions are relative to the window's origin, the centre of a sphere.
+    The origin of positions is the origin of the window, such as the centre of a sphere.
 
     Parameters
     ----------
@@ -59,21 +59,21 @@ class Solids:
     removed : array_like of bool, shape (N,)
         Spheres that the variants b and d leave out.
     window : Convex, optional
-        What the lines of c and d are clipped to; None if these are not scanned.
+        The window that clips the lines of c and d; None if these are not scanned.
     medium : CellGrains, optional
         The grains of a periodic packing, each once, if its whole is scanned, which has no edge.
     origin : array_like, optional
-        Where the origin of these positions lies in the dump's coordinates, shape (3,).
+        The origin of the positions in the dump's coordinates, shape (3,).
     edge : {"clip", "start", "ends"}, optional
-        What counts at the window's surface, see :mod:`scanfab.scan.edges`.
+        The edge rule: what counts at the window's surface, see :mod:`scanfab.scan.edges`.
     around : CellGrains, optional
-        For the rule ``start`` all grains, each once, with the vectors by which they repeat, if any;
-        ``position`` then has all that come within the margin of the window.
+        For the rule ``start``: all grains, each once, and the vectors along which they repeat.
+        ``position`` then holds all spheres within the margin of the window.
     inner : Inner, optional
-        For the rule ``ends`` the window of an open whole, in which all grains are known.
+        For the rule ``ends``: the window of an open whole, in which all grains are known.
     space : Space, optional
-        The plane in which all lies, if it does: then spheres are discs, and all positions are 0
-        across it. The cell's third vector stands across it.
+        For discs: their plane. All positions are then 0 across it, and the cell's third vector is
+        normal to it.
 
     Raises
     ------
@@ -125,12 +125,12 @@ class Solids:
 
     @cached_property
     def bounds(self) -> Bounds:
-        """What holds all spheres."""
+        """Bounds of all spheres."""
         return _bounds(self.position, self.radius)
 
     @cached_property
     def bounds_left(self) -> Bounds:
-        """What holds the spheres that are not removed."""
+        """Bounds of the spheres that are not removed."""
         return _bounds(self.position[~self.removed], self.radius[~self.removed])
 
     @cached_property
@@ -141,18 +141,18 @@ class Solids:
 
     @cached_property
     def medium_cells(self) -> Cells:
-        """Those of the periodic whole, through which few lines are followed."""
+        """The grains of the periodic whole, sorted into wide cells: few lines are followed there."""
         assert self.medium is not None
         return cells_of(self.medium, 3.0)
 
     def near_window(self, margin: float) -> BoolArray:
         """
-        Which spheres come near to the window.
+        Which spheres lie within a margin of the window.
 
         Parameters
         ----------
         margin : float
-            How near, dump's length unit.
+            Distance from the window's surface, dump's length unit.
 
         Returns
         -------
@@ -171,7 +171,7 @@ class Solids:
 
     @property
     def margin(self) -> float:
-        """How far beyond the window solids are listed, for the rule ``start``."""
+        """For the rule ``start``: how far beyond the window solids are listed."""
         return 0.0 if self.around is None else margin_of(self.around)
 
     @property
@@ -182,27 +182,27 @@ class Solids:
     @property
     def grain_radius(self) -> FloatArray:
         """
-        Radii of the grains that lines may meet, each once where the whole is periodic.
+        Radii of the grains that lines may meet, each once if the whole is periodic.
 
-        In a periodic packing without a window, ``radius`` has next to none.
+        In a periodic packing without a window, ``radius`` holds hardly any.
         """
         return self.radius if self.medium is None else self.medium.radius
 
     @property
     def shadow(self) -> float:
-        """That of all spheres together: Σ π r², or Σ 2 r of discs."""
+        """Projected area of all spheres: Σ π r², or Σ 2 r for discs."""
         power = self.space.dimension - 1
         of_medium = 0.0 if self.medium is None else float(np.sum(self.medium.radius**power))
         return self.space.unit_shadow * (float(np.sum(self.radius**power)) + of_medium)
 
     def chords(self, spacing: float) -> float:
         """
-        About how many chords the spheres cut from the lines of one axis.
+        Expected number of chords that the spheres cut from the lines of one axis.
 
         Parameters
         ----------
         spacing : float
-            Of the lines, dump's length unit.
+            Distance between neighbouring lines, dump's length unit.
 
         Returns
         -------
@@ -212,7 +212,7 @@ class Solids:
 
 
 def clip_of(window: Convex | None) -> Clip:
-    """The numbers of a window; without one, nothing clips the lines."""
+    """The numbers of a window for kernels; without a window, nothing clips the lines."""
     if window is None:
         return Clip(np.zeros((0, 4)), 1.0, np.zeros((3, 3)), 1.0, np.inf, np.inf)
     isotropic, deviator, level = window.quadric
@@ -226,21 +226,21 @@ def margin_of(grains: CellGrains) -> float:
 
 
 def shortest_gap(solids: Solids) -> float:
-    """Length below which a gap is only rounding, dump's length unit."""
+    """Length below which a gap is rounding, dump's length unit."""
     radius = solids.grain_radius
     return SHORTEST * float(radius.min()) if len(radius) else 0.0
 
 
 def is_affordable(solids: Solids, spacing: float) -> bool:
-    """Whether the lines of one axis and replicate are not too many."""
+    """Whether one axis of a replicate has no more lines than are allowed."""
     return most_lines(solids, spacing) <= MAX_LINES
 
 
 def most_lines(solids: Solids, spacing: float) -> float:
-    """At most so many lines, also such that meet nothing, has one axis of a replicate."""
+    """Upper bound for the lines of one axis and replicate, with those that meet nothing."""
     reach = solids.reach
     if solids.medium is not None:
-        # along an axis that does not repeat, what the grains take
+        # along an axis that is not periodic, the extent of the grains
         edges = np.linalg.norm(solids.medium.vectors[solids.medium.periodic], axis=1)
         across = solids.medium.position - solids.medium.position.mean(axis=0)
         extent = float((np.linalg.norm(across, axis=1) + solids.medium.radius).max(initial=0.0))
@@ -251,7 +251,7 @@ def most_lines(solids: Solids, spacing: float) -> float:
 
 
 def check_space(solids: Solids, rule: DirectionRule) -> None:
-    """SettingsError if the axes do not lie in the plane of the solids."""
+    """Raise SettingsError if the axes do not lie in the plane of the solids."""
     if rule.space != solids.space:
         raise SettingsError(
             f"directions: the solids lie in {solids.space}, the axes of {rule.name} in {rule.space}"
@@ -259,7 +259,7 @@ def check_space(solids: Solids, rule: DirectionRule) -> None:
 
 
 def check_spacing(solids: Solids, spacing: float) -> None:
-    """SettingsError if that makes more lines than can be scanned in reasonable time."""
+    """Raise SettingsError if the lines are too many to be scanned in reasonable time."""
     lines = most_lines(solids, spacing)
     if lines > MAX_LINES:
         raise SettingsError(
@@ -271,9 +271,9 @@ def check_spacing(solids: Solids, spacing: float) -> None:
 
 def cells_of(grains: CellGrains, width: float) -> Cells:
     """
-    Grains sorted into the cells of a grid, for rays that look for the next one.
+    Sort grains into the cells of a grid, for rays that look for the next grain.
 
-    ``width`` is about that of a cell, in grains: of wide ones there are fewer to be kept.
+    ``width`` is the approximate width of a cell in mean diameters; wide cells take less memory.
 
     Examples
     --------
@@ -290,7 +290,7 @@ def cells_of(grains: CellGrains, width: float) -> Cells:
     reach = grains.radius[:, None] * np.linalg.norm(once, axis=0)
     fixed = ~grains.periodic
     for k in np.flatnonzero(fixed):
-        # the box of the grains' surfaces
+        # the grid begins and ends with the surfaces of the grains
         low, high = (along - reach)[:, k].min(), (along + reach)[:, k].max()
         corner = corner + low * vectors[k]
         vectors[k] *= high - low
@@ -321,7 +321,7 @@ def cells_of(grains: CellGrains, width: float) -> Cells:
 
 
 def _farthest(grains: CellGrains, volume: float, solid: BoolArray | slice) -> float:
-    """How far to follow a ray that meets nothing: out of an open sample, or not for ever."""
+    """How far to follow a ray that meets nothing: FAR leaves an open sample."""
     radius = grains.radius[solid]
     if not len(radius):
         return 0.0
@@ -333,7 +333,7 @@ def _farthest(grains: CellGrains, volume: float, solid: BoolArray | slice) -> fl
 
 
 def _bounds(position: FloatArray, radius: FloatArray) -> Bounds:
-    """A box and a ball about the origin that hold some spheres."""
+    """A box, and a ball about the origin, that hold some spheres."""
     if not len(radius):
         return Bounds(np.zeros(3), np.zeros(3), 0.0)
     low, high = (position - radius[:, None]).min(axis=0), (position + radius[:, None]).max(axis=0)
