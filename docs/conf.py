@@ -45,6 +45,8 @@ html_context = {"default_mode": "auto"}
 html_title = "scanfab"
 html_static_path = ["make/static"]
 html_css_files = ["site.css"]
+html_favicon = "make/static/icon.svg"
+html_use_index = False  # the list of the API and the search have it
 html_show_sourcelink = False
 html_copy_source = False
 html_math_renderer = "mathml"
@@ -96,8 +98,15 @@ def make_files(app: Any) -> None:
     pages.make_files()
 
 
+def describe(app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]) -> None:
+    """Say what a constant is: autodoc would show what Python says of every tuple."""
+    if name == "scanfab.COLUMNS":
+        lines[:] = ["Names of the columns of every fabric table, in their order."]
+
+
 def setup(app: Any) -> None:
     """What Sphinx calls first."""
     app.add_html_math_renderer("mathml", (draw_math, None), (draw_math, None))
     app.connect("builder-inited", make_files)
     app.connect("source-read", fill)
+    app.connect("autodoc-process-docstring", describe)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import groupby
 from textwrap import dedent
 
 import click
@@ -20,7 +19,17 @@ from scanfab.table.compare import DIFFERENCES, FRAMES, SUMMARY
 
 COMPONENT = re.compile(
     r"\b([xyz]{1,2}|\d)\b|(?<=_)\d\b|\b(void|contact) fabric\b|\balpha_(vs|c)_axial\b"
-    r"|(?<=without the )(segments|contacts)"
+    r"|(?<=without the )(segments|contacts)|\b(strong|weak)(?= contacts$)"
+    r"|the (largest|middle one|smallest)$"
+)
+# what a line says of several columns, in place of what it says of the first of them
+FOR_SEVERAL = (
+    (r"^(xx|x) of (the )?", ""),
+    (r"_1\b", "_N"),
+    (r"octant 1 \(at", "octant N (1 is at"),
+    (r"the largest$", "the largest first"),
+    (r"strong contacts$", "strong or weak contacts"),
+    (r"order 2\b", "order 2 or 4"),
 )
 COLUMNS: dict[str, tuple[Column, ...]] = {
     "`scanfab compute`": OWN_COLUMNS,
@@ -144,17 +153,22 @@ def columns() -> str:
         if "compare" in title or "calibrate" in title:
             is_new = {one: one.name not in told for one in listed}
         told = {one.name: one.meaning for one in listed} | told
-        alike = groupby((one for one in listed if is_new[one]), key=without_component)
-        rows = [row(list(group)) for _, group in alike]
+        alike: dict[str, list[Column]] = {}
+        for one in listed:
+            if is_new[one]:
+                alike.setdefault(without_component(one), []).append(one)
+        rows = [row(group) for group in alike.values()]
         parts.append(f"## {title}\n\n{markdown(['column', 'what it holds (unit)'], rows)}")
         if again := [f"`{one.name}`" for one in listed if not is_new[one]]:
-            parts.append(f"As above: {', '.join(again)}.\n")
+            names = re.sub(r"(`\w+_)xx`, (?:\1\w\w`, )*(\1yz`)", r"\1xx` to \2", ", ".join(again))
+            parts.append(f"As above: {names}.\n")
     return "\n".join(parts)
 
 
 def without_component(column: Column) -> str:
-    """The meaning of a column without the component, octant, number or fabric that it is for."""
-    return COMPONENT.sub("", re.sub(r" \(at -x.*", "", column.meaning))
+    """The meaning without the component, octant, number or fabric; a tensor has its own line."""
+    tensor = column.name.rpartition("_")[0] if "tensor" in column.meaning else ""
+    return tensor + COMPONENT.sub("", re.sub(r" \(at -x.*", "", column.meaning))
 
 
 def row(alike: list[Column]) -> list[str]:
@@ -162,10 +176,12 @@ def row(alike: list[Column]) -> list[str]:
     names = ", ".join(f"`{one.name}`" for one in alike)
     meaning = alike[0].meaning.removeprefix("of a map: ")
     if len(alike) > 1:
-        meaning = re.sub(r"^(xx|x) of (the )?", "", meaning)
-        meaning = re.sub(r"_1\b", "_N", meaning).replace("octant 1 (at", "octant N (1 is at")
-    if any("the contact fabric" in one.meaning for one in alike[1:]):
-        meaning = meaning.replace("the void fabric", "void or contact fabric")
+        for pattern, words in FOR_SEVERAL:
+            meaning = re.sub(pattern, words, meaning)
+    of = alike[0].name.removesuffix("_se") if len(alike) == 1 else "the column without _se"
+    meaning = re.sub("^its standard error", f"standard error of {of}", meaning)
+    if any("contact fabric" in one.meaning for one in alike[1:]):
+        meaning = re.sub(r"(the )?void fabric\b", "void or contact fabric", meaning)
     if "alpha_vs_axial" in meaning and any("alpha_c_axial" in one.meaning for one in alike[1:]):
         meaning = meaning.replace("alpha_vs_axial", "alpha_vs_axial or alpha_c_axial")
         meaning = meaning.replace("the segments", "the segments or contacts")

@@ -28,8 +28,7 @@ SHORTEST = 1e-9
 # Margin in mean radii. With a wider margin more chords are swept, and fewer segments are followed.
 MARGIN = 5.0
 
-# a ray through periodic grains that meets nothing along so many periods and mean free paths stays in
-# a channel
+# a ray that meets nothing along so many periods and mean free paths stays in a channel
 MOST_PERIODS, MOST_FREE_PATHS = 64.0, 20.0
 # most cells per grain, in the grid that grains are sorted into
 MOST_CELLS = 4.0
@@ -141,7 +140,7 @@ class Solids:
 
     @cached_property
     def medium_cells(self) -> Cells:
-        """The grains of the periodic whole, sorted into wide cells: few lines are followed there."""
+        """The grains of the periodic whole, sorted into wide cells, as few lines are followed."""
         assert self.medium is not None
         return cells_of(self.medium, 3.0)
 
