@@ -25,9 +25,9 @@ from scanfab.packing.contacts import (
     resolve_contacts,
 )
 
-# Fewer centres may share a coordinate by chance.
 # grains that a message names, and the share of centres that may lie off the plane of all others
 MOST_NAMED, OFF_PLANE = 5, 0.01
+# fewer centres may share a coordinate by chance
 FEWEST = 10
 
 

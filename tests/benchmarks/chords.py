@@ -16,6 +16,7 @@ from scipy.spatial import ConvexHull
 
 from scanfab.base.convex import Convex
 from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron, sphere
+from scanfab.scan import tallies
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import EDGES
 from scanfab.scan.kernels.periodic import CellGrains
@@ -147,4 +148,40 @@ def scans(repeats: int) -> str:
     return table(titles, list(zip(solids, *columns, strict=True)))
 
 
-SECTIONS = {"chords": chords, "scans": scans}
+def swept(by_lists: bool, *words: Any, **options: Any) -> ScanSums:
+    """A scan by one of the two engines, whichever scanfab would choose."""
+    usual, tallies.FEW_LINES = tallies.FEW_LINES, np.inf if by_lists else 0.0
+    try:
+        return sweep(*words, **options)
+    finally:
+        tallies.FEW_LINES = usual
+
+
+def engines(repeats: int) -> str:
+    """What each kernel wins over the other that could do its work, in processor time."""
+    position, radius, _ = copied(2)
+    solids = Solids(position, radius, tenth(len(radius)))
+    rows = []
+    for spacing, directions in (
+        (CLOSE, 1),
+        (0.2, 16),
+        (0.5, 50),
+        (1.0, 100),
+        (2.0, 200),
+        (4.0, 400),
+    ):
+        words: Any = {"spacing": spacing, "directions": directions}
+        ways = {
+            "dense": partial(swept, False, solids, "ab", **words),
+            "lists": partial(swept, True, solids, "ab", **words),
+            "window": partial(sweep, solids, "ab", quick=True, **words),
+            "whole": partial(sweep, solids, "ab", **words),
+        }
+        seconds = interleaved(ways, repeats, clock=time.process_time)
+        ratios = seconds["lists"] / seconds["dense"], seconds["window"] / seconds["whole"]
+        rows.append((f"{spacing:g}", *(f"{ratio:.2f}" for ratio in ratios)))
+    titles = ["lines apart, mean radii", "lists over dense sweep", "window's kernel over whole's"]
+    return table(titles, rows)
+
+
+SECTIONS = {"chords": chords, "scans": scans, "engines": engines}
