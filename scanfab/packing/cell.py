@@ -127,7 +127,7 @@ class Cell:
 
     @property
     def volume(self) -> float:
-        """Dump's length unit, cubed; in a plane the area."""
+        """Volume, in the cube of the dump's length unit; in a plane the area."""
         return abs(float(np.linalg.det(self.own_vectors)))
 
     @property

@@ -178,9 +178,9 @@ def resolve_contacts(listed: ContactList, packing: Packing, turns: IntArray | No
     Parameters
     ----------
     listed : ContactList
-        As the source has them.
+        The contacts as the source lists them.
     packing : Packing
-        Its grains.
+        The packing that holds the grains.
     turns : ndarray of int, shape (N, 3), or None
         Lattice vectors from the position of each grain in the packing to its position in the
         source; None if these are the same.
@@ -230,7 +230,7 @@ def contacts_of(
     Parameters
     ----------
     packing : Packing
-        Its grains.
+        The packing that holds the grains.
     pairs, image, force : ndarray
         As in :class:`Contacts`.
     source : str

@@ -59,7 +59,7 @@ class Packing:
     cell : Cell, optional
         The (periodic) cell.
     step, time : int, float, optional
-        Of the dump.
+        Time step and simulation time of the dump.
     dim : {2, 3}, optional
         2 for discs, whose centres share one coordinate. The default is 3, or 2 if positions have
         two coordinates. The cell of discs does not repeat across their plane. A series gives the

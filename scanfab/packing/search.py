@@ -41,7 +41,7 @@ def find_contacts(packing: Packing, tolerance: float = 0.0) -> Packing:
     Parameters
     ----------
     packing : Packing
-        Its own contacts, if any, are replaced.
+        The grains; contacts that the packing has already are replaced.
     tolerance : float, optional
         Relative, dimensionless. Lattices and text files with 6 digits need about 1e-4: at 0,
         exact ties are decided by rounding.
@@ -85,13 +85,13 @@ class NearPairs(NamedTuple):
     normal : ndarray, shape (M, 3)
         Unit vectors between the centres of each pair.
     overlap : ndarray, shape (M,)
-        r1 + r2 less the distance of the centres, dump's length unit; below 0 for a gap.
+        r1 + r2 minus the distance of the centres, dump's length unit; negative for a gap.
     reduced_radius : ndarray, shape (M,)
         r1 r2 / (r1 + r2), dump's length unit.
     shadow : float
-        Projected area of all grains: Σ π r², of discs Σ 2 r.
+        Projected area of all grains: Σ π r², or Σ 2 r for discs.
     volume : float
-        Volume of the region, of discs its area.
+        Volume of the region, or its area for discs.
     space : Space
         The plane of the discs, if the grains are discs.
     """
@@ -108,7 +108,7 @@ def near_pairs(
     packing: Packing, solid: BoolArray, counted: BoolArray, window: Window | None, gap: float
 ) -> NearPairs:
     """
-    The pairs of solid grains whose surfaces are no more than a gap apart.
+    Find the pairs of solid grains whose surfaces are no more than a gap apart.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def overlapping_pairs(
     position: FloatArray, radius: FloatArray, scale: float = 1.0, cell: Cell | None = None
 ) -> tuple[RowArray, RowArray]:
     """
-    Pairs of spheres whose distance is below (r_i + r_j) * scale, in linear time.
+    Find the pairs of spheres whose distance is below (r_i + r_j) * scale, in linear time.
 
     Parameters
     ----------
@@ -155,14 +155,14 @@ def overlapping_pairs(
     radius : ndarray, shape (N,)
         Above 0, dump's length unit.
     scale : float, optional
-        Dimensionless.
+        Factor, dimensionless.
     cell : Cell, optional
-        Of any shape, periodic along any of its vectors.
+        A cell of any shape, periodic along any of its vectors.
 
     Returns
     -------
     pairs : ndarray of int, shape (M, 2)
-        Rows of both spheres, the smaller first, in their order; each pair once an image.
+        Rows of both spheres, the smaller row first, sorted; a pair occurs once for each image.
     image : ndarray of int, shape (M, 3)
         Lattice translation of the second sphere.
     """
@@ -238,16 +238,16 @@ def find_pairs(
     found: int,
 ) -> int:
     """
-    Add the pairs whose distance is below (r_i + r_j) * scale; how many there are then.
+    Add the pairs whose distance is below (r_i + r_j) * scale; returns their number so far.
 
-    One sphere is of a grid, the second of its own grid or of another one with larger spheres, whose
-    bins around the first sphere hold all that can be near.
+    The first sphere of a pair belongs to ``grid``. The second belongs to ``other``, the same grid
+    or one with larger spheres; its bins around the first sphere hold all that can be near.
 
     The label of a sphere is its row of ``count`` times ``images``, plus the number of the image,
     which is images // 2 for the sphere itself. Both spheres of a pair see an image of the other. So
     a pair counts once if its smaller label is that of a sphere itself. Its number is the smaller
-    row times (count * images), plus the larger label. Pairs that find no room in ``pairs``, shape
-    (M,), are counted only, and the search ends once there are more than ``most``.
+    row times (count * images), plus the larger label. Pairs without room in ``pairs``, shape (M,),
+    are only counted, and the search ends once there are more than ``most``.
     """
     shape, b = other.shape, other.spheres
     for i in range(len(grid.label)):
@@ -260,7 +260,7 @@ def find_pairs(
             for by in range(max(y - 1, 0), min(y + 2, shape[1])):
                 column = (bx * shape[1] + by) * shape[2]
                 first = other.start[column + low]
-                # in its own grid a sphere meets those that come behind it
+                # within one grid, a sphere is compared with the spheres behind it
                 for j in range(max(first, i + 1) if own else first, other.start[column + high]):
                     dx, dy, dz = b[j, 0] - a[0], b[j, 1] - a[1], b[j, 2] - a[2]
                     reach = (a[3] + b[j, 3]) * scale

@@ -73,7 +73,7 @@ class Window:
         points : ndarray, shape (N, 3)
             Dump's coordinates.
         packing : Packing
-            Whose cell repeats, if it does.
+            The packing, whose cell may be periodic.
 
         Returns
         -------
@@ -96,7 +96,7 @@ class Window:
         radius : ndarray, shape (N,)
             Their radii.
         packing : Packing
-            Whose cell repeats, if it does.
+            The packing, whose cell may be periodic.
 
         Returns
         -------
@@ -132,7 +132,7 @@ class Window:
         Parameters
         ----------
         packing : Packing
-            Whose cell repeats, if it does.
+            The packing, whose cell may be periodic.
 
         Raises
         ------
@@ -166,7 +166,7 @@ class Window:
         points : ndarray, shape (N, 3)
             Dump's coordinates.
         packing : Packing
-            Whose cell repeats, if it does.
+            The packing, whose cell may be periodic.
 
         Returns
         -------
@@ -191,7 +191,7 @@ class Window:
         points : ndarray, shape (N, 3)
             Dump's coordinates.
         packing : Packing
-            Whose cell repeats, if it does.
+            The packing, whose cell may be periodic.
         margin : float, optional
             Distance from the window's surface, dump's length unit.
 
@@ -218,7 +218,7 @@ class SurfaceBox:
     """The box around the grains' surfaces; along periodic directions the cell takes its place."""
 
     low: FloatArray
-    """Shape (3,)."""
+    """Lower corner, shape (3,)."""
     high: FloatArray
     cell: Cell | None
     space: Space = SPACE
