@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import partial
 from typing import NamedTuple
 
 SKIPPED = "skipped"
@@ -94,23 +95,18 @@ class Note(NamedTuple):
 _kept: ContextVar[list[Note] | None] = ContextVar("kept", default=None)
 
 
-def warn(text: str) -> None:
-    """Warn the user of a doubt about a result."""
-    _issue(text, ScanfabWarning)
-
-
-def note(text: str) -> None:
-    """Inform the user of something that puts no result in doubt."""
-    _issue(text, ScanfabNote)
-
-
-def _issue(text: str, kind: type[Warning]) -> None:
+def warn(text: str, kind: type[Warning] = ScanfabWarning) -> None:
+    """Warn the user of a doubt about a result, or issue a warning of another kind."""
     kept = _kept.get()
     if kept is None:
-        warnings.warn(text, kind, stacklevel=6)
+        warnings.warn(text, kind, stacklevel=5)
     else:
         # messages that differ only in numbers, such as steps in names of files, are the same note
         kept.append(Note(re.sub(r"\d+", "", text), text, kind=kind))
+
+
+note = partial(warn, kind=ScanfabNote)
+"""Inform the user of something that puts no result in doubt."""
 
 
 @contextmanager

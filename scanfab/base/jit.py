@@ -123,11 +123,10 @@ class _Compiler(CompilerBase):
 
 def kernel(function: Function, **options: Any) -> Function:
     """Compile a function that is called from Python."""
-    compiled = njit(nogil=True, pipeline_class=_Compiler, **options)(function)
+    compiled: Function = njit(nogil=True, pipeline_class=_Compiler, **options)(function)
     if compiled is not function:  # else Numba is switched off
-        compiled._cache = _Cache(function)
-    same: Function = compiled
-    return same
+        compiled._cache = _Cache(function)  # type: ignore[attr-defined]
+    return compiled
 
 
 def inner(**options: Any) -> Callable[[Function], Function]:

@@ -12,7 +12,7 @@ import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from contextvars import ContextVar
-from functools import cache, lru_cache, partial
+from functools import cache, lru_cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
@@ -63,8 +63,7 @@ def stamp_of(path: Path) -> Stamp:
 
 def first_bytes(path: Path, count: int = 4096) -> bytes:
     """The first bytes of the decompressed file; ReadError if it cannot be opened."""
-    head = _head(path, max(count, MAGIC_BYTES))
-    return head[:count] if _decompressor(head) is None else next(pieces(path, count), b"")
+    return next(pieces(path, count), b"")
 
 
 def plain(path: Path) -> Path:
@@ -74,7 +73,7 @@ def plain(path: Path) -> Path:
     The copy exists as long as something refers to the returned path. The last few copies stay
     longer, so that a reader that opens its file several times decompresses it once.
     """
-    if _decompressor(_head(path, MAGIC_BYTES)) is None:
+    if _decompressor(path) is None:
         return path
     return _copy_of(path, stamp_of(path), os.getpid())
 
@@ -95,7 +94,7 @@ def _remove(folder: str, process: int) -> None:
 
 def pieces(path: Path, size: int = PART) -> Iterator[bytes]:
     """The decompressed content of a file, ``size`` bytes at a time; raises only ReadError."""
-    module = _decompressor(_head(path, MAGIC_BYTES))
+    module = _decompressor(path)
     zstd_error, unpacked = getattr(module, "ZstdError", OSError), 0
     try:
         with open(path, "rb") as packed, packed if module is None else module.open(packed) as file:
@@ -190,16 +189,15 @@ def temporary_copy(content: Iterable[bytes], name: str) -> Path:
 def _folder(process: int) -> str:
     """The folder for the copies of a process; it is removed at the end of the process."""
     folder = tempfile.mkdtemp(prefix=PREFIX)
-    at_end(partial(_remove_at_end, folder))
+
+    def remove() -> None:
+        # renamed first, so that a thread that is still reading cannot add a copy
+        with suppress(OSError):
+            os.rename(folder, f"{folder}-removed")
+        shutil.rmtree(f"{folder}-removed", ignore_errors=True)
+
+    at_end(remove)
     return folder
-
-
-def _remove_at_end(folder: str) -> None:
-    # renamed first, so that a thread that is still reading cannot add a copy
-    last = f"{folder}-removed"
-    with suppress(OSError):
-        os.rename(folder, last)
-    shutil.rmtree(last, ignore_errors=True)
 
 
 def without_temporary(text: str) -> str:
@@ -217,20 +215,16 @@ def without_temporary(text: str) -> str:
     return re.sub(rf"{folder}\w+[/\\]tmp\w+[/\\]", "", text)
 
 
-def _decompressor(head: bytes) -> Any:
-    """The module that opens a file with these first bytes; None if it is not compressed."""
-    name = next((module for key, module in DECOMPRESSORS.items() if head.startswith(key)), None)
-    return name and import_module(name)
-
-
-def _head(path: Path, count: int) -> bytes:
-    """The first bytes of the file, not decompressed."""
+def _decompressor(path: Path) -> Any:
+    """The module that opens a compressed file, by its first bytes; None for any other file."""
     check_file(path)
     try:
         with open(path, "rb") as stream:
-            return stream.read(count)
+            head = stream.read(MAGIC_BYTES)
     except OSError as error:
         raise ReadError(f"{path}: cannot be read: {_reason(error)}") from None
+    name = next((module for key, module in DECOMPRESSORS.items() if head.startswith(key)), None)
+    return name and import_module(name)
 
 
 def _reason(error: Exception) -> str:

@@ -37,7 +37,7 @@ OF_YADE = b"LIGGGHTS Description"
 
 
 class DataFile(GrainsOnly):
-    """Reads data files, for DumpReader."""
+    """Reads data files, for the readers of both programs."""
 
     # the files have no boundary flags: the user says what is periodic
     has_cell: Carries = "box"

@@ -50,7 +50,7 @@ class Header(NamedTuple):
 
 
 class TextDump(shared.GrainsOnly):
-    """Reads text dumps, for DumpReader."""
+    """Reads text dumps, for the readers of both programs."""
 
     def recognises(self, path: Path) -> bool:
         """By the first words of the file."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.typing import AnyArray, Columns
-from scanfab.io.formats.table_names import is_frame_name
+from scanfab.io.formats.table import FRAME_NAMES, plain_name
 from scanfab.io.writer import Left, as_arrays, csv_bytes, flat, table_columns
 from scanfab.packing.packing import Packing
 
@@ -29,7 +29,8 @@ class CsvWriter:
         """Write one frame; a column that numbers frames (`time`) goes into a companion file."""
         known, own, notes = table_columns(packing)
         numbers = {name: values for name, values in own.items() if values.dtype.kind in "iuf"}
-        left = {k for k in numbers if is_frame_name(k) and len(np.unique(numbers[k])) > 1}
+        times = {k: values for k, values in numbers.items() if plain_name(k) in FRAME_NAMES}
+        left = {k for k, values in times.items() if len(np.unique(values)) > 1}
         held = {name: own[name] for name in own if name not in left}
         path.write_bytes(self.table({**known, **held}))
         columns = tuple(name for name in own if name in left)
