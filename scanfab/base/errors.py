@@ -10,11 +10,12 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
+Value = TypeVar("Value")
 SKIPPED = "skipped"
 """Code of the note about a frame that was skipped because it could not be read."""
 
@@ -109,15 +110,19 @@ note = partial(warn, kind=ScanfabNote)
 """Inform the user of something that puts no result in doubt."""
 
 
-@contextmanager
-def collected() -> Iterator[list[Note]]:
+def collected() -> AbstractContextManager[list[Note]]:
     """Collect what this thread calls :func:`warn` and :func:`note` for inside the block."""
-    notes: list[Note] = []
-    token = _kept.set(notes)
+    return within(_kept, [])
+
+
+@contextmanager
+def within(variable: ContextVar[Any], value: Value) -> Iterator[Value]:
+    """Inside the block, a variable of this thread has a value."""
+    token = variable.set(value)
     try:
-        yield notes
+        yield value
     finally:
-        _kept.reset(token)
+        variable.reset(token)
 
 
 def joined(notes: Iterable[Note]) -> tuple[Note, ...]:

@@ -10,15 +10,15 @@ import sys
 import tempfile
 import zlib
 from collections.abc import Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, suppress
 from contextvars import ContextVar
 from functools import cache, lru_cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 from weakref import finalize
 
-from scanfab.base.errors import ReadError, warn
+from scanfab.base.errors import ReadError, warn, within
 from scanfab.base.files import at_end, check_file, free_memory
 
 COMPRESSED_SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".lz4")
@@ -43,7 +43,6 @@ Stamp = tuple[str, int, int, int]
 """Identifies a file in its present state: path, inode, size and time of change."""
 _grows: ContextVar[bool] = ContextVar("grows", default=False)
 _times: ContextVar[float] = ContextVar("times", default=MOST_TIMES)
-Value = TypeVar("Value")
 
 
 class _Copy(type(Path())):  # type: ignore[misc]
@@ -108,18 +107,9 @@ def pieces(path: Path, size: int = PART) -> Iterator[bytes]:
         raise ReadError(f"{path}: cannot be {verb}: {_reason(error)}") from None
 
 
-@contextmanager
-def _set(variable: ContextVar[Value], value: Value) -> Iterator[None]:
-    token = variable.set(value)
-    try:
-        yield
-    finally:
-        variable.reset(token)
-
-
-def unpacking_up_to(times: float | None) -> AbstractContextManager[None]:
+def unpacking_up_to(times: float | None) -> AbstractContextManager[float]:
     """Inside the block, files may decompress to this many times their size; None: no change."""
-    return _set(_times, times or _times.get())
+    return within(_times, times or _times.get())
 
 
 def check_times(path: Path, packed: int, unpacked: float) -> None:
@@ -233,9 +223,9 @@ def _reason(error: Exception) -> str:
     return str(error) or "the file ends too early"
 
 
-def growing() -> AbstractContextManager[None]:
+def growing() -> AbstractContextManager[bool]:
     """Inside the block, files may still be growing: an incomplete end draws no warning."""
-    return _set(_grows, True)
+    return within(_grows, True)
 
 
 def grows() -> bool:

@@ -9,9 +9,9 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import Columns
+from scanfab.io.binary_files import is_hdf, read_hdf_file
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.shared import GrainsOnly, numbered_frames
-from scanfab.io.hdf import is_hdf, read_hdf_file
 from scanfab.io.mesh import joined_arrays
 from scanfab.io.reader import Carries, FileKind, Snapshot
 from scanfab.io.text import Layout, read_rows, spelt, text_of

@@ -19,14 +19,8 @@ import numpy as np
 from scanfab.base.arrays import MOST, doubles
 from scanfab.base.errors import ReadError, SettingsError, note
 from scanfab.base.typing import Columns
-from scanfab.io.binary_tables import binary_names, is_xyzd, read_binary, xyzd_cell
-from scanfab.io.columns import (
-    DIAMETER_NAMES,
-    ID_NAMES,
-    RADIUS_NAMES,
-    grain_table,
-    refuse_named_twice,
-)
+from scanfab.io.binary_files import binary_names, is_xyzd, read_binary, xyzd_cell
+from scanfab.io.columns import DIAMETER_NAMES, ID_NAMES, RADIUS_NAMES, grain_table, refuse_shared
 from scanfab.io.contacts import join_table
 from scanfab.io.layout import TextTable, read_text, text_table
 from scanfab.io.options import parse_columns
@@ -302,7 +296,7 @@ def find_columns(
         keys = [table.layout.names[place] for place in places]
         if standard in named or not {*keys} <= {*roles.values()}:
             roles[standard] = keys[0]
-    refuse_named_twice(path, {standard: roles[standard] for standard in named}, option)
+    refuse_shared(path, {standard: roles[standard] for standard in named}, option)
     return roles
 
 
