@@ -62,18 +62,21 @@ class Body:
         from scipy.spatial import ConvexHull, HalfspaceIntersection
 
         shared, slope = np.zeros((2, len(shift)))
+        part = ConvexHull(self.outline)  # all of the body, if the copy lies at its own place
         normals, distance = self.planes[:, :3], self.planes[:, 3]
         depth = np.column_stack([normals, np.ones(len(normals))])
         for k, vector in enumerate(shift):
-            # the planes of the shared part, and the centre and radius of its largest ball
-            room = distance + np.minimum(normals @ (length * vector), 0.0)
-            *inside, radius = linprog([0, 0, 0, -1], depth, room, bounds=[(None, None)] * 4).x
-            if radius > SLIVER * self.reach(np.eye(3)):
+            if length != 0.0:
+                # the planes of the shared part, and the centre and radius of its largest ball
+                room = distance + np.minimum(normals @ (length * vector), 0.0)
+                *inside, radius = linprog([0, 0, 0, -1], depth, room, bounds=[(None, None)] * 4).x
+                if radius <= SLIVER * self.reach(np.eye(3)):
+                    continue
                 bounds = np.column_stack([normals, -room])
                 part = ConvexHull(HalfspaceIntersection(bounds, np.array(inside)).intersections)
-                a, b, c = np.moveaxis(part.points[part.simplices], 1, 0)
-                shared[k] = part.volume
-                slope[k] = 0.25 * np.abs(np.cross(b - a, c - a) @ vector).sum()
+            a, b, c = np.moveaxis(part.points[part.simplices], 1, 0)
+            shared[k] = part.volume
+            slope[k] = 0.25 * np.abs(np.cross(b - a, c - a) @ vector).sum()
         return shared, slope
 
 

@@ -10,10 +10,12 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple, TypeVar
 
+Value = TypeVar("Value")
 SKIPPED = "skipped"
 """Code of the note about a frame that was skipped because it could not be read."""
 
@@ -94,34 +96,33 @@ class Note(NamedTuple):
 _kept: ContextVar[list[Note] | None] = ContextVar("kept", default=None)
 
 
-def warn(text: str) -> None:
-    """Warn the user of a doubt about a result."""
-    _issue(text, ScanfabWarning)
-
-
-def note(text: str) -> None:
-    """Inform the user of something that puts no result in doubt."""
-    _issue(text, ScanfabNote)
-
-
-def _issue(text: str, kind: type[Warning]) -> None:
+def warn(text: str, kind: type[Warning] = ScanfabWarning) -> None:
+    """Warn the user of a doubt about a result, or issue a warning of another kind."""
     kept = _kept.get()
     if kept is None:
-        warnings.warn(text, kind, stacklevel=6)
+        warnings.warn(text, kind, stacklevel=5)
     else:
         # messages that differ only in numbers, such as steps in names of files, are the same note
         kept.append(Note(re.sub(r"\d+", "", text), text, kind=kind))
 
 
-@contextmanager
-def collected() -> Iterator[list[Note]]:
+note = partial(warn, kind=ScanfabNote)
+"""Inform the user of something that puts no result in doubt."""
+
+
+def collected() -> AbstractContextManager[list[Note]]:
     """Collect what this thread calls :func:`warn` and :func:`note` for inside the block."""
-    notes: list[Note] = []
-    token = _kept.set(notes)
+    return within(_kept, [])
+
+
+@contextmanager
+def within(variable: ContextVar[Any], value: Value) -> Iterator[Value]:
+    """Inside the block, a variable of this thread has a value."""
+    token = variable.set(value)
     try:
-        yield notes
+        yield value
     finally:
-        _kept.reset(token)
+        variable.reset(token)
 
 
 def joined(notes: Iterable[Note]) -> tuple[Note, ...]:

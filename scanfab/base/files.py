@@ -69,19 +69,16 @@ def check_folder(path: Path) -> None:
 
 def refuse_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path]) -> None:
     """Raise SettingsError if a file to write is one that is read, by whatever path or link."""
-    read = dict[tuple[int, int], Path]()
-    for path in inputs:
-        with suppress(OSError):
-            found = path.stat()
-            read[found.st_dev, found.st_ino] = path
+
+    def place(path: Path) -> tuple[int, int]:
+        found = path.stat()
+        return found.st_dev, found.st_ino
+
+    read = {place(path): path for path in inputs if os.path.exists(path)}
     for path in filter(None, outputs):
-        with suppress(OSError):
-            found = path.stat()
-            if (found.st_dev, found.st_ino) in read:
-                source = read[found.st_dev, found.st_ino]
-                raise SettingsError(
-                    f"{path}: would replace the input {source}: name another file to write"
-                )
+        if os.path.exists(path) and (source := read.get(place(path))) is not None:
+            advice = "name another file to write"
+            raise SettingsError(f"{path}: would replace the input {source}: {advice}")
 
 
 @contextmanager

@@ -149,14 +149,15 @@ class _PartCompiler(_Compiler):
         return super().define_pipelines()
 
 
-def kernel(function: Function, **options: Any) -> Function:
+def kernel(
+    function: Function, compiler: type[CompilerBase] = _Compiler, **options: Any
+) -> Function:
     """Compile a function that is called from Python."""
-    compiled = njit(**{"nogil": True, "pipeline_class": _Compiler, **options})(function)
+    compiled: Function = njit(nogil=True, pipeline_class=compiler, **options)(function)
     # a part is kept with its kernel; and Numba may be switched off
-    if compiled is not function and options.get("pipeline_class") is not _PartCompiler:
-        compiled._cache = _Cache(function)
-    same: Function = compiled
-    return same
+    if compiled is not function and compiler is _Compiler:
+        compiled._cache = _Cache(function)  # type: ignore[attr-defined]
+    return compiled
 
 
 def inner(**options: Any) -> Callable[[Function], Function]:
@@ -177,7 +178,7 @@ def part(**options: Any) -> Callable[[Function], Function]:
     its callers do the same again. Without that a scan compiles in four fifths of the time. A
     function with a loop where time is spent stays as it is: the loop would be slower.
     """
-    return inner(pipeline_class=_PartCompiler, **options)
+    return inner(compiler=_PartCompiler, **options)
 
 
 def when_compiling(tell: Callable[[], object]) -> None:

@@ -179,26 +179,22 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
     return decorate
 
 
-def number(expected: str, holds: Callable[[float], bool]) -> Parse:
+def number(expected: str, holds: Callable[[float], bool], kind: type = float) -> Parse:
     """A parser of one number for which a condition holds; NaN must fail every condition."""
-    return _number(expected, holds, float)
 
-
-def whole(expected: str, holds: Callable[[float], bool]) -> Parse:
-    """A parser of one whole number for which a condition holds."""
-    return _number(expected, lambda value: value.is_integer() and holds(value), int)
-
-
-def _number(expected: str, holds: Callable[[float], bool], kind: type) -> Parse:
     def parse(name: str, value: Any) -> Any:
         with suppress(TypeError, ValueError, OverflowError):
             result = float(value)
-            if holds(result):
+            if (kind is float or result.is_integer()) and holds(result):
                 # an integer is returned itself, because a float would round a large one
                 return value if kind is int and isinstance(value, int) else kind(result)
         raise unusable(name, expected, value)
 
     return parse
+
+
+whole = partial(number, kind=int)
+"""A parser of one whole number for which a condition holds."""
 
 
 def numbers(expected: str, holds: Callable[[Floats], bool]) -> Callable[[str, Any], Floats]:

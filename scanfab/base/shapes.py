@@ -123,10 +123,8 @@ def sphere(radius: float, space: Space = SPACE) -> Convex:
     high, frame = radius * np.diag(space.identity), radius * space.basis.T
     if space.is_plane:
         frame[:, 2] = space.normal
-    quadric, body = (
-        Quadric(1.0, np.zeros((3, 3)), radius * radius),
-        DISC if space.is_plane else BALL,
-    )
+    body = DISC if space.is_plane else BALL
+    quadric = Quadric(1.0, np.zeros((3, 3)), radius * radius)
     return Convex(np.zeros((0, 4)), quadric, -high, high, radius, f"radius {radius:g}", body, frame)
 
 

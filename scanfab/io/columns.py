@@ -110,7 +110,7 @@ def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | Non
     return Cell(cell.vectors, periodic, cell.origin)
 
 
-def refuse_named_twice(path: Path, named: Mapping[str, str], option: str) -> None:
+def refuse_shared(path: Path, named: Mapping[str, str], option: str) -> None:
     """
     Refuse an option that uses one column for two quantities.
 
@@ -137,7 +137,7 @@ def refuse_named_twice(path: Path, named: Mapping[str, str], option: str) -> Non
 
 def _named_by_user(path: Path, columns: Columns, options: ReadOptions) -> dict[str, Any]:
     """All columns; those that the user named get their standard names."""
-    refuse_named_twice(path, options.columns, "columns")
+    refuse_shared(path, options.columns, "columns")
     rest, named = dict(columns), {}
     for standard, own in options.columns.items():
         if own not in rest:

@@ -175,11 +175,6 @@ def _refuse_images(path: Path, grains: GrainTable, rows: IntArray, ends: FloatAr
         raise ReadError(f"{path}: {problem}: name it with `cell=(LX, LY, LZ)` (and `periodic`)")
 
 
-def count_walls(rows: IntArray, count: int) -> IntArray:
-    """How often each of ``count`` grains occurs among the rows."""
-    return np.bincount(rows, minlength=count).astype(np.int64)
-
-
 def _join(
     path: Path,
     grains: GrainTable,
@@ -214,7 +209,8 @@ def _join(
         for values in (listed.image, listed.force, listed.force_n)
     )
     kept = ContactList(rows[both], image, force, force_n=force_n)
-    return JoinedContacts(kept, count_walls(rows[~both].max(axis=1), len(grains.radius)))
+    walls_of = np.bincount(rows[~both].max(axis=1), minlength=len(grains.radius))
+    return JoinedContacts(kept, walls_of)
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -309,7 +305,7 @@ def join_table(path: Path, grains: GrainTable, columns: Columns) -> JoinedContac
         problem = f"{path}: {np.count_nonzero(counts > 1)} of {len(unique)} pairs are listed more "
         warn(f"{problem}than once, such as {first} and {second}: each row counts as a contact")
     touched = rows_of_ids(grains, ids[walls]).max(axis=1)
-    count = count_walls(touched[touched >= 0], len(grains.radius))
+    count = np.bincount(touched[touched >= 0], minlength=len(grains.radius))
     return joined._replace(wall_contacts=joined.wall_contacts + count)
 
 

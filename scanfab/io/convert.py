@@ -12,8 +12,8 @@ from typing import Any
 from scanfab.base.errors import SettingsError, note
 from scanfab.base.files import check_folder, refuse_inputs, whole_file
 from scanfab.base.option import refuse_unknown
-from scanfab.io.companions import HEADS, companion_kind, companion_there, companions_of
 from scanfab.io.files import COMPRESSED_SUFFIXES, bare_name
+from scanfab.io.formats.own import HEADS, companion_kind, companion_there, companions_of
 from scanfab.io.options import READING_OPTIONS, parse_frames
 from scanfab.io.reader import installed_readers
 from scanfab.io.series import Series

@@ -205,9 +205,9 @@ def in_one_series(families: Sequence[Family]) -> Family:
     """Files that were named one by one, of one reader, as one series in natural order."""
     files = [file for family in families for file in family.files.values()]
 
-    def natural(file: Path) -> list[tuple[bool, int, str]]:
-        words = re.split(r"(\d+)", str(file))
-        return [(w.isdigit(), int(w) if w.isdigit() else 0, w) for w in words if w]
+    def natural(file: Path) -> list[int | str]:
+        # texts and numbers alternate, so that two names compare texts with texts
+        return [int(w) if w.isdigit() else w for w in re.split(r"(\d+)", str(file))]
 
     ordered = dict[int | None, Path](enumerate(sorted(files, key=natural)))
     return replace(

@@ -10,15 +10,15 @@ import sys
 import tempfile
 import zlib
 from collections.abc import Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, suppress
 from contextvars import ContextVar
-from functools import cache, lru_cache, partial
+from functools import cache, lru_cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 from weakref import finalize
 
-from scanfab.base.errors import ReadError, warn
+from scanfab.base.errors import ReadError, warn, within
 from scanfab.base.files import at_end, check_file, free_memory
 
 COMPRESSED_SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".lz4")
@@ -43,7 +43,6 @@ Stamp = tuple[str, int, int, int]
 """Identifies a file in its present state: path, inode, size and time of change."""
 _grows: ContextVar[bool] = ContextVar("grows", default=False)
 _times: ContextVar[float] = ContextVar("times", default=MOST_TIMES)
-Value = TypeVar("Value")
 
 
 class _Copy(type(Path())):  # type: ignore[misc]
@@ -63,8 +62,7 @@ def stamp_of(path: Path) -> Stamp:
 
 def first_bytes(path: Path, count: int = 4096) -> bytes:
     """The first bytes of the decompressed file; ReadError if it cannot be opened."""
-    head = _head(path, max(count, MAGIC_BYTES))
-    return head[:count] if _decompressor(head) is None else next(pieces(path, count), b"")
+    return next(pieces(path, count), b"")
 
 
 def plain(path: Path) -> Path:
@@ -74,7 +72,7 @@ def plain(path: Path) -> Path:
     The copy exists as long as something refers to the returned path. The last few copies stay
     longer, so that a reader that opens its file several times decompresses it once.
     """
-    if _decompressor(_head(path, MAGIC_BYTES)) is None:
+    if _decompressor(path) is None:
         return path
     return _copy_of(path, stamp_of(path), os.getpid())
 
@@ -95,7 +93,7 @@ def _remove(folder: str, process: int) -> None:
 
 def pieces(path: Path, size: int = PART) -> Iterator[bytes]:
     """The decompressed content of a file, ``size`` bytes at a time; raises only ReadError."""
-    module = _decompressor(_head(path, MAGIC_BYTES))
+    module = _decompressor(path)
     zstd_error, unpacked = getattr(module, "ZstdError", OSError), 0
     try:
         with open(path, "rb") as packed, packed if module is None else module.open(packed) as file:
@@ -109,18 +107,9 @@ def pieces(path: Path, size: int = PART) -> Iterator[bytes]:
         raise ReadError(f"{path}: cannot be {verb}: {_reason(error)}") from None
 
 
-@contextmanager
-def _set(variable: ContextVar[Value], value: Value) -> Iterator[None]:
-    token = variable.set(value)
-    try:
-        yield
-    finally:
-        variable.reset(token)
-
-
-def unpacking_up_to(times: float | None) -> AbstractContextManager[None]:
+def unpacking_up_to(times: float | None) -> AbstractContextManager[float]:
     """Inside the block, files may decompress to this many times their size; None: no change."""
-    return _set(_times, times or _times.get())
+    return within(_times, times or _times.get())
 
 
 def check_times(path: Path, packed: int, unpacked: float) -> None:
@@ -190,16 +179,15 @@ def temporary_copy(content: Iterable[bytes], name: str) -> Path:
 def _folder(process: int) -> str:
     """The folder for the copies of a process; it is removed at the end of the process."""
     folder = tempfile.mkdtemp(prefix=PREFIX)
-    at_end(partial(_remove_at_end, folder))
+
+    def remove() -> None:
+        # renamed first, so that a thread that is still reading cannot add a copy
+        with suppress(OSError):
+            os.rename(folder, f"{folder}-removed")
+        shutil.rmtree(f"{folder}-removed", ignore_errors=True)
+
+    at_end(remove)
     return folder
-
-
-def _remove_at_end(folder: str) -> None:
-    # renamed first, so that a thread that is still reading cannot add a copy
-    last = f"{folder}-removed"
-    with suppress(OSError):
-        os.rename(folder, last)
-    shutil.rmtree(last, ignore_errors=True)
 
 
 def without_temporary(text: str) -> str:
@@ -217,20 +205,16 @@ def without_temporary(text: str) -> str:
     return re.sub(rf"{folder}\w+[/\\]tmp\w+[/\\]", "", text)
 
 
-def _decompressor(head: bytes) -> Any:
-    """The module that opens a file with these first bytes; None if it is not compressed."""
-    name = next((module for key, module in DECOMPRESSORS.items() if head.startswith(key)), None)
-    return name and import_module(name)
-
-
-def _head(path: Path, count: int) -> bytes:
-    """The first bytes of the file, not decompressed."""
+def _decompressor(path: Path) -> Any:
+    """The module that opens a compressed file, by its first bytes; None for any other file."""
     check_file(path)
     try:
         with open(path, "rb") as stream:
-            return stream.read(count)
+            head = stream.read(MAGIC_BYTES)
     except OSError as error:
         raise ReadError(f"{path}: cannot be read: {_reason(error)}") from None
+    name = next((module for key, module in DECOMPRESSORS.items() if head.startswith(key)), None)
+    return name and import_module(name)
 
 
 def _reason(error: Exception) -> str:
@@ -239,9 +223,9 @@ def _reason(error: Exception) -> str:
     return str(error) or "the file ends too early"
 
 
-def growing() -> AbstractContextManager[None]:
+def growing() -> AbstractContextManager[bool]:
     """Inside the block, files may still be growing: an incomplete end draws no warning."""
-    return _set(_grows, True)
+    return within(_grows, True)
 
 
 def grows() -> bool:

@@ -155,22 +155,19 @@ class FollowedSeries(Series):
             return
         self._look()
         waiting = self._frames_of(self)[len(self._taken) :]
-        waited = time.monotonic() - self._since
-        if any(self._is_whole(frame, has_later=frame is not waiting[-1]) for frame in waiting):
-            self._take(waiting[0])
-        elif self._is_over or waited >= self._seconds:
+        ends = self._is_over or time.monotonic() - self._since >= self._seconds
+        if not any(self._is_whole(frame, has_later=frame is not waiting[-1]) for frame in waiting):
+            if not ends:
+                return
             # the series ends: do not wait for contact files either
             self._seconds = 0.0
-            if any(map(self._can_be_read, waiting)):
-                self._take(waiting[0])
+            if not any(map(self._can_be_read, waiting)):
+                self._is_over = True
+                for frame in waiting[:1]:
+                    problem = f"left out, because it was incomplete at the end: {self._problem}"
+                    warn(f"{frame.snapshot.path}: {problem}")
                 return
-            self._is_over = True
-            if waiting:
-                path = waiting[0].snapshot.path
-                warn(f"{path}: left out, because it was incomplete at the end: {self._problem}")
-
-    def _take(self, frame: Frame) -> None:
-        self._taken.append((frame, _state(frame.series, frame)))
+        self._taken.append((waiting[0], _state(waiting[0].series, waiting[0])))
         self._since = time.monotonic()
 
     def _frames_of(self, series: Series) -> list[Frame]:

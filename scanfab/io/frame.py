@@ -10,10 +10,10 @@ import numpy as np
 
 from scanfab.base.errors import PackingError, ReadError, note, warn
 from scanfab.io.columns import body_numbers
-from scanfab.io.companions import FrameData, check_contacts_are_there, companion_kind, with_columns
 from scanfab.io.contacts import NotContactsError, OtherGrainsError
 from scanfab.io.families import are_tied
 from scanfab.io.files import unpacking_up_to
+from scanfab.io.formats.own import FrameData, check_contacts_are_there, companion_kind, with_columns
 from scanfab.io.reader import Carries, GrainTable, JoinedContacts, Reader, ReadOptions, Snapshot
 from scanfab.packing.contacts import ListedWallForces
 from scanfab.packing.packing import Packing, check_lengths

@@ -22,9 +22,9 @@ import numpy as np
 from scanfab.base.arrays import doubles
 from scanfab.base.errors import ReadError, warn
 from scanfab.base.typing import AnyArray, Columns, FloatArray, IntArray
+from scanfab.io.binary_files import is_hdf, read_hdf_file
 from scanfab.io.fence import fenced
 from scanfab.io.files import check_memory, file_inside, first_bytes, plain
-from scanfab.io.hdf import is_hdf, read_hdf_file
 
 # kinds of files that hold a mesh, and of files that list the pieces of one mesh
 MESHES = {"polydata", "unstructuredgrid", "unstructured_grid", "rectilineargrid", "xdmf"}

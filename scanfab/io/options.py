@@ -10,20 +10,11 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.option import (
-    accepted,
-    number,
-    numbers,
-    optional,
-    options_of,
-    reading,
-    unusable,
-    whole,
-)
+from scanfab.base.option import accepted, number, numbers, optional, options_of, reading, unusable
 from scanfab.io.reader import installed_readers, reader_named
 
 parse_positive = optional(number("a number above 0", lambda value: 0 < value < math.inf))
-parse_skip = whole("how many lines to skip, 0 or more", lambda value: 0 <= value < 2**31)
+parse_skip = number("how many lines to skip, 0 or more", lambda value: 0 <= value < 2**31, int)
 
 
 # texts and paths are checked further where they are used

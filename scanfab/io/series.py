@@ -15,9 +15,9 @@ from scanfab.base.errors import NoFrameError, PackingError, ReadError, SettingsE
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.io.companions import companion_file, read_frame
 from scanfab.io.families import Family
 from scanfab.io.files import Stamp, stamp_of, unpacking_up_to
+from scanfab.io.formats.own import companion_file, read_frame
 from scanfab.io.frame import Frame
 from scanfab.io.layout import FrameFile
 from scanfab.io.reader import ReadOptions, Snapshot

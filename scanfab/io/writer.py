@@ -216,7 +216,7 @@ def csv_bytes(
     return text.encode()
 
 
-def cell_of(path: Path, arrays: Mapping[str, Any]) -> Cell | None:
+def stated_cell(path: Path, arrays: Mapping[str, Any]) -> Cell | None:
     """The cell in the arrays of a frame, or None; ReadError if the arrays are no valid cell."""
     if "cell" not in arrays:
         return None

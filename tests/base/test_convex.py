@@ -190,6 +190,10 @@ def test_a_box_by_its_corners_is_the_box():
     assert found.planes[order] == pytest.approx(expected.planes[same])
     assert found.volume == pytest.approx(expected.volume)
     assert found.reach == pytest.approx(expected.reach)
+    a, b, c = 2 * HALF
+    assert found.mean_shadow == pytest.approx(expected.mean_shadow, rel=1e-9)
+    # Cauchy: a quarter of the surface
+    assert found.mean_shadow == pytest.approx((a * b + b * c + c * a) / 2, rel=1e-3)
     assert (found.low, found.high) == (pytest.approx(expected.low), pytest.approx(expected.high))
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import NoFrameError, ReadError, ScanfabNote, ScanfabWarning, SettingsError
-from scanfab.io.formats.liggghts import LiggghtsReader
+from scanfab.io.formats.lammps import LiggghtsReader
 from tests.helpers.dumps import PAIRS, dump_text, pairs_text, refuses, write
 from tests.helpers.truth import FLOOR, id_pairs
 

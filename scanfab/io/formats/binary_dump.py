@@ -52,7 +52,7 @@ class Header(NamedTuple):
 
 
 class BinaryDump(shared.GrainsOnly):
-    """Reads binary dumps, for DumpReader."""
+    """Reads binary dumps, for the readers of both programs."""
 
     def recognises(self, path: Path) -> bool:
         """Whether the file begins with the header of a snapshot."""
@@ -147,7 +147,7 @@ def _text(stream: IO[bytes]) -> str:
 
 
 class NetcdfDump(shared.GrainsOnly):
-    """Reads NetCDF dumps, for DumpReader."""
+    """Reads NetCDF dumps, for the readers of both programs."""
 
     def recognises(self, path: Path) -> bool:
         """Whether the first bytes are of a kind of NetCDF that LAMMPS writes."""

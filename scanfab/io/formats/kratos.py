@@ -9,9 +9,9 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import Columns
+from scanfab.io.binary_files import is_hdf, read_hdf_file
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.shared import GrainsOnly, numbered_frames
-from scanfab.io.hdf import is_hdf, read_hdf_file
 from scanfab.io.mesh import joined_arrays
 from scanfab.io.reader import Carries, FileKind, Snapshot
 from scanfab.io.text import Layout, read_rows, spelt, text_of
@@ -45,7 +45,7 @@ class KratosReader(GrainsOnly):
     has_cell: Carries = "nothing"
 
     def recognises(self, path: Path) -> bool:
-        """By the blocks of ``.mdpa``, or the datasets in the groups of an HDF5 file."""
+        """Recognise the file by the blocks of ``.mdpa``, or the datasets in the groups of an HDF5 file."""
         head = first_bytes(path)
         if is_hdf(head):
             return bool(_groups(path))

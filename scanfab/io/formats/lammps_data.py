@@ -37,13 +37,13 @@ OF_YADE = b"LIGGGHTS Description"
 
 
 class DataFile(GrainsOnly):
-    """Reads data files, for DumpReader."""
+    """Reads data files, for the readers of both programs."""
 
     # the files have no boundary flags: the user says what is periodic
     has_cell: Carries = "box"
 
     def recognises(self, path: Path) -> bool:
-        """By the first line, or by the number of atoms and the box below it."""
+        """Recognise the file by the first line, or by the number of atoms and the box below it."""
         head = first_bytes(path)
         has_both = ATOMS.search(head) is not None and BOX.search(head) is not None
         return has_both or head.startswith(b"LAMMPS data file")

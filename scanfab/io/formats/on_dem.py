@@ -1,29 +1,36 @@
 """
 ON-DEM's exchange format (VTKHDF with a group ONDEM).
 
-Drafts 0.1 and 0.2 are read, and draft 0.1 is written (by `writers.vtk`). They differ in names and
+Drafts 0.1 and 0.2 are read, and draft 0.1 is written. They differ in names and
 in the sign of the normal force: compression is positive in 0.1 and negative in 0.2.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from scanfab.base.arrays import doubles
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import Columns, FloatArray
+from scanfab.io.binary_files import HdfFile, is_hdf, read_hdf_file
 from scanfab.io.columns import grain_table, whole_numbers
 from scanfab.io.contacts import join_ids, rows_of_ids
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.shared import GrainsOnly
-from scanfab.io.hdf import HdfFile, is_hdf, read_hdf_file
 from scanfab.io.mesh import joined_arrays
 from scanfab.io.reader import Carries, GrainTable, ReadOptions, Snapshot
-from scanfab.io.writer import cell_of
-from scanfab.io.writers.vtk import BODIES, INTERACTIONS, SCENE, SCENE_NAMES, STROKE, write_on_dem
+from scanfab.io.writer import Left, as_arrays, stated_cell
+from scanfab.packing.packing import Packing
 
+# groups of ON-DEM, and the attributes of its scene for the names in writer.Arrays
+SCENE, BODIES, INTERACTIONS = "ONDEM/Scene", "ONDEM/Bodies/sphere", "ONDEM/Interactions"
+SCENE_NAMES = {"step": "iteration", "time": "time", "cell": "cell"}
+SCENE_NAMES |= {"origin": "cell_origin", "periodic": "cell_periodic"}
+# replaces / in names of columns, because / would create a group
+STROKE = "\u2215"
 # sign of the normal force in compression, by draft
 SIGNS = {"0.1": 1.0, "0.2": -1.0}
 # the columns of interactions that are read, and the shape of a value in each
@@ -39,10 +46,9 @@ class OnDemReader(GrainsOnly):
     description = "ON-DEM's VTKHDF (drafts 0.1 and 0.2): spheres and contacts with forces"
     extensions: tuple[str, ...] = (".vtkhdf",)
     lists_contacts = True
-    write = staticmethod(write_on_dem)
 
     def recognises(self, path: Path) -> bool:
-        """By the groups VTKHDF and ONDEM."""
+        """Recognise the file by the groups VTKHDF and ONDEM."""
         if not is_hdf(first_bytes(path, 8)):
             return False
         return {"ONDEM", "VTKHDF"} <= read_hdf_file(path, with_data=False).attributes.keys()
@@ -65,8 +71,58 @@ class OnDemReader(GrainsOnly):
         path, file = snapshot.path, read_hdf_file(snapshot.path)
         scene = file.attributes.get(SCENE, {})
         arrays = {name: scene[key] for name, key in SCENE_NAMES.items() if key in scene}
-        grains = grain_table(path, _spheres(path, file), cell_of(path, arrays), options)
+        grains = grain_table(path, _spheres(path, file), stated_cell(path, arrays), options)
         return grains if INTERACTIONS not in file.attributes else _joined(path, file, grains)
+
+    def write(self, packing: Packing, path: Path) -> Left:
+        """Write one frame; the file holds all data of the packing."""
+        import h5py
+
+        arrays, count = as_arrays(packing), len(packing)
+        columns = {**arrays.grains, **arrays.own}
+        columns["body_id"] = columns.pop("id")
+        # VTK cannot read texts as point data
+        texts = {name: values for name, values in columns.items() if values.dtype.kind == "U"}
+        # in memory first, because HDF5 ends the process if the disk is full
+        with h5py.File(path, "w", driver="core", backing_store=False, track_order=True) as file:
+            file.attrs.update(file_format="ON-DEM VTKHDF", file_format_version="0.1-draft")
+            file.attrs["source_code"] = "scanfab"
+            # PolyData with a vertex at each point, so that ParaView shows the points
+            group = file.create_group("VTKHDF", track_order=True)
+            group.attrs.update(Type=np.bytes_("PolyData"), Version=np.array([2, 0]))
+            group["NumberOfPoints"] = np.array([count])
+            group["Points"] = packing.position
+            for cells in ("Vertices", "Lines", "Polygons", "Strips"):
+                filled = count if cells == "Vertices" else 0
+                group[f"{cells}/NumberOfCells"] = np.array([filled])
+                group[f"{cells}/NumberOfConnectivityIds"] = np.array([filled])
+                group[f"{cells}/Connectivity"] = np.arange(filled)
+                group[f"{cells}/Offsets"] = np.arange(filled + 1)
+            points = group.create_group("PointData", track_order=True)
+            _write(points, {name: values for name, values in columns.items() if name not in texts})
+            if texts:
+                _write(file.create_group(BODIES), {"body_id": packing.id, **texts})
+            scene = file.create_group(SCENE)
+            scene.attrs["scanfab"] = 1
+            for name, value in arrays.frame.items():
+                scene.attrs[SCENE_NAMES[name]] = np.int8(value) if name == "periodic" else value
+            if (contacts := packing.contacts) is not None:
+                group = file.create_group(INTERACTIONS)
+                group.attrs["count"] = len(contacts)
+                # the parts of the force that the draft names, and the exact total force
+                table = {**arrays.contacts, "virtual": np.zeros(len(contacts), np.int8)}
+                table |= {"normal": contacts.normal, "contact_point": contacts.point}
+                table.pop("force_n", None)
+                if contacts.force_n is not None:
+                    table["normal_force"] = contacts.force_n
+                if contacts.force is not None and contacts.force_n is not None:
+                    normal_part = contacts.force_n[:, None] * contacts.normal
+                    table["shear_force"] = contacts.force - normal_part
+                _write(group, table)
+            file.flush()
+            image = file.id.get_file_image()
+        path.write_bytes(image)
+        return Left(no_step=False, notes=tuple(arrays.notes))
 
 
 def _spheres(path: Path, file: HdfFile) -> Columns:
@@ -138,3 +194,14 @@ def _force(
     if not {"normal", "shear_force"} <= table.keys():
         return None, normal
     return doubles(normal[:, None] * table["normal"] + table["shear_force"]), None
+
+
+def _write(group: Any, columns: Columns) -> None:
+    import h5py
+
+    for name, values in columns.items():
+        plain = name.replace("/", STROKE)
+        if values.dtype.kind == "U":
+            group.create_dataset(plain, data=values.astype(object), dtype=h5py.string_dtype())
+        else:
+            group[plain] = values.astype(np.uint8) if values.dtype.kind == "b" else values

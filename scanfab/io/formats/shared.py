@@ -15,15 +15,7 @@ from scanfab.base.typing import Columns, FloatArray
 from scanfab.io.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.contacts import join_ids
 from scanfab.io.files import leave_out_last, plain
-from scanfab.io.reader import (
-    Carries,
-    FileKind,
-    GrainTable,
-    JoinedContacts,
-    Reader,
-    ReadOptions,
-    Snapshot,
-)
+from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.io.text import CutError, spelt, text_of
 from scanfab.packing.cell import Cell
 
@@ -34,9 +26,9 @@ PIECE = 1 << 22
 NO_COMMENT = re.compile(rb"^[ \t]*[^#\s][^\n]*", re.MULTILINE)
 
 
-class GrainsOnly(Reader):
+class GrainsOnly:
     """
-    Base class of readers whose files hold grains and no contacts.
+    Base class of readers (:class:`scanfab.io.Reader`) whose files hold grains and no contacts.
 
     A subclass defines ``recognises`` (is a file of this format?) and ``table`` (the columns and the
     cell of a frame). It overrides ``snapshots`` if a file may hold several frames, and ``names`` if
@@ -46,6 +38,10 @@ class GrainsOnly(Reader):
     name = description = ""
     extensions: tuple[str, ...] = ()
     has_cell: Carries = "cell"
+
+    def recognises(self, path: Path) -> bool:
+        """Whether the content is certainly of this format."""
+        raise NotImplementedError
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """All columns of a frame by their names, and its cell."""

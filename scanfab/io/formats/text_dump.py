@@ -50,10 +50,10 @@ class Header(NamedTuple):
 
 
 class TextDump(shared.GrainsOnly):
-    """Reads text dumps, for DumpReader."""
+    """Reads text dumps, for the readers of both programs."""
 
     def recognises(self, path: Path) -> bool:
-        """By the first words of the file."""
+        """Recognise the file by the first words of the file."""
         head = first_bytes(path)
         is_yaml = YAML_MARK.match(head) is not None and b"creator: LAMMPS" in head[:100]
         return is_yaml or head.startswith(b"ITEM: ")

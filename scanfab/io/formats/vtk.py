@@ -1,27 +1,45 @@
-"""VTK files: grains as points with a radius, contacts as lines; and lists of VTK files."""
+"""
+VTK files: grains as points with a radius, contacts as lines; and lists of VTK files.
+
+scanfab writes PolyData (``.vtp``). Data without a usual name (cell, images) get names of scanfab.
+"""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
+from xml.sax.saxutils import escape
 
 import numpy as np
 
 from scanfab.base.arrays import doubles
 from scanfab.base.errors import ReadError, note
-from scanfab.base.typing import FloatArray
+from scanfab.base.typing import AnyArray, FloatArray
 from scanfab.io.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.contacts import join_ids, join_positions, proved_force
-from scanfab.io.files import bare_name, file_inside, plain
+from scanfab.io.files import bare_name, file_inside, first_bytes, plain
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
 from scanfab.io.formats.yade_save import cell_beside, cell_file, is_cell_file
 from scanfab.io.mesh import Mesh, elements, form_of, holds_mesh, listed, read_mesh
 from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.io.writers.vtk import moment_of, packing_of, says_all
+from scanfab.io.writer import Left, as_arrays, contacts_of, stated_cell
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList
+from scanfab.packing.packing import Packing
 
+# step and time: scanfab writes them as a comment in the first line, so that the frames of a series
+# are found without reading whole files; TIME also matches the text of other programs
+STEP = re.compile(rb"scanfab_step=(-?\d{1,30})[\s<]")
+TIME = re.compile(
+    rb'TimeValue(?:=|"[^>]*format="ascii"[^>]*>\s*)([-+]?\d+\.?\d*(?:[eE][-+]?\d+)?)[\s<]'
+)
+# bytes at the start of a file that hold the field arrays
+HEAD = 1 << 14
+# names of field arrays: KNOWN says whether contacts are known, FIELDS hold the frame
+KNOWN = "scanfab_contacts"
+FIELDS = {name: f"scanfab_{name}" for name in ("step", "cell", "origin", "periodic")}
+FIELDS["time"] = "TimeValue"
 # rectilinear grids are boxes, not grains
 BOXES = ("RectilinearGrid", "RECTILINEAR_GRID")
 # kinds of files that list the files of one frame: grains, contacts, boxes
@@ -45,7 +63,7 @@ class VtkReader(GrainsOnly):
     sign: float | None = None
 
     def recognises(self, path: Path) -> bool:
-        """By the first line of legacy VTK, the root element of XML, or the type in VTKHDF."""
+        """Recognise the file by the first line of legacy VTK, the root element of XML, or the type in VTKHDF."""
         return form_of(path) is not None
 
     def kind(self, path: Path) -> FileKind:
@@ -71,8 +89,10 @@ class VtkReader(GrainsOnly):
         """The frames that a ``.pvd`` lists; any other file is a single frame."""
         if form_of(path) == "Collection":
             return self._listed(path)
-        step, time = moment_of(path)
-        return [Snapshot(path, step, time, stepless=step is None and says_all(path))]
+        head = first_bytes(path, HEAD)
+        step, time = STEP.search(head), TIME.search(head)
+        moment = step and int(step[1]), time and float(time[1])
+        return [Snapshot(path, *moment, stepless=step is None and says_all(path))]
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """The points and their arrays, with the companion box of LIGGGHTS or cell of YADE."""
@@ -224,3 +244,81 @@ def _read_box(path: Path) -> Cell | None:
     if len(corners) == 0:
         return None
     return cell_of(path, np.ptp(corners, axis=0), (False, False, False), corners.min(axis=0))
+
+
+class VtpWriter:
+    """PolyData by VTK's own writer, with numbers in binary form."""
+
+    name = "vtp"
+    description = "VTK PolyData: spheres as points, contacts as lines, the cell as field data"
+    extensions = (".vtp",)
+
+    def write(self, packing: Packing, path: Path) -> Left:
+        """Write one frame; the file holds all data of the packing."""
+        from vtkmodules.vtkCommonCore import vtkPoints
+        from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+        from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+        arrays, contacts = as_arrays(packing), packing.contacts
+        frame = arrays.frame
+        fields = {FIELDS[name]: np.ravel(values)[None] for name, values in frame.items()}
+        fields[KNOWN] = np.array([int(contacts is not None)])
+        data, points, lines = vtkPolyData(), vtkPoints(), vtkCellArray()
+        points.SetData(_array("Points", packing.position))
+        data.SetPoints(points)
+        if contacts is not None and len(contacts):
+            lines.SetData(2, _array("", contacts.pairs.ravel()))
+            data.SetLines(lines)
+        for place, columns in (
+            (data.GetPointData(), arrays.grains | arrays.own),
+            (data.GetCellData(), arrays.contacts),
+            (data.GetFieldData(), fields),
+        ):
+            for name, values in columns.items():
+                place.AddArray(_array(name, values))
+        writer = vtkXMLPolyDataWriter()
+        writer.SetInputData(data)
+        writer.SetHeaderTypeToUInt64()
+        writer.SetCompressorTypeToNone()
+        writer.EncodeAppendedDataOff()
+        # VTK writes into memory and Python to the disk, so that a full disk raises OSError
+        writer.WriteToOutputStringOn()
+        writer.Write()
+        said = " ".join(f"{FIELDS[k]}={frame[k]!r}" for k in ("step", "time") if k in frame)
+        text: Any = writer.GetOutputString()
+        content = text if isinstance(text, bytes) else text.encode()
+        path.write_bytes(f"<!-- {said} -->\n".encode() + content)
+        return Left(no_step=False, notes=tuple(arrays.notes))
+
+
+def _array(name: str, values: AnyArray) -> Any:
+    """A VTK array; its name is escaped, as VTK's writer does not do it."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonCore import vtkStringArray
+
+    if values.dtype.kind == "U":
+        array = vtkStringArray()
+        array.SetNumberOfComponents(int(np.prod(values.shape[1:])))
+        for word in values.ravel().tolist():
+            array.InsertNextValue(word)
+    else:
+        table = values.reshape(len(values), int(np.prod(values.shape[1:])))
+        table = table.astype(np.uint8) if values.dtype.kind == "b" else table
+        array = numpy_to_vtk(np.ascontiguousarray(table), deep=True)  # type: ignore[no-untyped-call]
+    array.SetName(escape(name, {'"': "&quot;"}))
+    return array
+
+
+def says_all(path: Path) -> bool:
+    """Whether scanfab wrote the file; then it states the cell and the step completely."""
+    return KNOWN.encode() in first_bytes(path, HEAD)
+
+
+def packing_of(path: Path, mesh: Mesh) -> tuple[Cell | None, ContactList | None] | None:
+    """The cell and the contacts of a file that scanfab wrote; None for other files."""
+    fields = mesh.field_arrays
+    if KNOWN not in fields:
+        return None
+    cell = {name: fields[array] for name, array in FIELDS.items() if array in fields}
+    contacts = contacts_of(mesh.lines, mesh.line_arrays) if np.any(fields[KNOWN]) else None
+    return stated_cell(path, cell), contacts

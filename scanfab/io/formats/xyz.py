@@ -11,12 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from scanfab.base.errors import ReadError
-from scanfab.base.typing import Columns
+from scanfab.base.typing import AnyArray, Columns
 from scanfab.io.files import bare_name, first_bytes, leave_out_last, plain
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
 from scanfab.io.reader import Carries, Snapshot
 from scanfab.io.text import Layout, read_rows, spelt, text_of
+from scanfab.io.writer import Left, as_arrays, csv_bytes, flat
 from scanfab.packing.cell import Cell
+from scanfab.packing.packing import Packing
 
 COUNT = re.compile(rb"(?:\xef\xbb\xbf)?[ \t]*([0-9]{1,15})[ \t]*\r?\n")
 # key=value; a value with blanks is in quotes
@@ -24,6 +26,8 @@ PAIR = re.compile(r"([A-Za-z_][\w.-]*)\s*=\s*(?:\"([^\"]*)\"|([^\s\"]+))")
 PROPERTIES = re.compile(r"[^:]+:[SIRL]:[1-9][0-9]?(:[^:]+:[SIRL]:[1-9][0-9]?)*")
 # longest line with the names of columns, in bytes
 HEAD = 1 << 16
+# its letter for each of numpy's kinds
+LETTERS = {"b": "L", "i": "I", "u": "I", "f": "R", "U": "S"}
 TRUTHS = {"T": True, "F": False, "TRUE": True, "FALSE": False, "1": True, "0": False}
 POSITIONS = ("pos", "position", "positions")
 
@@ -37,15 +41,15 @@ class Head(NamedTuple):
     """Name, kind and width of each column."""
 
 
-class XyzReader(GrainsOnly):
-    """Reader plugin for extended XYZ."""
+class XyzFormat(GrainsOnly):
+    """Reader and writer plugin for extended XYZ."""
 
     name = "xyz"
     description = "extended XYZ with a radius, its cell and step; contacts in companion files"
     extensions: tuple[str, ...] = (".xyz", ".extxyz")
 
     def recognises(self, path: Path) -> bool:
-        """By a number in line 1, and in line 2 names of columns, or the ending .xyz."""
+        """Recognise the file by a number in line 1, and in line 2 names of columns, or the ending .xyz."""
         head = first_bytes(path, HEAD)
         count = COUNT.match(head)
         if count is None:
@@ -104,6 +108,34 @@ class XyzReader(GrainsOnly):
             columns["position" if is_position else name] = values if width > 1 else values[:, 0]
         return columns, _cell(path, head)
 
+    def write(self, packing: Packing, path: Path) -> Left:
+        """Write one frame; texts with blanks go into a companion file."""
+        arrays = as_arrays(packing)
+        held = {name: values for name, values in arrays.own.items() if _is_xyz(name, values)}
+        properties: list[str] = []
+        rows: Columns = {}
+        for name, values in {"pos": packing.position, **arrays.grains, **held}.items():
+            width = int(np.prod(values.shape[1:]))
+            properties.append(f"{name}:{LETTERS[values.dtype.kind]}:{width}")
+            words = np.where(values, "T", "F") if values.dtype.kind == "b" else values
+            # names with a blank cannot clash with names of other columns
+            parts = enumerate(words.reshape(len(values), width).T)
+            rows |= {f"{name} {place}": part for place, part in parts}
+        line = [f"Properties={':'.join(properties)}"]
+        if packing.time is not None:
+            line.insert(0, f"Time={packing.time!r}")
+        if packing.step is not None:
+            line.insert(0, f"Timestep={packing.step}")
+        if (cell := packing.cell) is not None:
+            vectors = " ".join(map(repr, cell.vectors.ravel().tolist()))
+            origin = " ".join(map(repr, cell.origin.tolist()))
+            along = " ".join("FT"[repeats] for repeats in cell.periodic)
+            line.insert(0, f'Lattice="{vectors}" Origin="{origin}" pbc="{along}"')
+        head = f"{len(packing)}\n{' '.join(line)}\n"
+        path.write_bytes(head.encode() + csv_bytes(rows, " ", with_names=False))
+        left = flat({name: values for name, values in arrays.own.items() if name not in held})
+        return Left(contacts=True, columns=tuple(left), notes=tuple(arrays.notes))
+
 
 def _head(path: Path, text: bytes) -> Head:
     """Parse the first two lines of a frame."""
@@ -140,3 +172,13 @@ def _cell(path: Path, head: Head) -> Cell | None:
         raise ReadError(f"{path}: pbc: expected three of T and F, found {head.words['pbc']}")
     edges = np.reshape(vectors, (3, 3))
     return cell_of(f"{path}: Lattice", edges, map(bool, periodic), origin or [0.0] * 3)
+
+
+def _is_xyz(name: str, values: AnyArray) -> bool:
+    """Whether extended XYZ can hold a column: its name and its texts must be single words."""
+    if re.search(r"[\s:\"=]", name) or not name or int(np.prod(values.shape[1:])) > 99:
+        return False
+    if name.lower() in POSITIONS or values.dtype == np.uint64:
+        return False
+    texts = values.ravel() if values.dtype.kind == "U" else ()
+    return all(text.split() == [text] for text in texts)

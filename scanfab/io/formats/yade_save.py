@@ -73,51 +73,54 @@ class SavedScene(GrainsOnly):
         return [Snapshot(path, step and int(step[1]), time and float(time[1]))]
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """The spheres with ids and masks, the cell, and the real interactions as contacts."""
-        return _read_save(snapshot.path, options)
+        """
+        The spheres with ids and masks, the cell, and the real interactions as contacts.
 
-
-def _read_save(path: Path, options: ReadOptions) -> GrainTable:
-    """Read a saved simulation; ReadError if its elements are not as YADE writes them."""
-    ids: list[float] = []
-    spheres: list[list[float]] = []
-    contacts: list[list[float]] = []
-    # a class is named at its first occurrence only, and later given by number
-    shapes: dict[str, str] = {}
-    try:
-        with open(plain(path), "rb") as stream:
-            parsed: Any = ElementTree.iterparse(stream)
-            for _, element in parsed:
-                # contacts are nested in bodies; other px elements, such as references, are left out
-                if element.tag != "px":
-                    continue
-                if element.find("iterMadeReal") is not None:
-                    row = [_number(element, name) for name in CONTACT]
-                    for vector in (next(element.iter(name), None) for name in VECTORS):
-                        row += [np.nan if vector is None else _number(vector, a) for a in "xyz"]
-                    contacts.append(row)
-                elif element.find("id") is not None and element.find("state") is not None:
-                    ids.append(_number(element, "id"))
-                    if _shape(element, shapes) == "Sphere":
-                        spheres.append([_number(element, *item) for item in SPHERE.items()])
-                else:
-                    continue
-                # free the element, so that the whole file is never in memory
-                element.clear()
-        scene = parsed.root
-        # the vectors of the cell are the columns of hSize
-        sides = [[_number(scene, f".//hSize/m{row}{k}") for row in range(3)] for k in range(3)]
-    except (ElementTree.ParseError, LookupError, ValueError, OverflowError) as error:
-        reason = f"cannot be read as a simulation that YADE saved (O.save): {error}"
-        raise ReadError(f"{path}: {reason}") from None
-    is_periodic = scene.findtext(".//isPeriodic") == "1"
-    cell = cell_of(path, sides, PERIODIC, np.zeros(3)) if is_periodic else None
-    table = np.array(spheres).reshape(-1, 7)
-    columns = dict(zip(("id", "mask", "clumpId", "radius"), table.T, strict=False))
-    if np.all(columns["clumpId"] < 0):
-        del columns["clumpId"]
-    grains = grain_table(path, {**columns, "position": table[:, 4:]}, cell, options)
-    return _with_contacts(path, grains, np.array(contacts).reshape(-1, 15), np.array(ids))
+        Raises
+        ------
+        ReadError
+            If the elements of the file are not as YADE writes them.
+        """
+        path = snapshot.path
+        ids: list[float] = []
+        spheres: list[list[float]] = []
+        contacts: list[list[float]] = []
+        # a class is named at its first occurrence only, and later given by number
+        shapes: dict[str, str] = {}
+        try:
+            with open(plain(path), "rb") as stream:
+                parsed: Any = ElementTree.iterparse(stream)
+                for _, element in parsed:
+                    # contacts are nested in bodies; other px elements (references) are left out
+                    if element.tag != "px":
+                        continue
+                    if element.find("iterMadeReal") is not None:
+                        row = [_number(element, name) for name in CONTACT]
+                        for vector in (next(element.iter(name), None) for name in VECTORS):
+                            row += [np.nan if vector is None else _number(vector, a) for a in "xyz"]
+                        contacts.append(row)
+                    elif element.find("id") is not None and element.find("state") is not None:
+                        ids.append(_number(element, "id"))
+                        if _shape(element, shapes) == "Sphere":
+                            spheres.append([_number(element, *item) for item in SPHERE.items()])
+                    else:
+                        continue
+                    # free the element, so that the whole file is never in memory
+                    element.clear()
+            scene = parsed.root
+            # the vectors of the cell are the columns of hSize
+            sides = [[_number(scene, f".//hSize/m{row}{k}") for row in range(3)] for k in range(3)]
+        except (ElementTree.ParseError, LookupError, ValueError, OverflowError) as error:
+            reason = f"cannot be read as a simulation that YADE saved (O.save): {error}"
+            raise ReadError(f"{path}: {reason}") from None
+        is_periodic = scene.findtext(".//isPeriodic") == "1"
+        cell = cell_of(path, sides, PERIODIC, np.zeros(3)) if is_periodic else None
+        table = np.array(spheres).reshape(-1, 7)
+        columns = dict(zip(("id", "mask", "clumpId", "radius"), table.T, strict=False))
+        if np.all(columns["clumpId"] < 0):
+            del columns["clumpId"]
+        grains = grain_table(path, {**columns, "position": table[:, 4:]}, cell, options)
+        return _with_contacts(path, grains, np.array(contacts).reshape(-1, 15), np.array(ids))
 
 
 def _shape(body: ElementTree.Element, shapes: dict[str, str]) -> str | None:
@@ -200,7 +203,7 @@ def cell_beside(path: Path, position: FloatArray) -> Cell | None:
         edges = corners[list(ENDS)] - corners[ORIGIN]
         cell = cell_of(file, edges, PERIODIC, corners[ORIGIN])
     else:
-        cell = _read_save(file, ReadOptions()).cell
+        cell = SavedScene().read_grains(Snapshot(file), ReadOptions()).cell
     if cell is None:
         return None
     fractions = cell.fractional(position)

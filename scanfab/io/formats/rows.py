@@ -1,12 +1,18 @@
-"""Write packings as text dumps and data files of LAMMPS."""
+"""
+Write packings with a row for each sphere: CSV, TSV, Parquet, and LAMMPS.
+
+LAMMPS reads text dumps and data files.
+"""
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
 
-from scanfab.base.typing import AnyArray, FloatArray
+from scanfab.base.typing import AnyArray, Columns, FloatArray
+from scanfab.io.formats.table import FRAME_NAMES, plain_name
 from scanfab.io.writer import Left, csv_bytes, more_columns, table_columns
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
@@ -19,6 +25,55 @@ TURNED = (
     "LAMMPS cannot store this cell, as its first vector is not along x, or its second not in the "
     "plane x-y: the box in the file is the box around the cell"
 )
+
+
+class CsvWriter:
+    """Tables with commas between the values."""
+
+    name = "csv"
+    description = "a table of spheres with commas; contacts and cell in companion files"
+    extensions: tuple[str, ...] = (".csv",)
+    separator = ","
+
+    def write(self, packing: Packing, path: Path) -> Left:
+        """Write one frame; a column that numbers frames (`time`) goes into a companion file."""
+        known, own, notes = table_columns(packing)
+        numbers = {name: values for name, values in own.items() if values.dtype.kind in "iuf"}
+        times = {k: values for k, values in numbers.items() if plain_name(k) in FRAME_NAMES}
+        left = {k for k, values in times.items() if len(np.unique(values)) > 1}
+        held = {name: own[name] for name in own if name not in left}
+        path.write_bytes(self.table({**known, **held}))
+        columns = tuple(name for name in own if name in left)
+        return Left(contacts=True, frame=True, columns=columns, notes=tuple(notes))
+
+    def table(self, columns: Columns) -> bytes:
+        """The bytes of the file."""
+        return csv_bytes(columns, self.separator)
+
+
+class TsvWriter(CsvWriter):
+    """Tables with tabs between the values."""
+
+    name = "tsv"
+    description = "a table of spheres with tabs; contacts and cell in companion files"
+    extensions = (".tsv",)
+    separator = "\t"
+
+
+class ParquetWriter(CsvWriter):
+    """Apache Parquet."""
+
+    name = "parquet"
+    description = "a table of spheres as Apache Parquet; contacts and cell in companion files"
+    extensions = (".parquet",)
+
+    def table(self, columns: Columns) -> bytes:
+        """The bytes of the file."""
+        import polars
+
+        stream = io.BytesIO()
+        polars.DataFrame(columns).write_parquet(stream)
+        return stream.getvalue()
 
 
 class LammpsDumpWriter:

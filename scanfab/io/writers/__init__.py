@@ -1,1 +1,0 @@
-"""Writer plugins for packings."""
