@@ -28,7 +28,7 @@ def map(sources: tuple[str, ...], frame: int | None, **chosen: Any) -> int:
     its blocks scatter more than their errors explain.
     """
     from scanfab.cli.rows import write_table
-    from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings
+    from scanfab.pipeline.map_settings import BLOCK_OPTIONS, MapSettings
 
     if all(chosen[name] is None for name in BLOCK_OPTIONS):
         # discs have no map, so do not ask for blocks first

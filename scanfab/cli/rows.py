@@ -14,7 +14,7 @@ from scanfab.cli.console import announce, draw, is_readable, print_csv, print_ta
 from scanfab.cli.options import checked, excerpt_of, open_series, take_output, usage_errors
 from scanfab.cli.settings_file import as_listed
 from scanfab.cli.signals import ending_in_order, telling
-from scanfab.pipeline.maps.settings import MapSettings
+from scanfab.pipeline.map_settings import MapSettings
 from scanfab.pipeline.options import Output, as_options
 from scanfab.pipeline.settings import Settings
 

@@ -28,7 +28,7 @@ from scanfab.packing.sample import Sample
 from scanfab.pipeline.cluster import DaskExecutor, DeadWorkersError
 from scanfab.pipeline.frame import FrameResult, compute_frame
 from scanfab.pipeline.frames import Frames, Source, Unread, doubts_of_frame
-from scanfab.pipeline.maps.settings import MapSettings
+from scanfab.pipeline.map_settings import MapSettings
 from scanfab.pipeline.plan import Plan, make_plan, plan_without_grains
 from scanfab.pipeline.series_notes import Facts, SeriesNotes
 from scanfab.pipeline.settings import Settings

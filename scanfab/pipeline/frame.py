@@ -24,7 +24,7 @@ from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample, Variant
 from scanfab.packing.search import near_pairs
 from scanfab.pipeline.frames import packing_of, sample_rule
-from scanfab.pipeline.maps.rows import map_rows
+from scanfab.pipeline.map_rows import map_rows
 from scanfab.pipeline.measurement import (
     Measurement,
     blocked_sums,

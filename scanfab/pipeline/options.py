@@ -16,7 +16,7 @@ from scanfab.base.option import option, options_of, reading, running
 from scanfab.io.files import without_temporary
 from scanfab.io.options import READING_OPTIONS
 from scanfab.io.writer import installed_writers
-from scanfab.pipeline.maps.settings import MapSettings
+from scanfab.pipeline.map_settings import MapSettings
 from scanfab.pipeline.settings import Settings
 
 

@@ -15,8 +15,8 @@ from scanfab.base.space import SPACE, Space
 from scanfab.packing.doubts import refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
-from scanfab.pipeline.maps.blocks import MapBlocks
-from scanfab.pipeline.maps.settings import MapSettings
+from scanfab.pipeline.map_blocks import MapBlocks
+from scanfab.pipeline.map_settings import MapSettings
 from scanfab.pipeline.rv import RV, Deformation, doubts_of_rv, in_sample, rvs_of
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import Strains

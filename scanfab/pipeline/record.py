@@ -37,7 +37,7 @@ from scanfab.io.files import without_temporary
 from scanfab.io.options import READING_OPTIONS
 from scanfab.io.series import Series
 from scanfab.io.sources import READING, open_sources
-from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
+from scanfab.pipeline.map_settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import SHAPES, STRAIN_MODES, as_written
 from scanfab.table.columns import row_of

@@ -1,15 +1,24 @@
-"""The grids of scan lines: a triad for each axis, turned and shifted at random in a replicate."""
+"""
+The grids of scan lines, and a few lines cut into their solid and void segments.
+
+Each axis has a triad; in a replicate it is turned, and its grid is shifted, at random. Segments are
+exact: the chords of a line are sorted.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
+from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.space import SPACE, Space
-from scanfab.base.typing import FloatArray
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
+from scanfab.scan.kernels.strips import spans
+from scanfab.scan.solids import clip_of
 
 
 def line_triads(axes: FloatArray, space: Space = SPACE) -> FloatArray:
@@ -89,4 +98,159 @@ def _random_rotation(random: np.random.Generator) -> FloatArray:
             [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """Pieces of scan lines; lengths in the dump's unit, positions with the spheres' origin."""
+
+    ends: FloatArray
+    """Both end points, shape (K, 2, 3)."""
+    void: BoolArray
+    """Whether a piece lies outside all solids, shape (K,)."""
+    line: IntArray
+    """Number of the line that a piece belongs to, shape (K,)."""
+
+    @property
+    def length(self) -> FloatArray:
+        """Length of each piece, shape (K,)."""
+        length: FloatArray = np.linalg.norm(self.ends[:, 1] - self.ends[:, 0], axis=1)
+        return length
+
+    @classmethod
+    def concatenate(cls, parts: Iterable[Segments]) -> Segments:
+        """Join the pieces of several sets of lines; line numbers go on from set to set."""
+        ends, void, line, first = [np.zeros((0, 2, 3))], [np.zeros(0, bool)], [np.arange(0)], 0
+        for part in parts:
+            ends.append(part.ends)
+            void.append(part.void)
+            line.append(part.line + first)
+            first += int(part.line.max(initial=-1)) + 1
+        return cls(np.concatenate(ends), np.concatenate(void), np.concatenate(line))
+
+
+def cut_lines(
+    position: FloatArray,
+    radius: FloatArray,
+    triad: FloatArray,
+    points: FloatArray,
+    window: Convex | None = None,
+) -> Segments:
+    """
+    Cut parallel lines into solid and void segments.
+
+    This is for figures of hundreds of lines; a scan cuts millions of lines by kernels.
+
+    Parameters
+    ----------
+    position : ndarray, shape (N, 3)
+        Centres of the solids; the window, if there is one, lies about the origin.
+    radius : ndarray, shape (N,)
+        Radii of the solids, dump's length unit.
+    triad : ndarray, shape (3, 3)
+        Orthonormal rows u, v, n; the lines run along n.
+    points : ndarray, shape (L, 2)
+        Coordinates u and v of the points where the lines pass the plane through the origin.
+    window : Convex, optional
+        Window that clips the lines: its surface bounds the first and the last segment. Without a
+        window, a line runs from its first to its last solid.
+
+    Returns
+    -------
+    Segments
+        Pieces in the order of the lines, and along each line.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab import sphere
+    >>> from scanfab.scan.lines import cut_lines
+    >>> cut_lines(np.zeros((1, 3)), np.ones(1), np.eye(3), np.zeros((1, 2)), sphere(3.0)).length
+    array([2., 2., 2.])
+    """
+    across, depth = position @ triad[:2].T, position @ triad[2]
+    ends, void, line = [np.zeros((0, 2, 3))], [np.zeros(0, bool)], [np.arange(0)]
+    clips = np.empty_like(points)
+    if window is not None:
+        spans(clip_of(window), np.ascontiguousarray(triad), np.ascontiguousarray(points), clips)
+    for number, point in enumerate(points):
+        square = radius**2 - np.sum((across - point) ** 2, axis=1)
+        hit = square > 0
+        half = np.sqrt(square[hit])
+        clip = None if window is None else clips[number]
+        bounds, is_void = _cut(depth[hit] - half, depth[hit] + half, clip)
+        places = np.empty((*bounds.shape, 3))
+        places[..., :2], places[..., 2] = point, bounds
+        ends.append(places @ triad)
+        void.append(is_void)
+        line.append(np.full(len(bounds), number))
+    return Segments(np.concatenate(ends), np.concatenate(void), np.concatenate(line))
+
+
+def _cut(
+    start: FloatArray, stop: FloatArray, clip: FloatArray | None
+) -> tuple[FloatArray, BoolArray]:
+    """
+    Solid and void pieces of one line, (K, 2) bounds and (K,) flags, from its chords.
+
+    ``clip`` holds where the line enters and leaves a window, NaN if it misses the window.
+    """
+    if clip is not None:
+        # everything outside the window counts as solid
+        start = np.concatenate([[-np.inf, clip[1]], start])
+        stop = np.concatenate([[clip[0], np.inf], stop])
+    if len(start) == 0 or (clip is not None and np.isnan(clip[0])):
+        return np.zeros((0, 2)), np.zeros(0, bool)
+    order = np.argsort(start)
+    start, stop = start[order], np.maximum.accumulate(stop[order])
+    gap = np.flatnonzero(start[1:] > stop[:-1])
+    # solid runs alternate with gaps
+    bounds = np.concatenate([start[:1], np.column_stack([stop[gap], start[gap + 1]]).ravel()])
+    bounds = np.concatenate([bounds, stop[-1:]])
+    if clip is not None:
+        bounds = np.clip(bounds, *clip)
+    pieces = np.column_stack([bounds[:-1], bounds[1:]])
+    is_void = np.arange(len(pieces)) % 2 == 1
+    some = pieces[:, 1] > pieces[:, 0]
+    return pieces[some], is_void[some]
+
+
+def grid_points(reach: float, lines: int, space: Space = SPACE) -> FloatArray:
+    """
+    A square grid of about so many points in a circle of this radius, shape (L, 2).
+
+    In a plane the points lie on a line.
+    """
+    if space.is_plane:
+        steps = reach * (2.0 * (np.arange(lines) + 0.5) / lines - 1.0)
+        return np.column_stack([steps, np.zeros(lines)])
+    spacing = reach * np.sqrt(np.pi / lines)
+    steps = np.arange(-np.floor(reach / spacing), np.floor(reach / spacing) + 1) * spacing
+    points = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+    inside: FloatArray = points[np.linalg.norm(points, axis=1) < reach]
+    return inside
+
+
+def sample_segments(
+    position: FloatArray,
+    radius: FloatArray,
+    triads: FloatArray,
+    lines: int,
+    window: Convex | None = None,
+    space: Space = SPACE,
+) -> Segments:
+    """
+    Cut about so many lines, in a grid for each of several line triads (D, 3, 3).
+
+    The parameters are those of :func:`cut_lines`. In a plane its normal is each triad's second row.
+    """
+    reach = 0.0 if window is None else window.reach
+    if window is None and len(position):
+        reach = float((np.linalg.norm(position, axis=1) + radius).max())
+    if reach == 0:
+        return Segments.concatenate([])
+    points = grid_points(reach, max(lines // len(triads), 1), space)
+    return Segments.concatenate(
+        cut_lines(position, radius, triad, points, window) for triad in triads
     )

@@ -16,7 +16,7 @@ from scanfab.io.options import take_reading
 from scanfab.io.series import Series
 from scanfab.io.sources import READING, open_sources
 from scanfab.pipeline.job import Job
-from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
+from scanfab.pipeline.map_settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.options import listening
 from scanfab.pipeline.settings import Settings
 from scanfab.table.table import Table, load

@@ -16,7 +16,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import Window
 from scanfab.scan.blocks import Blocks
-from scanfab.scan.segments import Segments
+from scanfab.scan.lines import Segments
 from scanfab.viz.scene import Grains, inside
 
 SOLID, DROPPED, KEPT = 0, 1, 2

@@ -16,11 +16,10 @@ from scanfab.base.files import check_folder, whole_file
 from scanfab.fabric.distribution import direction_points, mean_length_function
 from scanfab.packing.sample import VARIANTS
 from scanfab.pipeline.frame import FrameResult
-from scanfab.pipeline.maps.settings import MapSettings
+from scanfab.pipeline.map_settings import MapSettings
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.settings import Settings
-from scanfab.scan.lines import line_triads
-from scanfab.scan.segments import Segments, sample_segments
+from scanfab.scan.lines import Segments, line_triads, sample_segments
 from scanfab.table.row import Row, number_of
 from scanfab.table.table import Table
 from scanfab.viz.scene import grains_of

@@ -22,7 +22,7 @@ from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import Strains, shear_strain
 from scanfab.pipeline.values import Vector
-from scanfab.scan.segments import Segments, cut_lines
+from scanfab.scan.lines import Segments, cut_lines
 from scanfab.table.curves import SAME, frame_strain_column
 
 # Angle between the lines of a section and the plane across the axis, degrees.

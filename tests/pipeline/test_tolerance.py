@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scanfab import Cell, Packing, ScanfabWarning, Settings, SettingsError, compute, find_contacts
-from scanfab.pipeline.maps.settings import MapSettings
+from scanfab.pipeline.map_settings import MapSettings
 from scanfab.scan.directions import AUTO_RULE, direction_rule
 from tests.helpers.lattices import shaken_cubic
 

@@ -1,10 +1,80 @@
-"""The triads of scan lines."""
+"""The triads of scan lines, and lines cut exactly: against the naive twin and closed forms."""
+
+from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from scanfab import direction_rule
-from scanfab.scan.lines import line_triads
+from scanfab.base.shapes import sphere
+from scanfab.scan.lines import Segments, cut_lines, grid_points, line_triads, sample_segments
+from tests.helpers import naive
+from tests.helpers.lattices import shaken_cubic
+
+
+@pytest.fixture
+def spheres():
+    random = np.random.default_rng(5)
+    packing = shaken_cubic(random, 4)
+    # overlap, and one grain inside another
+    radius = packing.radius * random.uniform(0.4, 1.4, len(packing.radius))
+    return packing.position - packing.position.mean(axis=0), radius
+
+
+@pytest.mark.parametrize("window", [0.0, 1.5])
+def test_void_segments_are_those_of_the_naive_twin(spheres, window):
+    position, radius = spheres
+    triad = line_triads(np.array([[0.3, -0.5, np.sqrt(0.66)]]))[0]
+    points = grid_points(2.0, 60)
+    found = cut_lines(position, radius, triad, points, sphere(window) if window else None)
+    for number, point in enumerate(points):
+        chords = naive.chords(position, radius, point @ triad[:2], triad[2])
+        solids = naive.union(chords)
+        if window:
+            half2 = window**2 - point @ point
+            half = np.sqrt(max(half2, 0.0))
+            expected = naive.gaps_within(solids, -half, half) if half2 > 0 else []
+        else:
+            expected = naive.gaps_between(solids)
+        lengths = found.length[(found.line == number) & found.void]
+        assert lengths == pytest.approx(naive.lengths(expected), abs=1e-12)
+
+
+def test_pieces_of_a_line_join_and_alternate(spheres):
+    found = cut_lines(*spheres, np.eye(3), np.array([[0.1, 0.2]]), sphere(1.5))
+    assert found.ends[1:, 0] == pytest.approx(found.ends[:-1, 1])
+    assert np.all(found.void[1:] != found.void[:-1])
+    assert found.length.sum() == pytest.approx(2 * np.sqrt(1.5**2 - 0.05))
+
+
+def test_ends_lie_on_the_line(spheres):
+    triad = line_triads(np.array([[0.0, 0.6, 0.8]]))[0]
+    found = cut_lines(*spheres, triad, np.array([[0.25, -0.5]]), sphere(1.5))
+    assert found.ends @ triad[0] == pytest.approx(np.full(found.ends.shape[:2], 0.25))
+    assert found.ends @ triad[1] == pytest.approx(np.full(found.ends.shape[:2], -0.5))
+
+
+def test_an_empty_window_is_one_segment():
+    found = cut_lines(np.zeros((0, 3)), np.zeros(0), np.eye(3), np.zeros((1, 2)), sphere(2.0))
+    assert found.length.tolist() == [4.0]
+    assert found.void.all()
+
+
+@pytest.mark.parametrize("points", [np.zeros((0, 2)), np.array([[5.0, 0.0]])])
+def test_lines_that_meet_nothing_have_no_pieces(points):
+    assert len(cut_lines(np.zeros((1, 3)), np.ones(1), np.eye(3), points).length) == 0
+    assert len(cut_lines(np.zeros((1, 3)), np.ones(1), np.eye(3), points, sphere(2.0)).length) == 0
+
+
+def test_lines_of_several_directions_are_numbered_on(spheres):
+    found = sample_segments(*spheres, line_triads(np.eye(3)), 90, sphere(1.5))
+    numbers = np.unique(found.line)
+    assert numbers.tolist() == list(range(len(numbers)))
+    assert 60 < len(numbers) < 120
+
+
+def test_nothing_to_cut_is_no_segment():
+    assert len(sample_segments(np.zeros((0, 3)), np.zeros(0), np.eye(3)[None], 9).length) == 0
+    assert len(Segments.concatenate([]).length) == 0
 
 
 def test_triads_are_orthonormal_and_right_handed():

@@ -44,7 +44,7 @@ class EsysReader(GrainsOnly):
     extensions: tuple[str, ...] = (".txt",)
 
     def recognises(self, path: Path) -> bool:
-        """Recognise the file by the header; one byte is checked first, because a header may be long."""
+        """Recognised by the header; one byte is checked first, because a header may be long."""
         return first_bytes(path, 2)[:1] == b"V" and bool(HEADER.match(first_bytes(path, LONGEST)))
 
     def snapshots(self, path: Path) -> list[Snapshot]:

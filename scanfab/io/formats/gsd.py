@@ -34,7 +34,7 @@ class GsdReader(GrainsOnly):
     requires = ("gsd", '"scanfab[gsd]"')
 
     def recognises(self, path: Path) -> bool:
-        """Recognise the file by the first bytes."""
+        """Recognised by the first bytes."""
         return first_bytes(path, len(MAGIC)) == MAGIC
 
     def names(self, path: Path) -> list[str]:

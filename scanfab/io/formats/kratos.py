@@ -45,7 +45,7 @@ class KratosReader(GrainsOnly):
     has_cell: Carries = "nothing"
 
     def recognises(self, path: Path) -> bool:
-        """Recognise the file by the blocks of ``.mdpa``, or the datasets in the groups of an HDF5 file."""
+        """Recognised by the blocks of ``.mdpa``, or the datasets in the groups of an HDF5 file."""
         head = first_bytes(path)
         if is_hdf(head):
             return bool(_groups(path))

@@ -74,7 +74,7 @@ class LammpsReader(FormsReader):
     """Whether the program lists contacts with walls, which are recognised by their values."""
 
     def recognises(self, path: Path) -> bool:
-        """Recognise the file by marks that only one of both programs writes."""
+        """Recognised by marks that only one of both programs writes."""
         head = first_bytes(path)
         first, _, rest = head.partition(b"\n")
         if head.startswith(b"# vtk DataFile"):

@@ -43,7 +43,7 @@ class DataFile(GrainsOnly):
     has_cell: Carries = "box"
 
     def recognises(self, path: Path) -> bool:
-        """Recognise the file by the first line, or by the number of atoms and the box below it."""
+        """Recognised by the first line, or by the number of atoms and the box below it."""
         head = first_bytes(path)
         has_both = ATOMS.search(head) is not None and BOX.search(head) is not None
         return has_both or head.startswith(b"LAMMPS data file")

@@ -37,7 +37,7 @@ class LfDemReader(shared.GrainsOnly):
     extensions: tuple[str, ...] = (".dat",)
 
     def recognises(self, path: Path) -> bool:
-        """Recognise the file by the first line."""
+        """Recognised by the first line."""
         return first_bytes(path).startswith(b"# LF_DEM version")
 
     def kind(self, path: Path) -> FileKind:

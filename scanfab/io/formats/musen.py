@@ -38,7 +38,7 @@ class MusenReader(GrainsOnly):
     extensions: tuple[str, ...] = (".txt",)
 
     def recognises(self, path: Path) -> bool:
-        """Recognise the file by the first properties of the first row."""
+        """Recognised by the first properties of the first row."""
         return OBJECT.match(first_bytes(path)) is not None
 
     def snapshots(self, path: Path) -> list[Snapshot]:

@@ -48,7 +48,7 @@ class OnDemReader(GrainsOnly):
     lists_contacts = True
 
     def recognises(self, path: Path) -> bool:
-        """Recognise the file by the groups VTKHDF and ONDEM."""
+        """Recognised by the groups VTKHDF and ONDEM."""
         if not is_hdf(first_bytes(path, 8)):
             return False
         return {"ONDEM", "VTKHDF"} <= read_hdf_file(path, with_data=False).attributes.keys()

@@ -259,7 +259,7 @@ class NpzFormat(GrainsOnly):
     lists_contacts = True
 
     def recognises(self, path: Path) -> bool:
-        """Recognise the file by the array `MARK`, or by the first line of a companion file."""
+        """Recognised by the array `MARK`, or by the first line of a companion file."""
         if first_bytes(path, 2) != IS_NPZ:
             return companion_kind(path) is not None
         with suppress(ReadError):

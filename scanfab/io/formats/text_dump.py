@@ -53,7 +53,7 @@ class TextDump(shared.GrainsOnly):
     """Reads text dumps, for the readers of both programs."""
 
     def recognises(self, path: Path) -> bool:
-        """Recognise the file by the first words of the file."""
+        """Recognised by the first words of the file."""
         head = first_bytes(path)
         is_yaml = YAML_MARK.match(head) is not None and b"creator: LAMMPS" in head[:100]
         return is_yaml or head.startswith(b"ITEM: ")

@@ -49,7 +49,7 @@ class XyzFormat(GrainsOnly):
     extensions: tuple[str, ...] = (".xyz", ".extxyz")
 
     def recognises(self, path: Path) -> bool:
-        """Recognise the file by a number in line 1, and in line 2 names of columns, or the ending .xyz."""
+        """Recognised by a number in line 1, and in line 2 names of columns, or the ending .xyz."""
         head = first_bytes(path, HEAD)
         count = COUNT.match(head)
         if count is None:

@@ -34,7 +34,7 @@ class TextExport(GrainsOnly):
     name = "yade's text"
 
     def recognises(self, path: Path) -> bool:
-        """Recognise the file by the first line of the file."""
+        """Recognised by the first line of the file."""
         return first_bytes(path).startswith(TEXT_HEADS)
 
     def carries(self, path: Path) -> Carries:
@@ -90,7 +90,7 @@ class YadeReader(FormsReader):
     forms = (TextExport(), SavedScene(), YadeVtk())
 
     def recognises(self, path: Path) -> bool:
-        """Recognise the file by YADE's own first lines, or by an array of VTKRecorder's interactions."""
+        """Recognised by YADE's own first lines, or by an array of VTKRecorder's interactions."""
         head = first_bytes(path)
         is_recorded = b"<VTKFile" in head and RECORDED in head
         is_vtk = is_recorded or head.startswith(EXPORTER_HEAD)

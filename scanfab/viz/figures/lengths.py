@@ -82,8 +82,7 @@ class Histogram(OnePanel):
 def _lengths_of(frame: ScannedFrame) -> FloatArray:
     """Lengths of void segments on lines in even directions, tens of thousands of them."""
     # loaded here, as other figures do without compiled kernels
-    from scanfab.scan.lines import line_triads
-    from scanfab.scan.segments import sample_segments
+    from scanfab.scan.lines import line_triads, sample_segments
 
     points, _ = direction_points(frame.space)
     some = points[: len(points) // 2 : 5 if frame.space.is_plane else 20]

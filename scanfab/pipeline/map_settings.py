@@ -48,7 +48,7 @@ class MapSettings(Settings):
 
     Examples
     --------
-    >>> from scanfab.pipeline.maps.settings import MapSettings
+    >>> from scanfab.pipeline.map_settings import MapSettings
     >>> MapSettings(grid="2,3,4").rows_per_frame
     24
     """

@@ -15,7 +15,7 @@ from scanfab.fabric.distribution import direction_points
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import Window
-from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings
+from scanfab.pipeline.map_settings import BLOCK_OPTIONS, MapSettings
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.lines import line_triads
 

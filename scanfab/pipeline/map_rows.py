@@ -21,7 +21,7 @@ from scanfab.fabric.tensor import FabricTensor, axial, tensor_values
 from scanfab.fabric.void import BlockFabrics, block_fabrics
 from scanfab.packing.sample import VARIANTS, Sample, Variant
 from scanfab.packing.window import Window
-from scanfab.pipeline.maps.blocks import near_surface, volumes_inside
+from scanfab.pipeline.map_blocks import near_surface, volumes_inside
 from scanfab.pipeline.measurement import (
     coarse_spacing,
     doubts_of_lines,

@@ -1,1 +1,0 @@
-"""Maps: the fabric block by block."""
