@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scanfab import direction_rule
 from scanfab.base.shapes import sphere
 from scanfab.scan.lines import Segments, cut_lines, grid_points, line_triads, sample_segments
 from tests.helpers import naive

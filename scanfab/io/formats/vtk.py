@@ -63,7 +63,7 @@ class VtkReader(GrainsOnly):
     sign: float | None = None
 
     def recognises(self, path: Path) -> bool:
-        """Recognised by the first line of legacy VTK, the root element of XML, or the type in VTKHDF."""
+        """Recognised by legacy VTK's first line, the root element of XML, or the type in VTKHDF."""
         return form_of(path) is not None
 
     def kind(self, path: Path) -> FileKind:
