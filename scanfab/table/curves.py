@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from scanfab.base.typing import FloatArray
-from scanfab.table.row import Rows, column_of, groups_of, number_of, numbers_of, total_error
+from scanfab.table.row import Rows, column_of, groups_of, number_of, numbers_of, total_errors
 
 # columns of strains, each with its name and its symbol in figures
 STRAINS = {
@@ -63,7 +63,7 @@ class Curve:
         """
         if name == "alpha_c_axial" and self.contact_alone:
             return self.errors("alpha_c_axial_se")
-        errors = np.array([total_error(row, name) for row in self.rows], np.float64)
+        errors = total_errors(self.rows, name)
         return np.where(errors < 0, np.nan, _drawable(errors))
 
     @property

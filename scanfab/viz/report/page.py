@@ -14,8 +14,7 @@ from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder
 from scanfab.base.typing import FloatArray
-from scanfab.viz.figures.figure import Figure
-from scanfab.viz.figures.page import drawn_page
+from scanfab.viz.figures.figure import Figure, drawn_page
 from scanfab.viz.figures.style import COLOURS, figure_bytes
 from scanfab.viz.scene import SHADES, Scene, towards_viewer
 

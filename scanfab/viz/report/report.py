@@ -26,17 +26,9 @@ from scanfab.table.curves import spelt_strain, strain_column
 from scanfab.table.formats import read_rows
 from scanfab.table.row import numbers_of
 from scanfab.table.selection import MAP, choose_rows
-from scanfab.viz.figures.page import make_figures
-from scanfab.viz.report.caveats import caveats_of
+from scanfab.viz.figures.figure import make_figures
+from scanfab.viz.report import tables as words
 from scanfab.viz.report.page import Picture, check_page_file, picture_of, render_page, view_data
-from scanfab.viz.report.tables import (
-    block_table,
-    frame_table,
-    input_table,
-    overview,
-    results_tables,
-    settings_table,
-)
 from scanfab.viz.scanned_frames import ScannedFrames
 from scanfab.viz.scene import Look, look_at
 
@@ -177,18 +169,18 @@ def make_report(
         pictures += section["shown"]["pictures"] if section["shown"] else []
     every = [row for one in inputs for row in one.rows]
     asked = [one.manifest["settings"] for one in inputs if one.manifest is not None]
-    doubts = [*told.warnings, *of_sources.warnings, *map(as_options, caveats_of(rows, asked))]
+    doubts = [*told.warnings, *of_sources.warnings, *map(as_options, words.caveats_of(rows, asked))]
     page = render_page(
         title=title or _usual_title(every),
         author=author,
         date=(today or datetime.now(UTC).astimezone().date()).isoformat(),
-        summary=[overview(one.path, one.rows) for one in inputs],
-        results=results_tables(comparison.summary, rows),
+        summary=[words.overview(one.path, one.rows) for one in inputs],
+        results=words.results_tables(comparison.summary, rows),
         pictures=pictures,
         warnings=list(dict.fromkeys(doubts)),
         notes=list(dict.fromkeys([*told.notes, *of_sources.notes])),
         sections=sections,
-        frames=[*([frame_table(rows)] if rows else []), *map(block_table, maps)],
+        frames=[*([words.frame_table(rows)] if rows else []), *map(words.block_table, maps)],
     )
     return Report(page, any(row["alpha_vs_axial"] is not None for row in every))
 
@@ -255,9 +247,9 @@ def _section(one: Input, told: Told) -> dict[str, Any]:
     return {
         **section,
         "command": repeat_command(asked, one.path.name, [str(name) for name in overridden]),
-        "settings": settings_table(asked),
+        "settings": words.settings_table(asked),
         "versions": [(str(k), str(v)) for k, v in (one.manifest.get("versions") or {}).items()],
-        "inputs": input_table(one.manifest),
+        "inputs": words.input_table(one.manifest),
     }
 
 

@@ -1,7 +1,13 @@
-"""The figures histogram and cutoffs: how long the void segments are, and what a cut-off does."""
+"""
+The figures histogram, cutoffs and calibration: what the settings of a scan do to its results.
+
+They show the lengths of void segments, and the void anisotropy over the cut-off and over the
+settings that a calibration tries.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -9,18 +15,37 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase
 
+from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.distribution import direction_points
-from scanfab.table.row import column_of, total_error
-from scanfab.viz.figures.figure import FrameFigure
-from scanfab.viz.figures.style import COLUMN, FRAME_LOOKS, LABELS, band, widen
+from scanfab.table.curves import short_names
+from scanfab.table.row import column_of, numbers_of, total_error, total_errors
+from scanfab.viz.figures.figure import Figure, FrameFigure
+from scanfab.viz.figures.style import (
+    COLUMN,
+    FRAME_LOOKS,
+    LABELS,
+    LOOKS,
+    WIDTH,
+    band,
+    plain,
+    widen,
+)
 
 if TYPE_CHECKING:
     from scanfab.viz.scanned_frames import ScannedFrame
 
+ALPHA = "alpha_vs_axial"
 LINES = 6_000
 # cut-offs that are drawn, in units of the smallest radius
 CUTOFFS = (0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0)
+# For each ladder: label of the x axis, whether it is logarithmic, and the value in the 2017 paper.
+PANELS: dict[str, tuple[str, bool, float | None]] = {
+    "spacing": ("spacing of lines $s/r_{min}$", True, 0.1),
+    "directions": ("number of directions", True, None),
+    "cutoff": ("cut-off $c/r_{min}$", False, 1.0),
+    "rv": ("RV radius / half extent", False, 0.67),
+}
 
 
 class OnePanel(FrameFigure):
@@ -95,19 +120,18 @@ def _lengths_of(frame: ScannedFrame) -> FloatArray:
 
 
 class CutoffCurve(NamedTuple):
-    """Anisotropy of one frame over the cut-off, which is in units of the smallest radius."""
+    """Void anisotropy of one frame over the cut-off."""
 
     title: str
-    cutoff: FloatArray
-    alpha: FloatArray
-    """alpha_vs_axial, dimensionless."""
-    error: FloatArray
-    """The scan's part of its standard error."""
-    total: FloatArray
-    """Standard error of scan and sample together; NaN if one of them is not known."""
     chosen: float
-    predicted: FloatArray
-    """alpha_vs_axial as predicted from near contacts; NaN if there is no prediction."""
+    """The cut-off of the table, in units of the smallest radius."""
+    rows: list[dict[str, Any]]
+    """
+    A row for each cut-off, with the columns of the table.
+
+    ``value`` is the cut-off in units of the smallest radius, ``predicted`` the alpha_vs_axial that
+    near contacts predict.
+    """
 
 
 class Cutoffs(OnePanel):
@@ -143,20 +167,31 @@ class Cutoffs(OnePanel):
     def draw(self, ax: Axes) -> None:
         """Draw a curve for each frame, and the cut-off of the table."""
         for one, look in zip(self.curves, FRAME_LOOKS, strict=False):
-            band(ax, one.cutoff, 1e3 * one.alpha, 1e3 * one.total, look)
-            error = 1e3 * np.nan_to_num(one.error)
-            ax.errorbar(one.cutoff, 1e3 * one.alpha, error, label=one.title, elinewidth=0.9, **look)
-            ax.plot(one.cutoff, 1e3 * one.predicted, color=look["color"], lw=1.2, ls="-.")
-        if any(np.isfinite(one.predicted).any() for one in self.curves):
+            draw_alpha(ax, one.rows, look, one.title)
+            x, predicted = (column_of(one.rows, name) for name in ("value", "predicted"))
+            ax.plot(x, 1e3 * predicted, color=look["color"], lw=1.2, ls="-.")
+        if any(numbers_of(one.rows, "predicted") for one in self.curves):
             ax.plot([], [], color="0.3", lw=1.2, ls="-.", label="predicted from near contacts")
         ax.axvline(self.curves[-1].chosen, color="k", lw=0.9, ls=":", label="cut-off of the table")
         ax.axhline(0, color="0.6", lw=0.6, zorder=0)
-        ax.set(xlabel=r"cut-off / $r_{min}$", ylabel=LABELS["alpha_vs_axial"])
+        ax.set(xlabel=r"cut-off / $r_{min}$", ylabel=LABELS[ALPHA])
         widen(ax, 1.0)
-        hole = any((np.isfinite(one.alpha) & ~np.isfinite(one.total)).any() for one in self.curves)
+        hole = any(lacks_errors(one.rows) for one in self.curves)
         without = "\n(none where either is not known)" if hole else ""
         note = f"bands: one total standard error, scan and sample{without}\nbars: the scan's part"
         ax.legend(title=note)
+
+
+def draw_alpha(ax: Axes, rows: Sequence[Any], look: dict[str, Any], label: str) -> None:
+    """Draw void anisotropy over ``value``, with bands of total errors, and bars for the scan."""
+    x, alpha, scan = (column_of(rows, name) for name in ("value", ALPHA, f"{ALPHA}_se"))
+    band(ax, x, 1e3 * alpha, 1e3 * total_errors(rows, ALPHA), look)
+    ax.errorbar(x, 1e3 * alpha, 1e3 * np.nan_to_num(scan), label=label, elinewidth=0.9, **look)
+
+
+def lacks_errors(rows: Sequence[Any]) -> bool:
+    """Whether a row has a void anisotropy without a total error."""
+    return any(numbers_of([row], ALPHA) and total_error(row, ALPHA) is None for row in rows)
 
 
 def _curve_of(frame: ScannedFrame) -> CutoffCurve:
@@ -166,16 +201,78 @@ def _curve_of(frame: ScannedFrame) -> CutoffCurve:
     from scanfab.pipeline.frame import VariantColumns
 
     smallest, chosen = frame.smallest, frame.measurement.plan.cutoff
-    lengths = {*(cutoff * smallest for cutoff in CUTOFFS), chosen}
+    lengths = sorted({*(cutoff * smallest for cutoff in CUTOFFS), chosen})
     measured, variant = frame.measurement.at_cutoffs(lengths), VARIANTS[frame.variant]
     each = [VariantColumns(measured, variant, place) for place in range(len(lengths))]
-    rows = [{**one.columns(), "predicted": one.predicted_alpha} for one in each]
-    return CutoffCurve(
-        frame.title,
-        cutoff=column_of(rows, "cutoff") / smallest,
-        alpha=column_of(rows, "alpha_vs_axial"),
-        error=column_of(rows, "alpha_vs_axial_se"),
-        total=np.array([total_error(row, "alpha_vs_axial") for row in rows], np.float64),
-        chosen=chosen / smallest,
-        predicted=column_of(rows, "predicted"),
-    )
+    rows = [
+        {**one.columns(), "value": length / smallest, "predicted": one.predicted_alpha}
+        for one, length in zip(each, lengths, strict=True)
+    ]
+    return CutoffCurve(frame.title, chosen / smallest, rows)
+
+
+class Ladders(Figure):
+    """
+    Void anisotropy over each ladder of a calibration.
+
+    Bands are total standard errors, bars the scan's part.
+
+    Parameters
+    ----------
+    data : sequence of StepRow
+        The steps of :func:`scanfab.calibrate`. Spacings and cut-offs are divided by r_min.
+    ladder : str, optional
+        The ladder to draw on one Axes: ``"spacing"``, ``"directions"``, ``"cutoff"`` or ``"rv"``.
+
+    Raises
+    ------
+    SettingsError
+        If there is no such ladder.
+    """
+
+    kind = "calibration"
+    order = 8
+    size = (WIDTH, 5.2)
+
+    def __init__(self, data: Sequence[Any], ladder: str = "spacing") -> None:
+        super().__init__(data)
+        if ladder not in PANELS:
+            raise SettingsError(f"ladder: expected {', '.join(PANELS)}, found {ladder!r}")
+        self.ladder = ladder
+
+    def draw(self, ax: Axes) -> None:
+        """Draw the chosen ladder."""
+        self._draw_ladder(ax, self.ladder)
+        ax.legend()
+
+    def panels(self, part: FigureBase) -> list[Axes]:
+        """Draw all four ladders."""
+        panels: list[Axes] = part.subplots(2, 2).ravel().tolist()
+        for panel, ladder in zip(panels, PANELS, strict=True):
+            self._draw_ladder(panel, ladder)
+        # the legend's title names the frame and explains bands, bars and dotted lines
+        lines = ["bands: one total standard error, of scan and sample together"]
+        if lacks_errors(self.data):
+            lines.append("no band where either part is not known")
+        lines.append("bars: the scan's part; dotted: the choice of the 2017 paper")
+        if self.data:
+            source, frame = self.data[0].source, self.data[0].frame
+            name = plain(short_names([source])[source])
+            lines.insert(0, f"{f'{name}, ' if name else ''}frame {frame}")
+        handles, labels = panels[0].get_legend_handles_labels()
+        above: dict[str, Any] = {"loc": "outside upper center", "title": "\n".join(lines)}
+        part.legend(handles, labels, ncols=4, **above)
+        return panels
+
+    def _draw_ladder(self, panel: Axes, ladder: str) -> None:
+        """Draw a curve for each variant."""
+        label, logarithmic, paper = PANELS[ladder]
+        rows = [row for row in self.data if row.ladder == ladder and row[ALPHA] is not None]
+        for variant in sorted({row.variant for row in rows}):
+            steps = [row for row in rows if row.variant == variant]
+            draw_alpha(panel, steps, LOOKS[variant], f"variant {variant}")
+        if paper is not None:
+            panel.axvline(paper, color="0.6", linewidth=0.8, linestyle=":")
+        if logarithmic:
+            panel.set_xscale("log")
+        panel.set(xlabel=label, ylabel=LABELS[ALPHA])
