@@ -85,6 +85,11 @@ def curves_of(rows: Iterable[Mapping[str, Any]]) -> list[Curve]:
     ]
 
 
+def have_errors(curves: Iterable[Curve], column: str) -> bool:
+    """Whether some total error of an anisotropy is known."""
+    return any(np.isfinite(curve.total_errors(column)).any() for curve in curves)
+
+
 def _drawable(array: FloatArray) -> FloatArray:
     return np.where(np.abs(array) < LARGEST, array, np.nan)
 

@@ -14,7 +14,7 @@ from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWrit
 
 from scanfab.base.convex import Convex
 from scanfab.base.files import whole_file
-from scanfab.base.space import SPACE, Space
+from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.distribution import direction_points, mean_length_function
 from scanfab.packing.sample import VARIANTS, Sample
@@ -118,7 +118,7 @@ def contact_mesh(sample: Sample, window: Window | None) -> Any:
     first, second = packing.position[contacts.pairs].transpose(1, 0, 2)
     if packing.cell is not None:
         second = second + contacts.image @ packing.cell.vectors
-    mesh = _lines(np.stack([first, second], axis=1))
+    mesh = lines_mesh(np.stack([first, second], axis=1))
     return _with(
         mesh,
         mesh.cell_data,
@@ -141,7 +141,7 @@ def line_mesh(measured: Measurement, variant: str) -> Any:
     # along the axis, and along the first direction across it
     across = line_triads(triad[:1], space)[0] if space.is_plane else np.roll(triad, -1, axis=0)
     found = sample_segments(position, radius, np.stack([triad, across]), LINES, window, space)
-    mesh = _lines(found.ends + measured.solids.origin)
+    mesh = lines_mesh(found.ends + measured.solids.origin)
     kept = found.void & (found.length >= measured.plan.cutoff)
     return _with(
         mesh,
@@ -161,7 +161,7 @@ def window_mesh(center: FloatArray, window: Convex, nsub: int = 4) -> Any:
     return _surface(center + window.outline, window.outline, window.is_flat)
 
 
-def distribution_mesh(mean_length: Any, space: Space = SPACE) -> Any:
+def distribution_mesh(mean_length: Any, space: Space) -> Any:
     """
     ℓ(n) as a closed surface about the origin, at ℓ in each direction n; a closed line for discs.
 
@@ -181,9 +181,7 @@ def distribution_mesh(mean_length: Any, space: Space = SPACE) -> Any:
     )
 
 
-def ellipsoid_mesh(
-    tensors: Mapping[str, FloatArray], center: FloatArray, size: float, space: Space = SPACE
-) -> Any:
+def ellipsoid_mesh(tensors: Fields, center: FloatArray, size: float, space: Space) -> Any:
     """
     Fabric tensors as ellipsoids side by side along x; isotropy gives spheres of radius ``size``.
 
@@ -229,7 +227,7 @@ def _with(mesh: Any, data: Any, **arrays: npt.ArrayLike) -> Any:
     return mesh
 
 
-def _lines(ends: FloatArray) -> Any:
+def lines_mesh(ends: FloatArray) -> Any:
     """A line for each pair of ends, shape (K, 2, 3)."""
     if len(ends) == 0:
         return pyvista.PolyData()

@@ -10,9 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 
-from scanfab.base.typing import FloatArray
 from scanfab.table.compare import Comparison, compare_tables
-from scanfab.table.curves import abscissa_words, is_turned
+from scanfab.table.curves import abscissa_words, have_errors, is_turned
 from scanfab.table.row import numbers_of
 from scanfab.table.table import Table
 from scanfab.viz.figures.curves import ROW, Curves, Drawn, Group, Quantity, group_of, groups_of
@@ -97,7 +96,7 @@ class Evolution(Curves):
             drawn = f"Intensity of {what}{angle}"
         divided = ", each curve divided by its own largest absolute value" if self.share else ""
         named = zip(self.of, self.quantities, strict=False)
-        banded = [name for name, one in named if one.errors and self._has_errors(one.column)]
+        banded = [name for name, one in named if have_errors(self.curves, one.column)]
         errors = "without total errors"
         if banded:
             errors = f"with total standard errors of {' and '.join(banded)}"
@@ -110,8 +109,8 @@ class Evolution(Curves):
             return "without errors: the table has those of the axial values only"
         alone = any(curve.contact_alone for curve in self.curves)
         which = "contacts taken as independent" if alone else "the sample's"
-        parts = [f"of {VOID} scan and sample together"] * self._has_errors("alpha_vs_axial")
-        parts += [f"of {CONTACT} {which}"] * self._has_errors("alpha_c_axial")
+        parts = [f"of {VOID} scan and sample together"] * have_errors(self.curves, "alpha_vs_axial")
+        parts += [f"of {CONTACT} {which}"] * have_errors(self.curves, "alpha_c_axial")
         # two lines, because one would be wider than the page
         lines = ["bands: one total standard error,", ", ".join(parts)] if parts else []
         scan = np.concatenate([curve.errors("alpha_vs_axial_se") for curve in self.curves])
@@ -119,9 +118,6 @@ class Evolution(Curves):
             largest = f"{1e3 * np.nanmax(scan):.2g}"
             lines.append(rf"bars: the scan's part, at most ${largest}\times10^{{-3}}$")
         return "\n".join(lines)
-
-    def _has_errors(self, column: str) -> bool:
-        return any(np.isfinite(curve.total_errors(column)).any() for curve in self.curves)
 
 
 class Normalised(Evolution):
@@ -179,6 +175,7 @@ class Correlation(Figure):
         self.paper_line = paper_line
         self.groups = groups_of(data)
         self.turned = is_turned(data)
+        self.part = "" if self.turned else "_axial"
         self.in_plane = any(0.0 in numbers_of(data, f"gvs_{axis}") for axis in ("xx", "yy", "zz"))
         made = compare_tables(data) if comparison is None else comparison
         self.fits = list(zip(made.summary, made.points, strict=True))
@@ -219,17 +216,15 @@ class Correlation(Figure):
     def _draw_group(self, axes: Axes, margin: Axes, group: Group, **place: Any) -> None:
         """The points and lines of one panel, and its legend in the margin."""
         entries = [self._draw_curve(axes, one) for one in group.drawn]
-        title, part = f"slope of {VOID} on {CONTACT}, axial", "_axial"
-        if self.turned:
-            title, part = "intensities", ""
-        else:
-            reach = self._reach(group.drawn)
+        reach, title = self._reach(group.drawn), "intensities"
+        if not self.turned:
+            title = f"slope of {VOID} on {CONTACT}, axial"
             if reach > 0:
                 slope, of = (PAPER_SLOPE_2D, ", 2D") if self.in_plane else (PAPER_SLOPE, "")
                 (line,) = axes.plot([0, 1e2 * reach], [0, 1e3 * slope * reach], "k:", lw=0.9)
                 entries.append((line, f"2017 paper{of}: {slope:.3f}"))
             entries += _errors_entry(group)
-        axes.set(xlabel=LABELS[f"alpha_c{part}"], ylabel=LABELS[f"alpha_vs{part}"])
+        axes.set(xlabel=LABELS[f"alpha_c{self.part}"], ylabel=LABELS[f"alpha_vs{self.part}"])
         axes.axhline(0, color="0.6", lw=0.6, zorder=0)
         widen(axes, 1.0)
         handles, labels = zip(*entries, strict=True)
@@ -239,22 +234,21 @@ class Correlation(Figure):
         """The frames of a curve, with their total errors, and its line."""
         look = {key: value for key, value in one.look.items() if key != "ls"}
         style = {"ls": "none", "elinewidth": 0.5, "capsize": 0, "zorder": 2.5, **look}
-        if self.turned:
-            x, y = one.curve.values("alpha_c"), one.curve.values("alpha_vs")
-            return axes.errorbar(1e2 * x, 1e3 * y, **style), one.name
-        x, y = one.curve.values("alpha_c_axial"), one.curve.values("alpha_vs_axial")
-        xerr = _bars(1e2 * one.curve.total_errors("alpha_c_axial"))
-        yerr = _bars(1e3 * one.curve.total_errors("alpha_vs_axial"))
-        points = axes.errorbar(1e2 * x, 1e3 * y, xerr=xerr, yerr=yerr, **style)
+        contact, void = f"alpha_c{self.part}", f"alpha_vs{self.part}"
+        x, y = 1e2 * one.curve.values(contact), 1e3 * one.curve.values(void)
+        xerr, yerr = (np.nan_to_num(one.curve.total_errors(name)) for name in (contact, void))
+        points = axes.errorbar(x, y, xerr=1e2 * xerr, yerr=1e3 * yerr, **style)
         for bars in points.lines[2]:
             bars.set_alpha(0.4)
+        if self.turned:
+            return points, one.name
         fit, frames = self.fits[one.place]
         if fit.slope is None:
             return points, f"{one.name}:\nno line"
-        contact, void = frames.mean(axis=0)
+        middle = frames.mean(axis=0)
         ends = np.array([frames[:, 0].min(), frames[:, 0].max()])
         style = {"color": look["color"], "ls": one.look["ls"], "gid": "fit"}
-        (line,) = axes.plot(1e2 * ends, 1e3 * (void + fit.slope * (ends - contact)), **style)
+        (line,) = axes.plot(1e2 * ends, 1e3 * (middle[1] + fit.slope * (ends - middle[0])), **style)
         error = "" if fit.slope_se is None else rf" $\pm$ {fit.slope_se:.3f}"
         r2 = "" if fit.r2 is None else f", $R^2$ = {fit.r2:.3f}"
         return (line, points), f"{one.name}:\n{fit.slope:.3f}{error}{r2}"
@@ -267,17 +261,10 @@ class Correlation(Figure):
         return max((frames[:, 0].max() for fit, frames in fits if fit.slope is not None), default=0)
 
 
-def _bars(error: FloatArray) -> FloatArray | None:
-    return np.nan_to_num(error) if np.isfinite(error).any() else None
-
-
 def _errors_entry(group: Group) -> list[tuple[Any, str]]:
     """The legend's entry for error bars: a cross, as a single line would look like the axis."""
     curves = [one.curve for one in group.drawn]
-    void, contact = (
-        any(np.isfinite(curve.total_errors(name)).any() for curve in curves)
-        for name in ("alpha_vs_axial", "alpha_c_axial")
-    )
+    void, contact = (have_errors(curves, name) for name in ("alpha_vs_axial", "alpha_c_axial"))
     if not (void or contact):
         return []
     shape = "+" if void and contact else "|" if void else "_"

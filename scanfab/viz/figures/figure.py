@@ -15,16 +15,7 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.files import whole_file
 from scanfab.table.plots import figures_of
 from scanfab.table.table import Table
-from scanfab.viz.figures.style import (
-    COLUMN,
-    DIRECTIONAL,
-    DPI,
-    STYLE,
-    check_plot_file,
-    figure_bytes,
-    letter,
-    new_figure,
-)
+from scanfab.viz.figures import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -95,7 +86,7 @@ class Figure:
     @property
     def size(self) -> tuple[float, float]:
         """Width and height, inches."""
-        return COLUMN, 2.6
+        return style.COLUMN, 2.6
 
     @property
     def caption(self) -> str:
@@ -121,13 +112,13 @@ class Figure:
         if place is None:
             from matplotlib import pyplot
 
-            with pyplot.rc_context(STYLE):
+            with pyplot.rc_context(style.STYLE):
                 page = pyplot.figure(layout="constrained")
                 return self.on(page.subplots(subplot_kw={"projection": self.projection}))
         if hasattr(place, "subplots"):
             panels = self.panels(place)
             if self.lettered:
-                letter(panels)
+                style.letter(panels)
             return place
         if not hasattr(place, "plot"):
             raise SettingsError(
@@ -197,11 +188,9 @@ class DirectionalFigure(FrameFigure):
         ``"voids"`` or ``"contacts"``, to draw only these. On one Axes the default is voids.
     """
 
-    def __init__(
-        self, data: ScannedFrames, frame: int | None = None, of: str | None = None
-    ) -> None:
+    def __init__(self, data: Any, frame: int | None = None, of: str | None = None) -> None:
         super().__init__(data, frame)
-        self.of = one_of(of, tuple(DIRECTIONAL))
+        self.of = one_of(of, tuple(style.DIRECTIONAL))
 
     @cached_property
     def frames(self) -> list[ScannedFrame]:
@@ -232,7 +221,7 @@ class DirectionalFigure(FrameFigure):
         for kind, column in zip(self.of, panels.T, strict=False):
             scales[kind] = self.draw_column(list(column), frames, kind)
             for axes, one in zip(column, frames, strict=True):
-                axes.set_title(f"{DIRECTIONAL[kind]}\n{one.title}", loc=loc)
+                axes.set_title(f"{style.DIRECTIONAL[kind]}\n{one.title}", loc=loc)
         return scales
 
 
@@ -315,7 +304,7 @@ def make_figures(data: Any, kind: str, text: str | None = None, **offered: Any) 
     return found
 
 
-def save_figures(path: Path, figures: Sequence[Figure], dpi: int = DPI) -> None:
+def save_figures(path: Path, figures: Sequence[Figure], dpi: int = style.DPI) -> None:
     """
     Draw figures to a file, all on one page.
 
@@ -333,10 +322,10 @@ def save_figures(path: Path, figures: Sequence[Figure], dpi: int = DPI) -> None:
     SettingsError
         If the file has another suffix.
     """
-    check_plot_file(path)
+    style.check_plot_file(path)
     # drawn in memory first, as the PDF writer fails with an unclear error on a full disk
     with drawn_page(figures) as page:
-        drawn = figure_bytes(page, path.suffix.lower().lstrip("."), dpi)
+        drawn = style.figure_bytes(page, path.suffix.lower().lstrip("."), dpi)
     with whole_file(path) as part:
         part.write_bytes(drawn)
 
@@ -345,11 +334,11 @@ def save_figures(path: Path, figures: Sequence[Figure], dpi: int = DPI) -> None:
 def drawn_page(figures: Sequence[Figure]) -> Iterator[Page]:
     """Figures below one another, lettered through, in the style of the package."""
     widths, heights = zip(*(one.size for one in figures), strict=True)
-    with new_figure(max(widths), sum(heights)) as page:
+    with style.new_figure(max(widths), sum(heights)) as page:
         parts: Any = [page]
         if len(figures) > 1:
             parts = page.subfigures(len(figures), 1, height_ratios=heights)
         every = [one.panels(part) for part, one in zip(parts, figures, strict=True)]
         if len(figures) > 1 or figures[0].lettered:
-            letter([axes for panels in every for axes in panels])
+            style.letter([axes for panels in every for axes in panels])
         yield page

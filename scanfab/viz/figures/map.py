@@ -15,7 +15,7 @@ from matplotlib.transforms import nonsingular
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.table.row import column_of, number_of, numbers_of, total_errors
+from scanfab.table.row import column_of, numbers_of, total_errors
 from scanfab.viz.figures.curves import Quantity
 from scanfab.viz.figures.figure import Figure
 from scanfab.viz.figures.style import FRAME_LOOKS, LABELS, WIDTH, band
@@ -71,10 +71,8 @@ class Map(Figure):
         known = [one for one in QUANTITIES if numbers_of(self.rows, one.column)]
         self.quantities = [one for one in known if quantity in (None, one.column)]
         if not self.quantities:
-            raise SettingsError(
-                f"there is nothing to draw: no block of variant {self.variant} has "
-                f"{quantity or 'a value'}"
-            )
+            none = f"no block of variant {self.variant} has {quantity or 'a value'}"
+            raise SettingsError(f"there is nothing to draw: {none}")
 
     @cached_property
     def frames(self) -> list[list[Any]]:
@@ -91,9 +89,8 @@ class Map(Figure):
         """Whether blocks follow one another along a line, or about a centre."""
         if self.rows[0].get("r_outer") is not None:
             return True
-        middles = _middles(self.frames[-1])
-        spread = np.linalg.svd(middles - middles.mean(axis=0), compute_uv=False)
-        return bool(len(spread) < 2 or spread[1] <= SAME * spread[0] or spread[0] == 0)
+        number, _ = lattice_of(_middles(self.frames[-1]))
+        return int((number.max(axis=0) > 0).sum()) < 2
 
     @property
     def size(self) -> tuple[float, float]:
@@ -162,11 +159,10 @@ class Map(Figure):
             if one.errors == "total":
                 error = total_errors(rows, one.column)
             band(axes, place, value, one.factor * error, look)
-            strain = number_of(rows[0], "strain")
-            name = f"frame {rows[0].get('frame')}"
-            name += "" if strain is None else f", strain {strain:.3g}"
+            told = [f"frame {rows[0].get('frame')}"]
+            told += [f"strain {strain:.3g}" for strain in numbers_of(rows[:1], "strain")]
             line = {key: look[key] for key in ("color", "marker", "ls")}
-            axes.plot(place, value, label=name, **line)
+            axes.plot(place, value, label=", ".join(told), **line)
             # the surface takes segments from these blocks, so they must not set the scale
             grey = {"ls": "", "marker": look["marker"], "color": "0.75", "scaley": False}
             legend = SURFACE if rows is self.frames[-1] and outer.any() else None

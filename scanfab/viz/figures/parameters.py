@@ -20,17 +20,8 @@ from scanfab.base.typing import FloatArray
 from scanfab.fabric.distribution import direction_points
 from scanfab.table.curves import short_names
 from scanfab.table.row import column_of, numbers_of, total_error, total_errors
+from scanfab.viz.figures import style
 from scanfab.viz.figures.figure import Figure, FrameFigure
-from scanfab.viz.figures.style import (
-    COLUMN,
-    FRAME_LOOKS,
-    LABELS,
-    LOOKS,
-    WIDTH,
-    band,
-    plain,
-    widen,
-)
 
 if TYPE_CHECKING:
     from scanfab.viz.scanned_frames import ScannedFrame
@@ -79,7 +70,7 @@ class Histogram(OnePanel):
     """
 
     order = 6
-    size = (COLUMN, 3.2)
+    size = (style.COLUMN, 3.2)
     drawn, more = "Lengths of the void segments", "; those below the cut-off are dropped"
 
     @cached_property
@@ -91,12 +82,12 @@ class Histogram(OnePanel):
         """Draw the density of the lengths; lengths below the cut-off are on grey."""
         longest = max(float(np.quantile(length, 0.999)) for length in self.lengths)
         edges, frames = np.linspace(0, longest, 41), self.chosen(self.data.frames)
-        for frame, length, look in zip(frames, self.lengths, FRAME_LOOKS, strict=False):
+        for frame, length, look in zip(frames, self.lengths, style.FRAME_LOOKS, strict=False):
             density, _ = np.histogram(length, edges, density=True)
             cutoff = frame.measurement.plan.cutoff / frame.smallest
             label = f"{frame.title}:\n{100 * np.mean(length < cutoff):.0f} % dropped"
-            style: dict[str, Any] = {"color": look["color"], "ls": look["ls"], "lw": 1.1}
-            ax.stairs(density, edges, baseline=None, label=label, **style)
+            line: dict[str, Any] = {"color": look["color"], "ls": look["ls"], "lw": 1.1}
+            ax.stairs(density, edges, baseline=None, label=label, **line)
         ax.axvspan(0, cutoff, color="0.92", zorder=0)
         ax.axvline(cutoff, color="k", lw=0.9, ls=":", label="cut-off")
         ax.set(yscale="log", xlim=(0, longest), ylabel="probability density")
@@ -155,7 +146,7 @@ class Cutoffs(OnePanel):
 
     order = 7
     slow = True
-    size = (COLUMN, 3.4)
+    size = (style.COLUMN, 3.4)
     drawn = "Void anisotropy along the loading axis over the cut-off"
     more = ", with total standard errors"
 
@@ -166,7 +157,7 @@ class Cutoffs(OnePanel):
 
     def draw(self, ax: Axes) -> None:
         """Draw a curve for each frame, and the cut-off of the table."""
-        for one, look in zip(self.curves, FRAME_LOOKS, strict=False):
+        for one, look in zip(self.curves, style.FRAME_LOOKS, strict=False):
             draw_alpha(ax, one.rows, look, one.title)
             x, predicted = (column_of(one.rows, name) for name in ("value", "predicted"))
             ax.plot(x, 1e3 * predicted, color=look["color"], lw=1.2, ls="-.")
@@ -174,8 +165,8 @@ class Cutoffs(OnePanel):
             ax.plot([], [], color="0.3", lw=1.2, ls="-.", label="predicted from near contacts")
         ax.axvline(self.curves[-1].chosen, color="k", lw=0.9, ls=":", label="cut-off of the table")
         ax.axhline(0, color="0.6", lw=0.6, zorder=0)
-        ax.set(xlabel=r"cut-off / $r_{min}$", ylabel=LABELS[ALPHA])
-        widen(ax, 1.0)
+        ax.set(xlabel=r"cut-off / $r_{min}$", ylabel=style.LABELS[ALPHA])
+        style.widen(ax, 1.0)
         hole = any(lacks_errors(one.rows) for one in self.curves)
         without = "\n(none where either is not known)" if hole else ""
         note = f"bands: one total standard error, scan and sample{without}\nbars: the scan's part"
@@ -185,7 +176,7 @@ class Cutoffs(OnePanel):
 def draw_alpha(ax: Axes, rows: Sequence[Any], look: dict[str, Any], label: str) -> None:
     """Draw void anisotropy over ``value``, with bands of total errors, and bars for the scan."""
     x, alpha, scan = (column_of(rows, name) for name in ("value", ALPHA, f"{ALPHA}_se"))
-    band(ax, x, 1e3 * alpha, 1e3 * total_errors(rows, ALPHA), look)
+    style.band(ax, x, 1e3 * alpha, 1e3 * total_errors(rows, ALPHA), look)
     ax.errorbar(x, 1e3 * alpha, 1e3 * np.nan_to_num(scan), label=label, elinewidth=0.9, **look)
 
 
@@ -232,7 +223,7 @@ class Ladders(Figure):
 
     kind = "calibration"
     order = 8
-    size = (WIDTH, 5.2)
+    size = (style.WIDTH, 5.2)
 
     def __init__(self, data: Sequence[Any], ladder: str = "spacing") -> None:
         super().__init__(data)
@@ -257,7 +248,7 @@ class Ladders(Figure):
         lines.append("bars: the scan's part; dotted: the choice of the 2017 paper")
         if self.data:
             source, frame = self.data[0].source, self.data[0].frame
-            name = plain(short_names([source])[source])
+            name = style.plain(short_names([source])[source])
             lines.insert(0, f"{f'{name}, ' if name else ''}frame {frame}")
         handles, labels = panels[0].get_legend_handles_labels()
         above: dict[str, Any] = {"loc": "outside upper center", "title": "\n".join(lines)}
@@ -270,9 +261,9 @@ class Ladders(Figure):
         rows = [row for row in self.data if row.ladder == ladder and row[ALPHA] is not None]
         for variant in sorted({row.variant for row in rows}):
             steps = [row for row in rows if row.variant == variant]
-            draw_alpha(panel, steps, LOOKS[variant], f"variant {variant}")
+            draw_alpha(panel, steps, style.LOOKS[variant], f"variant {variant}")
         if paper is not None:
             panel.axvline(paper, color="0.6", linewidth=0.8, linestyle=":")
         if logarithmic:
             panel.set_xscale("log")
-        panel.set(xlabel=label, ylabel=LABELS[ALPHA])
+        panel.set(xlabel=label, ylabel=style.LABELS[ALPHA])

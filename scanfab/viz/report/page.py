@@ -25,7 +25,6 @@ KIND_COLOURS = ((COLOURS["sky"], "#B4DDF5"), ("#C9CED3", "#E8EAEC"), (COLOURS["o
 
 # CSS pixels an inch, and pixels an inch of pictures that are no vectors.
 PIXELS, DPI = 96, 130
-KINDS = {"svg": "image/svg+xml", "png": "image/png"}
 
 
 class Picture(NamedTuple):
@@ -42,7 +41,7 @@ def picture_of(figure: Figure, kind: Literal["svg", "png"]) -> Picture:
     """A figure with its caption, as vectors or as pixels."""
     with drawn_page([figure]) as page:
         data = base64.b64encode(figure_bytes(page, kind, DPI)).decode("ascii")
-    url = f"data:{KINDS[kind]};base64,{data}"
+    url = f"data:image/{'svg+xml' if kind == 'svg' else kind};base64,{data}"
     return Picture(url, figure.caption, round(PIXELS * figure.size[0]))
 
 
@@ -105,11 +104,10 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     # the rotation (rows) after which the axis is z; y leads away from the viewer
     away = -towards_viewer(up, scene.space)
     turn = np.stack([np.cross(away, up), away, up])
-    kinds = np.where(grains.rattler, 2, np.where(grains.in_window, 0, 1))[shown]
     names = ["grains in the RV", "grains outside" if scene.window else "grains", "rattlers"]
     shades = [] if grains.body is None else [grains.shade[shown]]
     numbers = np.rint(np.column_stack([position @ turn.T, radius]) * scale)
-    spheres = np.column_stack([numbers, kinds, *shades]).astype(int)[nearest]
+    spheres = np.column_stack([numbers, grains.kind[shown], *shades]).astype(int)[nearest]
     return {
         "kinds": [
             {"name": name, "colour": colour, "pale": pale}

@@ -15,7 +15,6 @@ from scanfab.base.files import whole_file
 from scanfab.io.families import PathLike
 from scanfab.io.series import Series
 from scanfab.packing.cell import Cell
-from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox
 from scanfab.pipeline.options import Told, as_options, listening
 from scanfab.pipeline.record import read_manifest, reopen, repeat_command, restored_settings
@@ -44,11 +43,7 @@ class Input(NamedTuple):
     manifest: dict[str, Any] | None
     cutoff: float | None
     """The cut-off whose rows were chosen from several."""
-
-    @property
-    def is_map(self) -> bool:
-        """Whether it is a table of a map."""
-        return bool(self.rows) and MAP in self.rows[0]
+    is_map: bool
 
 
 @dataclass(frozen=True)
@@ -156,11 +151,9 @@ def make_report(
         maps = [one.rows for one in inputs if one.is_map]
         comparison = compare_tables(rows)
         figures = []
-        with suppress(SettingsError):  # there are no figures without a void fabric
-            figures += make_figures(rows, "table", comparison=comparison)
-        for blocks in maps:
-            with suppress(SettingsError):
-                figures += make_figures(blocks, "map")
+        for kind, data in [("table", rows), *(("map", blocks) for blocks in maps)]:
+            with suppress(SettingsError):  # there are no figures without a void fabric
+                figures += make_figures(data, kind, comparison=comparison)
         pictures = [picture_of(one, "svg") for one in figures]
     # warnings about the sources read again stand only in the page
     with listening(lambda _: None) as of_sources:
@@ -206,10 +199,10 @@ def read_inputs(
         for path in tables
     ]
     is_map = [bool(rows) and MAP in rows[0] for _, rows in read]
-    kept = [one for one, of_map in zip(read, is_map, strict=True) if not of_map]
-    chosen = iter(choose_rows(kept, cutoff, labels))
+    tables_of_frames = [one for one, of_map in zip(read, is_map, strict=True) if not of_map]
+    chosen = iter(choose_rows(tables_of_frames, cutoff, labels))
     inputs = [
-        Input(path, rows if of_map else next(chosen), read_manifest(path), cutoff)
+        Input(path, rows if of_map else next(chosen), read_manifest(path), cutoff, of_map)
         for (path, rows), of_map in zip(read, is_map, strict=True)
     ]
     if not any(one.rows for one in inputs):
@@ -220,7 +213,7 @@ def read_inputs(
 
 
 def _usual_title(rows: Sequence[Mapping[str, Any]]) -> str:
-    sources = list(dict.fromkeys(str(row["source"]) for row in rows))
+    sources = dict.fromkeys(str(row["source"]) for row in rows)
     names = [Path(source).name or source for source in sources]
     return f"Void fabric of {', '.join(names) if len(names) < 4 else f'{len(names)} samples'}"
 
@@ -313,19 +306,18 @@ def _facts(look: Look) -> list[tuple[str, str]]:
         if not window.shape.is_sphere:
             facts.append(("shape of the RV", str(window.shape)))
             continue
-        part, now = _fraction(first, radius), ""
         # relative to the first sample, and to the sample of this frame if that differs
-        if look.sample.gathered.any() and _fraction(look.sample, radius) != part:
-            now = f" in the first frame that has grains, {_fraction(look.sample, radius)} in frame "
-            now += str(look.number)
+        part, *others = (
+            f"{2 * radius / SurfaceBox.of(one.packing, one.gathered).smallest_extent:.3g}"
+            for one in (first, look.sample)
+            if one.gathered.any()
+        )
+        now = ""
+        if others not in ([], [part]):
+            now = f" in the first frame that has grains, {others[0]} in frame {look.number}"
         size = f"{radius:.4g}, {part} of half the sample's smallest extent{now}"
         facts.append(("radius of the RV", f"{size}, {radius / radii.mean():.3g} mean radii"))
     return facts
-
-
-def _fraction(sample: Sample, radius: float) -> str:
-    extent = SurfaceBox.of(sample.packing, sample.gathered).smallest_extent
-    return f"{2 * radius / extent:.3g}"
 
 
 def _cell(cell: Cell | None) -> str:
@@ -343,18 +335,18 @@ def _pictures(rows: list[dict[str, Any]], series: Series, settings: Settings) ->
     """Figures of the first and the last frame, from one scan."""
     # the least tolerance of a row, which may follow from the sample's error
     errors = numbers_of(rows, "alpha_vs_axial_sample_se")
-    rougher, asked = "", settings.aim(min(errors, default=None))
-    tolerance = asked
+    tolerance = asked = settings.aim(min(errors, default=None))
     if settings.spacing is None or settings.directions is None:
         # rougher, so that the scan is short enough to wait for
         most = max(numbers_of(rows, "segments"), default=0.0)
         tolerance *= max(1.0, most / MOST_SEGMENTS) ** 0.5
-    if tolerance > asked:
-        rougher = (
-            f"Scanned to a standard error of {tolerance:.2g} instead of the table's "
-            f"{asked:.2g}, which would take too long for a picture."
-        )
-    frames = ScannedFrames(series, replace(settings, tolerance=tolerance), rows, rougher)
+    rougher = (
+        f"Scanned to a standard error of {tolerance:.2g} instead of the table's {asked:.2g}, which "
+        f"would take too long for a picture."
+    )
+    frames = ScannedFrames(
+        series, replace(settings, tolerance=tolerance), rows, rougher if tolerance > asked else ""
+    )
     # drawn as pixels, as the coloured disks are pixels anyway
     figures = [figure for figure in make_figures(frames, "frames") if not figure.slow]
     return [picture_of(figure, "png") for figure in figures]
