@@ -85,8 +85,8 @@ def _variant_meshes(result: FrameResult, row: Row, size: float) -> Meshes:
         yield f"ellipsoids-{name}", ellipsoid_mesh(tensors, center, size, space), fields
         # one point, whose arrays of nine components are for the filter Tensor Glyph
         point = pyvista.PolyData(center[None])
-        flat = {k: one.reshape(1, 9) for k, one in tensors.items()}
-        yield f"tensors-{name}", _with(point, point.point_data, **flat), fields
+        point.point_data.update({k: one.reshape(1, 9) for k, one in tensors.items()})
+        yield f"tensors-{name}", point, fields
 
 
 def map_meshes(result: FrameResult) -> Meshes:
@@ -103,9 +103,8 @@ def map_meshes(result: FrameResult) -> Meshes:
 def grain_mesh(grains: Grains) -> Any:
     """A point for each particle, with its radius, id and other data."""
     mesh = pyvista.PolyData(grains.position) if len(grains.position) else pyvista.PolyData()
-    names = ["radius", "id", "contacts", "rattler", "boundary", "in_window"]
-    names += ["body"] * (grains.body is not None)
-    return _with(mesh, mesh.point_data, **{name: getattr(grains, name) for name in names})
+    kept = {k: v for k, v in vars(grains).items() if k not in ("position", "to_place")}
+    return _with(mesh, mesh.point_data, **kept)
 
 
 def contact_mesh(sample: Sample, window: Window | None) -> Any:
@@ -125,7 +124,7 @@ def contact_mesh(sample: Sample, window: Window | None) -> Any:
         normal=contacts.normal,
         boundary=~sample.contacts_without(sample.boundary),
         in_window=inside(contacts.point, sample, window),
-        force=() if contacts.force is None else contacts.force,
+        force=contacts.force,
     )
 
 
@@ -206,12 +205,8 @@ def block_mesh(blocks: Blocks, values: Mapping[str, npt.ArrayLike]) -> Any:
         at = blocks.corner + np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1) @ blocks.edges
         block = np.arange(len(blocks))
     else:
-        azimuth, polar, radius = np.meshgrid(
-            np.linspace(0.0, 2.0 * np.pi, AZIMUTHS + 1),
-            np.linspace(0.0, np.pi, POLAR + 1),
-            blocks.bounds,
-            indexing="ij",
-        )
+        turns = np.linspace(0.0, 2.0 * np.pi, AZIMUTHS + 1), np.linspace(0.0, np.pi, POLAR + 1)
+        azimuth, polar, radius = np.meshgrid(*turns, blocks.bounds, indexing="ij")
         unit = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
         at = blocks.middles[0] + radius[..., None] * np.stack(unit, axis=-1)
         block = np.repeat(np.arange(blocks.shells), AZIMUTHS * POLAR)
@@ -219,10 +214,10 @@ def block_mesh(blocks: Blocks, values: Mapping[str, npt.ArrayLike]) -> Any:
     return _with(mesh, mesh.cell_data, **{k: np.asarray(one)[block] for k, one in values.items()})
 
 
-def _with(mesh: Any, data: Any, **arrays: npt.ArrayLike) -> Any:
+def _with(mesh: Any, data: Any, **arrays: npt.ArrayLike | None) -> Any:
     """Add arrays to the point or cell data of a mesh, but for empty ones, which pyvista refuses."""
     for name, values in arrays.items():
-        if np.size(values):
+        if values is not None and np.size(values):
             data[name] = np.ascontiguousarray(values)
     return mesh
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -245,13 +244,9 @@ def about_window(scene: Scene) -> Scene:
     images, row = cell.images_near_origin(branch, grains.radius + scene.window.reach)
     other = np.linalg.norm(images - nearest[row], axis=1) > 1e-6 * grains.radius[row]
     rows = np.concatenate([np.arange(len(nearest)), row[other]])
-    position = np.concatenate([nearest, images[other]]) + scene.center
-    shown: dict[str, Any] = {
-        one.name: None if (values := getattr(grains, one.name)) is None else values[rows]
-        for one in fields(grains)
-    }
-    shown["position"] = position
-    moved = Grains(**shown)
+    taken = {name: values[rows] for name, values in vars(grains).items() if values is not None}
+    taken["position"] = np.concatenate([nearest, images[other]]) + scene.center
+    moved = replace(grains, **taken)
     moved.in_window[:] = scene.window.contains(moved.places - scene.center)
     return replace(scene, grains=moved)
 

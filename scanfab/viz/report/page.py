@@ -105,14 +105,12 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     away = -towards_viewer(up, scene.space)
     turn = np.stack([np.cross(away, up), away, up])
     names = ["grains in the RV", "grains outside" if scene.window else "grains", "rattlers"]
+    kinds = [(name, *colours) for name, colours in zip(names, KIND_COLOURS, strict=True)]
     shades = [] if grains.body is None else [grains.shade[shown]]
     numbers = np.rint(np.column_stack([position @ turn.T, radius]) * scale)
     spheres = np.column_stack([numbers, grains.kind[shown], *shades]).astype(int)[nearest]
     return {
-        "kinds": [
-            {"name": name, "colour": colour, "pale": pale}
-            for name, (colour, pale) in zip(names, KIND_COLOURS, strict=True)
-        ],
+        "kinds": [dict(zip(("name", "colour", "pale"), one, strict=True)) for one in kinds],
         "spheres": spheres.tolist(),
         "shades": SHADES if shades else [1.0],
         "axes": _axes(up, turn),

@@ -36,6 +36,17 @@ TURNED = (
     "way the axes point: never negative, so noise raises them. The table has no errors of them."
 )
 
+# Lines of the results with their columns below, for the first frame, the last, and turned axes; {}
+# stands for the strain or the frame.
+FIRST_LINES = {"α_vs{}": "α_vs ±", "α_c{}": "α_c ±"}
+ERROR_LINES = {"its error: scan": "scan", "its error: sample": "sample"}
+LAST_LINES = {"α_vs{}": "α_vs ±", **ERROR_LINES, "α_c{}": "α_c ±"}
+TURNED_LINES = {
+    "intensity α_vs{}": "void intensity",
+    "intensity α_c{}": "contact intensity",
+    "angle between their axes{}": "angle",
+    "α_vs along the loading axis{}": "α_vs ±",
+}
 # Columns of the table that are shown as they are, with the titles that readers see.
 TITLES = {
     **{name: name for name in ("frame", "block", "x", "y", "z", "r_inner", "r_outer", "grains")},
@@ -70,7 +81,7 @@ def overview(table: Path, rows: Sequence[Row]) -> str:
     if not rows:
         return f"{table}: an empty table."
     sources = list(dict.fromkeys(str(row["source"]) for row in rows))
-    frames = len({(row["source"], row["frame"]) for row in rows})
+    frames = len(set(map(_of_frame, rows)))
     variants = ", ".join(sorted({str(row["variant"]) for row in rows}))
     column = strain_column(rows)
     parts = [
@@ -100,44 +111,32 @@ def _span(rows: Sequence[Row], column: str, spelling: str, factor: float = 1.0) 
 
 def results_tables(summary: Iterable[TableRow], rows: Sequence[Row]) -> list[Part]:
     """A table for each source, with a column for each variant."""
-    sources: dict[str, list[TableRow]] = {}
-    for one in summary:
-        sources.setdefault(one.source, []).append(one)
     return [
-        _results(source, lines, [row for row in rows if row["source"] == source])
-        for source, lines in sources.items()
+        _results(
+            [one for one in summary if one.source == source],
+            [row for row in rows if row["source"] == source],
+        )
+        for source in dict.fromkeys(one.source for one in summary)
     ]
 
 
-def _results(source: str, summary: Sequence[TableRow], rows: Sequence[Row]) -> Part:
+def _results(summary: Sequence[TableRow], rows: Sequence[Row]) -> Part:
+    source, turned = summary[0].source, is_turned(rows)
     filled = groups_of(row for row in rows if row[VOID] is not None)
     each = [filled.get((source, variant_of(one)), [{}]) for one in summary]
     first, last = [one[0] for one in each], [one[-1] for one in each]
     column = strain_column(rows)
     if len({spelt_strain(row, column) for row in (*first, *last)}) < 2:
         column = None
-    here, there = _where("last", last, column), _where("first", first, column)
+    # no line is fitted to turned axes, as axial values miss their fabric
+    at_end, at_start = (TURNED_LINES, TURNED_LINES) if turned else (LAST_LINES, FIRST_LINES)
     lines: dict[str, list[str]] = {}
-    if is_turned(rows):
-        # no line is fitted, as axial values miss a fabric with turned axes
-        for ends, at in ((last, here), (first, there)):
-            lines |= {
-                f"intensity α_vs{at}": [_intensity(row, VOID) for row in ends],
-                f"intensity α_c{at}": [_intensity(row, CONTACT) for row in ends],
-                f"angle between their axes{at}": [_degrees(row) for row in ends],
-                f"α_vs along the loading axis{at}": [_value(row, VOID) for row in ends],
-            }
-    else:
-        lines = {
-            f"α_vs{here}": [_value(row, VOID) for row in last],
-            "its error: scan": [_error(number_of(row, f"{VOID}_se")) for row in last],
-            "its error: sample": [_error(number_of(row, f"{VOID}_sample_se")) for row in last],
-            f"α_c{here}": [_value(row, CONTACT) for row in last],
-        }
-    if first != last and not is_turned(rows):
+    for names, which, ends in ((at_end, "last", last), (at_start, "first", first)):
+        at, cells = _where(which, ends, column), [_cells(row) if row else {} for row in ends]
+        for name, cell in names.items():
+            lines[name.format(at)] = [one.get(cell, "-") for one in cells]
+    if first != last and not turned:
         lines |= {
-            f"α_vs{there}": [_value(row, VOID) for row in first],
-            f"α_c{there}": [_value(row, CONTACT) for row in first],
             "slope of α_vs on α_c": [with_error(one.slope, one.slope_se, ".5f") for one in summary],
             "R² of that line": [_spell(one.r2) for one in summary],
             "largest α_vs": [_spell(one.peak) for one in summary],
@@ -145,8 +144,7 @@ def _results(source: str, summary: Sequence[TableRow], rows: Sequence[Row]) -> P
         }
     # leave out lines that are empty for all variants
     shown = [[name, *cells] for name, cells in lines.items() if any(one != "-" for one in cells)]
-    note = TURNED if is_turned(rows) else ""
-    return Part(["variant", *map(variant_of, summary)], shown, note, source)
+    return Part(["variant", *map(variant_of, summary)], shown, TURNED if turned else "", source)
 
 
 def _where(which: str, rows: Sequence[Row], column: str | None) -> str:
@@ -177,37 +175,34 @@ def _alone(value: float | None, error: float | None) -> str:
     return with_error(value, error, ".5f").partition(" ±")[0]
 
 
-def _error(error: float | None) -> str:
-    return "-" if error is None else f"{error:#.2g}"
-
-
-def _degrees(row: Row) -> str:
-    angle = number_of(row, "coaxiality_deg")
-    return "-" if angle is None else f"{angle:.0f}°"
-
-
-def _spell(value: Any) -> str:
+def _spell(value: Any, spelling: str = ".4g", unit: str = "") -> str:
     if value is None:
         return "-"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return f"{value:{spelling}}{unit}" if isinstance(value, float) else str(value)
 
 
 def _cells(row: Row) -> dict[str, str]:
     """The cells of a frame or block, by the titles of their columns."""
     # spell the value of the table, so that counts stay whole numbers
     numbers = {title: row[name] for name, title in TITLES.items() if numbers_of([row], name)}
+    void, contact = (_value(row, name) for name in (VOID, CONTACT))
+    errors = {
+        "± total": total_error(row, VOID),
+        "scan": number_of(row, f"{VOID}_se"),
+        "sample": number_of(row, f"{VOID}_sample_se"),
+        "± of α_c": number_of(row, f"{CONTACT}_sample_se"),
+    }
     return {
         **{title: _spell(value) for title, value in numbers.items()},
+        **{title: _spell(error, "#.2g") for title, error in errors.items()},
         "variant": variant_of(row),
-        "α_vs": _value(row, VOID).partition(" ±")[0],
-        "± total": _error(total_error(row, VOID)),
-        "scan": _error(number_of(row, f"{VOID}_se")),
-        "sample": _error(number_of(row, f"{VOID}_sample_se")),
-        "α_c": _value(row, CONTACT).partition(" ±")[0],
-        "± of α_c": _error(number_of(row, f"{CONTACT}_sample_se")),
+        "α_vs ±": void,
+        "α_vs": void.partition(" ±")[0],
+        "α_c ±": contact,
+        "α_c": contact.partition(" ±")[0],
         "void intensity": _intensity(row, VOID),
         "contact intensity": _intensity(row, CONTACT),
-        "angle": _degrees(row),
+        "angle": _spell(number_of(row, "coaxiality_deg"), ".0f", "°"),
         "at a surface": "yes" if row.get("at_surface") else "-",
     }
 
@@ -228,10 +223,10 @@ def frame_table(rows: Sequence[Row]) -> Part:
     turned, lines = is_turned(rows), []
     for row in rows:
         if _of_frame(row) in shown:
-            column, strain = strains[row["source"]], number_of(row, strains[row["source"]])
-            line = {**_cells(row), "source": str(row["source"]) if len(sources) > 1 else "-"}
-            line[column.replace("_", " ")] = "-" if strain is None else f"{100 * strain:.3g} %"
-            lines.append(line)
+            column = strains[row["source"]]
+            strain = "".join(f"{100 * value:.3g} %" for value in numbers_of([row], column)) or "-"
+            source = str(row["source"]) if len(sources) > 1 else "-"
+            lines.append({**_cells(row), column.replace("_", " "): strain, "source": source})
     main = [*INTENSITIES, "angle", *FRAME_COLUMNS] if turned else [*FRAME_COLUMNS, *INTENSITIES]
     note = "" if len(shown) == len(numbers) else f"{len(shown)} of {len(numbers)} frames are shown."
     columns = ["frame", "variant", "strain", "shear strain", *main, "source"]
@@ -296,7 +291,16 @@ def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, A
             f"was long enough, or some direction kept none."
         )
     groups = groups_of(filled)
-    found += [*_unknown_errors(groups), *_large_errors(groups)]
+    for (source, variant), group in groups.items():
+        if not numbers_of(group, f"{VOID}_se"):
+            why = "it was made of one replicate"
+            if f"{VOID}_se" not in group[0]:
+                why = f"the table has no column {VOID}_se"
+            found.append(
+                f"Variant {variant} of {source} has no standard error of the scan: {why}. Without "
+                f"that part there is no error in all, and none behind ±."
+            )
+    found += _large_errors(groups)
     if groups and max(map(len, groups.values())) < 3:
         found.append(
             "There are fewer than three frames: no line is fitted to void against contact fabric."
@@ -316,19 +320,6 @@ def _biases(asked: Iterable[Mapping[str, Any]]) -> Iterator[str]:
                     f"anisotropy would get α = {bias:.2g}. Changes of α between frames mean more "
                     f"than its value."
                 )
-
-
-def _unknown_errors(groups: Groups) -> Iterator[str]:
-    """Warn of variants without a standard error of the scan."""
-    for (source, variant), group in groups.items():
-        if not numbers_of(group, f"{VOID}_se"):
-            why = "it was made of one replicate"
-            if f"{VOID}_se" not in group[0]:
-                why = f"the table has no column {VOID}_se"
-            yield (
-                f"Variant {variant} of {source} has no standard error of the scan: {why}. Without "
-                f"that part there is no error in all, and none behind ±."
-            )
 
 
 def _large_errors(groups: Groups) -> Iterator[str]:
