@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -48,12 +49,8 @@ def meshes_of(result: FrameResult) -> Meshes:
 def frame_meshes(result: FrameResult) -> Meshes:
     """The grains, contacts and RVs of a frame, and what each variant's scan says."""
     # the name of a file tells its RV only if there are several RVs
-    windows = {
-        _name("window", rv.fraction): rv.window
-        for measured in result.measurements
-        for rv in measured.plan.rvs[:1]
-        if rv.window is not None
-    }
+    rvs = [rv for measured in result.measurements for rv in measured.plan.rvs[:1]]
+    windows = {_name("window", rv.fraction): rv.window for rv in rvs if rv.window is not None}
     # the largest RV holds the others
     window = [None, *windows.values()][-1]
     fields = _fields(result.rows)
@@ -140,7 +137,8 @@ def line_mesh(measured: Measurement, variant: str) -> Any:
     # along the axis, and along the first direction across it
     across = line_triads(triad[:1], space)[0] if space.is_plane else np.roll(triad, -1, axis=0)
     found = sample_segments(position, radius, np.stack([triad, across]), LINES, window, space)
-    mesh = lines_mesh(found.ends + measured.solids.origin)
+    found = replace(found, ends=found.ends + measured.solids.origin)
+    mesh = lines_mesh(found.ends)
     kept = found.void & (found.length >= measured.plan.cutoff)
     return _with(
         mesh,

@@ -258,16 +258,14 @@ def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
     In the dump's coordinates; clipped to the RV, if there is one, in which periodic images of the
     grains are solid too.
     """
-    grains = scene.grains
-    solid = ~grains.boundary
+    grains, solid = scene.grains, ~scene.grains.boundary
     up = np.asarray(axis, dtype=np.float64)
     depth = towards_viewer(up, scene.space)
     across = np.cross(depth, up)
     turn = np.radians(LINE_ANGLE)
     along = np.cos(turn) * across + np.sin(turn) * up
     frame = np.stack([np.cross(depth, along), depth, along])
-    position = grains.position[solid] - scene.center
-    radius = grains.radius[solid]
+    position, radius = grains.position[solid] - scene.center, grains.radius[solid]
     reach = float(np.linalg.norm(position, axis=1).max(initial=0.0))
     if scene.window is not None:
         reach = scene.window.reach

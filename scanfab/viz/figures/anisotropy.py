@@ -114,8 +114,8 @@ class Evolution(Curves):
         lines = ["bands: one total standard error,", ", ".join(parts)] if parts else []
         scan = np.concatenate([curve.errors("alpha_vs_axial_se") for curve in self.curves])
         if np.isfinite(scan).any() and not self.share:
-            largest = f"{1e3 * np.nanmax(scan):.2g}"
-            lines.append(rf"bars: the scan's part, at most ${largest}\times10^{{-3}}$")
+            largest = rf"${1e3 * np.nanmax(scan):.2g}\times10^{{-3}}$"
+            lines.append(f"bars: the scan's part, at most {largest}")
         return "\n".join(lines)
 
 
@@ -192,7 +192,7 @@ class Correlation(Figure):
         what = "intensity" if self.turned else "anisotropy along the loading axis"
         drawn = [] if self.turned else [one for group in self.groups for one in group.drawn]
         fitted = any(self.fits[one.place][0].slope is not None for one in drawn)
-        lines = ["fitted lines"] * fitted + ["the paper's slope"] * (self._reach(drawn) > 0)
+        lines = ["fitted lines"] * fitted + ["the paper's slope"] * bool(self._reach(drawn) > 0)
         which = f"with {' and '.join(lines)}" if lines else "without a line"
         return f"Void against contact {what}, {which}."
 
@@ -224,8 +224,7 @@ class Correlation(Figure):
         axes.set(xlabel=LABELS[f"alpha_c{self.part}"], ylabel=LABELS[f"alpha_vs{self.part}"])
         axes.axhline(0, color="0.6", lw=0.6, zorder=0)
         widen(axes, 1.0)
-        handles, labels = zip(*entries, strict=True)
-        margin.legend(handles, labels, title=title, **place)
+        margin.legend(*zip(*entries, strict=True), title=title, **place)
 
     def _draw_curve(self, axes: Axes, one: Drawn) -> tuple[Any, str]:
         """The frames of a curve, with their total errors, and its line."""

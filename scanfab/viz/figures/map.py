@@ -25,9 +25,9 @@ from scanfab.viz.figures.style import FRAME_LOOKS, LABELS, WIDTH, band
 QUANTITIES = (
     Quantity("alpha_vs_axial", LABELS["alpha_vs_axial"], 1e3, "total"),
     Quantity("alpha_c_axial", LABELS["alpha_c_axial"], 1e2, "total"),
-    Quantity("mean_length", "mean length\n(dump's unit)", errors="column"),
-    Quantity("solid_fraction", "solid fraction", errors="column"),
-    Quantity("coordination", "coordination", errors="column"),
+    Quantity("mean_length", "mean length\n(dump's unit)"),
+    Quantity("solid_fraction", "solid fraction"),
+    Quantity("coordination", "coordination"),
 )
 AXES = "xyz"
 # Coordinates that differ by less than this part of their spread are the same.

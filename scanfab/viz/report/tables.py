@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.option import flag_of
+from scanfab.base.spelling import counted
 from scanfab.pipeline.options import MEANINGS
 from scanfab.pipeline.record import HIDDEN, given_settings
 from scanfab.scan.directions import direction_rule
@@ -18,8 +19,6 @@ from scanfab.table.row import Row as TableRow
 from scanfab.table.row import groups_of, number_of, numbers_of, total_error, variant_of, with_error
 
 Row = Mapping[str, Any]
-Groups = Mapping[tuple[str, str], Sequence[Row]]
-"""Rows by source and variant."""
 
 # The table shows at most about so many frames of a source and variant.
 MOST_FRAMES = 12
@@ -84,10 +83,7 @@ def overview(table: Path, rows: Sequence[Row]) -> str:
     frames = len(set(map(_of_frame, rows)))
     variants = ", ".join(sorted({str(row["variant"]) for row in rows}))
     column = strain_column(rows)
-    parts = [
-        f"{frames} {'frame' if frames == 1 else 'frames'} of {', '.join(sources)}",
-        f"variants {variants}",
-    ]
+    parts = [f"{counted(frames, 'frame')} of {', '.join(sources)}", f"variants {variants}"]
     if numbers_of(rows, "grains"):
         # variants count all grains, grains in the RV, or grains without rattlers
         grains = {
@@ -111,17 +107,14 @@ def _span(rows: Sequence[Row], column: str, spelling: str, factor: float = 1.0) 
 
 def results_tables(summary: Iterable[TableRow], rows: Sequence[Row]) -> list[Part]:
     """A table for each source, with a column for each variant."""
-    return [
-        _results(
-            [one for one in summary if one.source == source],
-            [row for row in rows if row["source"] == source],
-        )
-        for source in dict.fromkeys(one.source for one in summary)
-    ]
+    sources = dict.fromkeys(one.source for one in summary)
+    return [_results(source, summary, rows) for source in sources]
 
 
-def _results(summary: Sequence[TableRow], rows: Sequence[Row]) -> Part:
-    source, turned = summary[0].source, is_turned(rows)
+def _results(source: str, summary: Iterable[TableRow], rows: Sequence[Row]) -> Part:
+    summary = [one for one in summary if one.source == source]
+    rows = [row for row in rows if row["source"] == source]
+    turned = is_turned(rows)
     filled = groups_of(row for row in rows if row[VOID] is not None)
     each = [filled.get((source, variant_of(one)), [{}]) for one in summary]
     first, last = [one[0] for one in each], [one[-1] for one in each]
@@ -249,10 +242,8 @@ def _of_frame(row: Row) -> tuple[Any, Any]:
 def input_table(manifest: Mapping[str, Any]) -> Part:
     """The first input files with size and hash."""
     files = list(manifest.get("inputs") or [])
-    lines = [
-        [str(one.get("path")), str(one.get("size")), str(one.get("sha256"))]
-        for one in files[:MOST_INPUTS]
-    ]
+    names = ("path", "size", "sha256")
+    lines = [[str(one.get(name)) for name in names] for one in files[:MOST_INPUTS]]
     more = len(files) - len(lines)
     note = f"and {more} more, in the manifest" if more else ""
     return Part(["file", "bytes", "SHA-256"], lines, note)
@@ -283,7 +274,17 @@ def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, A
     asked : iterable of mapping
         The settings in their manifests.
     """
-    found = [*_biases(asked)]
+    found = []
+    for one in asked:
+        with suppress(SettingsError):
+            name = str(one.get("directions") or "")
+            bias = direction_rule(name).bias if name else 0.0
+            if bias >= SOME_BIAS:
+                found.append(
+                    f"The scan directions ({name}) are not spread evenly: a sample without any "
+                    f"anisotropy would get α = {bias:.2g}. Changes of α between frames mean more "
+                    f"than its value."
+                )
     filled = [row for row in rows if row[VOID] is not None]
     if len(filled) < len(rows):
         found.append(
@@ -308,21 +309,7 @@ def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, A
     return list(dict.fromkeys(found))
 
 
-def _biases(asked: Iterable[Mapping[str, Any]]) -> Iterator[str]:
-    """Warn of rules of scan directions that find anisotropy in an isotropic sample."""
-    for one in asked:
-        with suppress(SettingsError):
-            name = str(one.get("directions") or "")
-            bias = direction_rule(name).bias if name else 0.0
-            if bias >= SOME_BIAS:
-                yield (
-                    f"The scan directions ({name}) are not spread evenly: a sample without any "
-                    f"anisotropy would get α = {bias:.2g}. Changes of α between frames mean more "
-                    f"than its value."
-                )
-
-
-def _large_errors(groups: Groups) -> Iterator[str]:
+def _large_errors(groups: Mapping[tuple[str, str], Sequence[Row]]) -> Iterator[str]:
     """Warn of sources with a large total error, and say what would make it smaller."""
     large: dict[str, list[tuple[str, float, float]]] = {}
     for (source, variant), group in groups.items():
@@ -335,10 +322,8 @@ def _large_errors(groups: Groups) -> Iterator[str]:
         )
         total = math.hypot(scan, sample)
         if total > NOTABLE * signal:
-            text = (
-                f"in variant {variant} ({total:.2g} beside {signal:.2g}; scan {scan:.2g}, sample "
-                f"{sample:.2g})"
-            )
+            parts = f"scan {scan:.2g}, sample {sample:.2g}"
+            text = f"in variant {variant} ({total:.2g} beside {signal:.2g}; {parts})"
             large.setdefault(source, []).append((text, scan, sample))
     for source, doubts in large.items():
         # a part that is less than half of the other part hardly adds to the total error
