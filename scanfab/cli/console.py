@@ -280,7 +280,7 @@ def spelt(value: Any, digits: int = 3) -> str:
 
 def draw(outputs: Output, data: Any, kind: str, **more: Any) -> None:
     """Draw the figures that the options name; ``more`` goes to every figure."""
-    from scanfab.viz.figures.page import make_figures, save_figures
+    from scanfab.viz.figures.figure import make_figures, save_figures
 
     if outputs.plot is not None:
         save_figures(outputs.plot, make_figures(data, kind, outputs.figure, **more))

@@ -183,7 +183,7 @@ def take_output(chosen: dict[str, Any], *kinds: str) -> Output:
 
     It is a usage error if the figure is not of one of these kinds, or its file has a wrong format.
     """
-    from scanfab.viz.figures.page import find_figure
+    from scanfab.viz.figures.figure import find_figure
     from scanfab.viz.figures.style import check_plot_file
 
     outputs = Output(**{name: chosen.pop(name) for name in vars(Output()) if name in chosen})

@@ -35,7 +35,7 @@ def write_table(
     """
     from scanfab.io.follow import FollowedSeries
     from scanfab.pipeline.job import Job
-    from scanfab.viz.paraview import vtk_folders
+    from scanfab.viz.compute_file import vtk_folders
 
     ctx = click.get_current_context()
     figures = ("map",) if kind is MapSettings else ("table", "frames")
@@ -115,7 +115,7 @@ class _Drawing:
 
     def __init__(self, outputs: Output, kinds: tuple[str, ...]) -> None:
         from scanfab.table.plots import figures_of
-        from scanfab.viz.figures.page import find_figure
+        from scanfab.viz.figures.figure import find_figure
 
         self.outputs, self.kind, self._drawn = outputs, kinds[0], 0
         figures = list(figures_of(self.kind).values()) if outputs.plot is not None else []

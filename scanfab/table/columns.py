@@ -59,6 +59,9 @@ MORE_COLUMNS = (
 )
 """Columns that a table has only if options ask for them."""
 
+KINDS = {column.name: column.kind for column in (*OWN_COLUMNS, *MORE_COLUMNS)}
+"""The kind of each column of fabric tables."""
+
 SHELL_COLUMNS = (
     Column("r_inner", float, LENGTH, "of a map: inner radius of the shell"),
     Column("r_outer", float, LENGTH, "of a map: outer radius of the shell"),

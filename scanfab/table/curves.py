@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from scanfab.base.typing import FloatArray
-from scanfab.table.row import Rows, column_of, groups_of, number_of, numbers_of, total_error
+from scanfab.table.row import Rows, column_of, groups_of, number_of, numbers_of, total_errors
 
 # columns of strains, each with its name and its symbol in figures
 STRAINS = {
@@ -63,7 +63,7 @@ class Curve:
         """
         if name == "alpha_c_axial" and self.contact_alone:
             return self.errors("alpha_c_axial_se")
-        errors = np.array([total_error(row, name) for row in self.rows], np.float64)
+        errors = total_errors(self.rows, name)
         return np.where(errors < 0, np.nan, _drawable(errors))
 
     @property
@@ -83,6 +83,11 @@ def curves_of(rows: Iterable[Mapping[str, Any]]) -> list[Curve]:
         Curve(names[source], variant, factor * _drawable(column_of(group, abscissa)), group)
         for (source, variant), group in groups.items()
     ]
+
+
+def have_errors(curves: Iterable[Curve], column: str) -> bool:
+    """Whether some total error of an anisotropy is known."""
+    return any(np.isfinite(curve.total_errors(column)).any() for curve in curves)
 
 
 def _drawable(array: FloatArray) -> FloatArray:
@@ -124,10 +129,8 @@ def why_not_strain(rows: Rows) -> str | None:
     instead, cure = abscissa_words(rows), "chooses the length that it is measured by"
     if strain_column(rows) is not None:
         instead, cure = "shear_strain", "chooses another length"
-    return (
-        f"{instead} is used in place of the axial strain, because {'; '.join(lacking)}: `strain` "
-        f"of compute {cure}"
-    )
+    why = f"because {'; '.join(lacking)}"
+    return f"{instead} is used in place of the axial strain, {why}: `strain` of compute {cure}"
 
 
 def _lacking(rows: Rows, column: str) -> list[str]:

@@ -195,6 +195,11 @@ def total_error(row: Mapping[str, Any], name: str) -> float | None:
     return None if scan is None or sample is None else math.hypot(scan, sample)
 
 
+def total_errors(rows: Iterable[Mapping[str, Any]], name: str) -> FloatArray:
+    """:func:`total_error` of each row, shape (rows,), with NaN where it is not known."""
+    return np.array([total_error(row, name) for row in rows], np.float64)
+
+
 def as_text(rows: Rows, names: Sequence[str]) -> str:
     """A table as text: the number of rows, and the first and last rows."""
     lines = _lines(rows, names) if rows else []
@@ -214,9 +219,11 @@ def as_html(rows: Rows, names: Sequence[str]) -> str:
     )
 
 
-def with_error(value: float | None, error: float | None) -> str:
+def with_error(value: float | None, error: float | None, alone: str = ".3g") -> str:
     """
     A value and its standard error, to two digits of the error; a dash for a missing value.
+
+    ``alone`` is the format of a value whose error is not known.
 
     Examples
     --------
@@ -227,8 +234,9 @@ def with_error(value: float | None, error: float | None) -> str:
     if value is None:
         return "-"
     if error is None or not error > 0:
-        return f"{value:.3g}"
-    decimals = max(0, 1 - math.floor(math.log10(error)))
+        return f"{value:{alone}}"
+    # count the digits of the rounded error: 0.00099999 is 0.0010
+    decimals = max(0, 1 - math.floor(math.log10(float(f"{error:.1e}"))))
     return f"{value:.{decimals}f} ± {error:.{decimals}f}"
 
 

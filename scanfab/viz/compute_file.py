@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.errors import SettingsError
+from scanfab.base.files import check_folder, whole_file
 from scanfab.base.option import options_of, refuse_unknown
 from scanfab.io.families import PathLike, expanded
 from scanfab.io.options import take_reading
 from scanfab.io.series import Series
 from scanfab.io.sources import READING, open_sources
+from scanfab.pipeline.frame import FrameResult
 from scanfab.pipeline.job import Job
 from scanfab.pipeline.map_settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.options import listening
 from scanfab.pipeline.settings import Settings
 from scanfab.table.table import Table, load
 from scanfab.table.writing import Excerpt
-from scanfab.viz.paraview import vtk_folders
 
 Source = Series | PathLike
+ENTRY = re.compile(r'<DataSet timestep="([^"]*)" file="([^"]*)"/>')
 
 
 def compute_file(
@@ -146,3 +150,76 @@ def _opened(source: Source | Sequence[Source], options: dict[str, Any]) -> Seque
         )
     paths = [os.fspath(path) for one in given for path in expanded(one)]
     return open_sources(paths, **take_reading(options))
+
+
+def vtk_folders(folder: Path, count: int, settings: Settings, go_on: bool) -> list[VtkFolder]:
+    """
+    Make the folders for ParaView files; each of several series has a folder of its own.
+
+    Raises
+    ------
+    SettingsError
+        If a folder cannot be made or written to, or if there are several cut-offs.
+    """
+    if settings.cutoffs:
+        raise SettingsError("vtk: files for ParaView are of one cut-off: leave out `cutoffs`")
+    several = [folder / f"series-{number}" for number in range(1, count + 1)]
+    return [VtkFolder(one, go_on) for one in (several if count > 1 else [folder])]
+
+
+class VtkFolder:
+    """
+    A folder of the ParaView files of one series, to be called with each of its computed frames.
+
+    Parameters
+    ----------
+    folder : Path
+        Is made if it does not exist.
+    go_on : bool, optional
+        Keep the frames of an earlier run in the collections.
+
+    Raises
+    ------
+    SettingsError
+        If the folder cannot be made or written to.
+    """
+
+    def __init__(self, folder: Path, go_on: bool = False) -> None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise SettingsError(f"vtk: {folder} cannot be made: {error.strerror}") from None
+        check_folder(folder / "grains.pvd")
+        self.folder, self.go_on = folder, go_on
+        # the time of each file, by kind
+        self._times: dict[str, dict[str, float]] = {}
+        # VTK must not be used by several threads at once
+        self._lock = Lock()
+
+    def __call__(self, result: FrameResult) -> None:
+        """Write all files of a frame, and the collections with it."""
+        # loaded here, as VTK takes a second that a run without these files need not wait
+        from scanfab.viz.meshes import meshes_of, save_mesh
+
+        packing = result.sample.packing
+        known = [one for one in (packing.time, packing.step, result.number) if one is not None]
+        with self._lock:
+            for kind, mesh, fields in meshes_of(result):
+                path = save_mesh(mesh, self.folder / f"{kind}_{result.number:06d}", fields)
+                self._collect(kind, path.name, float(known[0]))
+
+    def _collect(self, kind: str, file: str, time: float) -> None:
+        """Add a file to the collection of its kind, which is complete after each frame."""
+        path = self.folder / f"{kind}.pvd"
+        if kind not in self._times:
+            before = path.read_text("utf-8") if self.go_on and path.exists() else ""
+            self._times[kind] = {name: float(at) for at, name in ENTRY.findall(before)}
+        self._times[kind][file] = time
+        entries = sorted((at, name) for name, at in self._times[kind].items())
+        lines = [f'    <DataSet timestep="{at!r}" file="{name}"/>\n' for at, name in entries]
+        text = (
+            '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+            f"{''.join(lines)}  </Collection>\n</VTKFile>\n"
+        )
+        with whole_file(path) as part:
+            part.write_text(text, encoding="utf-8")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -22,9 +22,7 @@ from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.settings import Settings
 from scanfab.table.curves import spelt_strain, strain_column
 from scanfab.table.plots import Plots
-from scanfab.table.row import Row, number_of, numbers_of, variant_of
-
-Rows = Sequence[Mapping[str, Any]]
+from scanfab.table.row import Row, Rows, numbers_of, variant_of
 
 
 def scan_frames(
@@ -92,9 +90,8 @@ class ScannedFrame:
         """Result of the scan."""
         self.space: Space = self.measurement.plan.space
         """The plane of the frame, if its grains are discs."""
-        self.row: Row = next(
-            row for row in result.rows if (row["variant"], row.get("rv")) == (variant, rv)
-        )
+        own = (row for row in result.rows if (row["variant"], row.get("rv")) == (variant, rv))
+        self.row: Row = next(own)
         """The row of the variant at the first cut-off."""
         sample = result.sample
         self.smallest = float(sample.packing.radius[sample.grains].min())
@@ -188,15 +185,11 @@ class ScannedFrames:
         # titles have the strains of the table, as a strain file may have changed since
         told = self.rows or rows
         column, told_of = strain_column(told), {row["frame"]: row for row in told}
-        found = []
-        for row in rows:
-            if row["alpha_vs_axial"] is not None:
-                number = row["frame"]
-                strain = spelt_strain(told_of[number], column, symbol=True)
-                parts = (f"variant {self._kind}", f"frame {number}", strain)
-                result = next(one for one in results if one.number == number)
-                title = ", ".join(filter(None, parts))
-                found.append(ScannedFrame(result, self.variant, self.rv, title))
+        result_of, found = {one.number: one for one in results}, []
+        for number in [row["frame"] for row in rows if row["alpha_vs_axial"] is not None]:
+            strain = spelt_strain(told_of[number], column, symbol=True)
+            title = ", ".join(filter(None, [f"variant {self._kind}", f"frame {number}", strain]))
+            found.append(ScannedFrame(result_of[number], self.variant, self.rv, title))
         return found
 
     @cached_property
@@ -205,17 +198,15 @@ class ScannedFrames:
         if self.rows is None:
             numbers = [number for number, _ in Frames(self.source, self.settings).due()]
         else:
-            filled = [row for row in self.rows if number_of(row, "alpha_vs_axial") is not None]
-            numbers = [row["frame"] for row in filled]
+            numbers = [row["frame"] for row in self.rows if numbers_of([row], "alpha_vs_axial")]
         return min(numbers), max(numbers)
 
     def _own(self, rows: Rows) -> Rows:
         """The rows of the variant; SettingsError if there is nothing to draw."""
         own = [row for row in rows if variant_of(row) == self._kind]
         if not numbers_of(own, "alpha_vs_axial"):
-            raise SettingsError(
-                f"there is nothing to draw: no frame has a void fabric of variant {self._kind}"
-            )
+            none = f"no frame has a void fabric of variant {self._kind}"
+            raise SettingsError(f"there is nothing to draw: {none}")
         return own
 
     def __repr__(self) -> str:

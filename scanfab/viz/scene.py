@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +20,7 @@ from scanfab.packing.window import Window
 from scanfab.pipeline.frames import Frames, doubts_of_frame
 from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.strain import Strains, shear_strain
+from scanfab.pipeline.strain import Strains
 from scanfab.pipeline.values import Vector
 from scanfab.scan.lines import Segments, cut_lines
 from scanfab.table.curves import SAME, frame_strain_column
@@ -29,6 +29,12 @@ from scanfab.table.curves import SAME, frame_strain_column
 LINE_ANGLE = 30.0
 # The colour of a clump is multiplied by one of these, so that neighbours can be told apart.
 SHADES = (1.0, 0.8, 0.62)
+# Kinds of grains, which have a colour each.
+IN_WINDOW, OUTSIDE, RATTLER = 0, 1, 2
+
+
+Strained = Mapping[str, float | None]
+"""Strains of a frame by the names of their columns; None where one is not known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +61,15 @@ class Grains:
         return self.position if self.to_place is None else self.position + self.to_place
 
     @property
+    def kind(self) -> IntArray:
+        """Whether each grain is a rattler, or lies in the RV or outside, shape (N,)."""
+        return np.where(self.rattler, RATTLER, np.where(self.in_window, IN_WINDOW, OUTSIDE))
+
+    @property
     def shade(self) -> IntArray:
         """Number of each sphere's shade, shape (N,); all spheres of a body have the same."""
-        if self.body is None:
-            return np.zeros(len(self.radius), np.int64)
-        return np.asarray(np.maximum(self.body, 0) % len(SHADES))
+        body = np.zeros(len(self.radius), np.int64) if self.body is None else self.body
+        return np.asarray(np.maximum(body, 0) % len(SHADES))
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +109,7 @@ class Look:
     number: int
     """Number of the frame, counted from 0."""
     sample: Sample
-    strains: dict[str, float | None]
+    strains: Strained
     """Axial and shear strain since the first frame that has grains, by the names of their columns
     in the fabric table; None where that is not known."""
     first: Sample | None
@@ -171,16 +181,11 @@ def _plan(first: Sample, settings: Settings) -> Plan | None:
     return plan
 
 
-def _strains(
-    number: int, sample: Sample, first: Sample | None, settings: Settings
-) -> dict[str, float | None]:
-    """Both strains as in the fabric table; None if one is not known."""
-    axial, shear = None, None
+def _strains(number: int, sample: Sample, first: Sample | None, settings: Settings) -> Strained:
+    """The strains of a frame as in the fabric table; none if they cannot be measured."""
     with suppress(SettingsError):
-        axial = Strains.of(settings, first).at(number, sample)["strain"]
-    if first is not None and sample.grains.any():
-        shear = shear_strain(sample.packing.cell, first.packing.cell)
-    return {"strain": axial, "shear_strain": shear}
+        return Strains.of(settings, first).at(number, sample)
+    return {}
 
 
 def scene_of(sample: Sample, *windows: Window) -> Scene:
@@ -239,13 +244,9 @@ def about_window(scene: Scene) -> Scene:
     images, row = cell.images_near_origin(branch, grains.radius + scene.window.reach)
     other = np.linalg.norm(images - nearest[row], axis=1) > 1e-6 * grains.radius[row]
     rows = np.concatenate([np.arange(len(nearest)), row[other]])
-    position = np.concatenate([nearest, images[other]]) + scene.center
-    shown: dict[str, Any] = {
-        one.name: None if (values := getattr(grains, one.name)) is None else values[rows]
-        for one in fields(grains)
-    }
-    shown["position"] = position
-    moved = Grains(**shown)
+    taken = {name: values[rows] for name, values in vars(grains).items() if values is not None}
+    taken["position"] = np.concatenate([nearest, images[other]]) + scene.center
+    moved = replace(grains, **taken)
     moved.in_window[:] = scene.window.contains(moved.places - scene.center)
     return replace(scene, grains=moved)
 
@@ -257,16 +258,14 @@ def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
     In the dump's coordinates; clipped to the RV, if there is one, in which periodic images of the
     grains are solid too.
     """
-    grains = scene.grains
-    solid = ~grains.boundary
+    grains, solid = scene.grains, ~scene.grains.boundary
     up = np.asarray(axis, dtype=np.float64)
     depth = towards_viewer(up, scene.space)
     across = np.cross(depth, up)
     turn = np.radians(LINE_ANGLE)
     along = np.cos(turn) * across + np.sin(turn) * up
     frame = np.stack([np.cross(depth, along), depth, along])
-    position = grains.position[solid] - scene.center
-    radius = grains.radius[solid]
+    position, radius = grains.position[solid] - scene.center, grains.radius[solid]
     reach = float(np.linalg.norm(position, axis=1).max(initial=0.0))
     if scene.window is not None:
         reach = scene.window.reach

@@ -19,8 +19,8 @@ from scanfab.base.errors import ScanfabError
 from scanfab.base.files import whole_file
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.viz.figures.style import COLOURS, rounded_down
-from scanfab.viz.meshes import window_mesh
-from scanfab.viz.scene import SHADES, Scene, towards_viewer
+from scanfab.viz.meshes import lines_mesh, window_mesh
+from scanfab.viz.scene import OUTSIDE, SHADES, Scene, towards_viewer
 
 ADVICE = (
     "install one of them: on Debian or Ubuntu apt-get install libegl1 libgl1 libosmesa6, or "
@@ -48,13 +48,10 @@ def check_screen() -> None:
     ScanfabError
         If there is none.
     """
-    if sys.platform.startswith("linux") and not (
-        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    ):
-        raise ScanfabError(
-            "this machine has no screen for a window (DISPLAY is not set): "
-            'write a picture instead: `screenshot="FILE.png"`'
-        )
+    has_screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if sys.platform.startswith("linux") and not has_screen:
+        problem = "this machine has no screen for a window (DISPLAY is not set)"
+        raise ScanfabError(f'{problem}: write a picture instead: `screenshot="FILE.png"`')
 
 
 def check_drawing() -> None:
@@ -68,20 +65,13 @@ def check_drawing() -> None:
     ScanfabError
         If it cannot. The message says what to install.
     """
-    code = (
-        "from vtkmodules.vtkRenderingCore import vtkRenderWindow; "
-        "import vtkmodules.vtkRenderingOpenGL2; "
-        "w = vtkRenderWindow(); w.SetOffScreenRendering(1); w.SetSize(8, 8); "
-        "w.Render()"
-    )
-    command = [sys.executable, "-c", code]
-    if subprocess.run(command, capture_output=True, check=False).returncode != 0:
+    code = "import pyvista; pyvista.Plotter(off_screen=True, window_size=[8, 8]).show()"
+    tried = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)
+    if tried.returncode != 0:
         raise ScanfabError(f"VTK finds no OpenGL, EGL or OSMesa library to draw with: {ADVICE}")
 
 
-def show_scene(
-    scene: Scene, axis: npt.ArrayLike, title: str = "", screenshot: Path | None = None
-) -> None:
+def show_scene(scene: Scene, axis: npt.ArrayLike, title: str, screenshot: Path | None) -> None:
     """
     Show the grains of a frame, its RV, and scan lines in a section if the scene has lines.
 
@@ -91,9 +81,9 @@ def show_scene(
         If it has ``lines``, the grains in front of them are left out.
     axis : array_like, shape (3,)
         This axis is upright.
-    title : str, optional
+    title : str
         Title of the window.
-    screenshot : Path, optional
+    screenshot : Path or None
         Write a PNG file instead of opening a window.
 
     Raises
@@ -105,32 +95,27 @@ def show_scene(
         check_drawing()
     # VTK would write to standard error; exceptions report what is wrong
     with pyvista.vtk_verbosity("off"):
-        plotter: Any = pyvista.Plotter(
-            off_screen=screenshot is not None, window_size=list(SIZE), title=title or "scanfab"
-        )
+        is_file = screenshot is not None
+        plotter: Any = pyvista.Plotter(off_screen=is_file, window_size=list(SIZE), title=title)
         _draw(plotter, scene, np.asarray(axis, dtype=np.float64), title)
         if screenshot is None:
             plotter.show()
             return
-        try:
-            with whole_file(screenshot) as part:
-                plotter.screenshot(str(part))
-        finally:
-            plotter.close()
+        with whole_file(screenshot) as part:
+            plotter.screenshot(str(part))
+        plotter.close()
 
 
 def _draw(plotter: Any, scene: Scene, up: FloatArray, title: str) -> None:
     """Draw the scene, and place the camera."""
     grains, window, toward = scene.grains, scene.window, towards_viewer(up, scene.space)
     look = toward if scene.is_section else toward + 0.45 * np.cross(up, toward) + 0.35 * up
+    shown = ~grains.boundary
     if scene.is_section:
-        shown = (grains.position - scene.center) @ toward < grains.radius
+        shown &= (grains.position - scene.center) @ toward < grains.radius
     elif window is not None:
         # grains outside the RV and in front of its centre would hide it
-        shown = grains.in_window | ((grains.places - scene.center) @ look <= 0.0)
-    else:
-        shown = np.ones(len(grains.radius), bool)
-    shown &= ~grains.boundary
+        shown &= grains.in_window | ((grains.places - scene.center) @ look <= 0.0)
     names = _add_grains(plotter, scene, shown, toward)
     for one in reversed(scene.windows):
         _add_window(plotter, scene, one, toward)
@@ -152,73 +137,52 @@ def _add_grains(plotter: Any, scene: Scene, shown: BoolArray, toward: FloatArray
 
     Gives back the names of the legend with their colours.
     """
-    grains = scene.grains
-    grain, rattler = ~grains.boundary & ~grains.rattler, ~grains.boundary & grains.rattler
-    kinds = {
-        "grain in the RV": (COLOURS["sky"], grain & grains.in_window),
-        "grain outside": ("#D2D7DB", grain & ~grains.in_window),
-        "rattler": (COLOURS["orange"], rattler),
-    }
+    grains, is_flat = scene.grains, scene.space.is_plane
+    kinds = [("grain in the RV", COLOURS["sky"]), ("grain outside", "#D2D7DB")]
     if scene.window is None:
-        kinds = {"grain": (COLOURS["sky"], grain), "rattler": kinds["rattler"]}
-    height = (grains.position - scene.center) @ toward
-    is_pale = not scene.space.is_plane or scene.lines is not None
-    disk = pyvista.Disc(inner=0.0, outer=0.5, normal=toward, c_res=48)
-    for colour, kind in kinds.values():
-        for number, shade in enumerate(SHADES):
-            chosen = kind & shown & (grains.shade == number)
-            tint = _mixed(colour, shade)
-            cut = chosen & (height > -grains.radius)
-            if scene.is_section and cut.any():
-                places = grains.position[cut] - height[cut, None] * toward
-                radius = np.sqrt(grains.radius[cut] ** 2 - height[cut] ** 2)
-                disks = _glyphs(places, radius, disk)
-                # paler than the balls behind it
-                flat = _mixed(tint, 0.45, 0.55) if is_pale else tint
-                plotter.add_mesh(disks, color=flat, lighting=False)
-            if chosen.any() and not scene.space.is_plane:
-                # fewer triangles for large samples
-                fine = 24 if chosen.sum() < 5_000 else 12
-                ball = pyvista.Sphere(radius=0.5, theta_resolution=fine, phi_resolution=fine)
-                balls = _glyphs(grains.position[chosen], grains.radius[chosen], ball)
-                if scene.is_section:
-                    balls = balls.clip(normal=toward, origin=scene.center)
-                plotter.add_mesh(balls, color=tint, smooth_shading=True, ambient=0.2, specular=0.2)
-    return {name: colour for name, (colour, kind) in kinds.items() if kind.any()}
+        kinds[OUTSIDE] = ("grain", COLOURS["sky"])
+    kinds.append(("rattler", COLOURS["orange"]))
+    colours = np.array([pyvista.Color(colour).float_rgb for _, colour in kinds])[grains.kind]
+    colours *= np.array(SHADES)[grains.shade][:, None]
+    position, radius = grains.position, grains.radius
+    height = (position - scene.center) @ toward
+    cut = shown & (height > -radius)
+    if scene.is_section and cut.any():
+        places = position[cut] - height[cut, None] * toward
+        # paler than the balls behind them
+        pale = colours if is_flat and scene.lines is None else 0.45 * colours + 0.55
+        disk = pyvista.Disc(inner=0.0, outer=0.5, normal=toward, c_res=48)
+        disks = _glyphs(places, np.sqrt(radius[cut] ** 2 - height[cut] ** 2), disk, pale[cut])
+        plotter.add_mesh(disks, scalars="colour", rgb=True, lighting=False)
+    if shown.any() and not is_flat:
+        # fewer triangles for large samples
+        fine = 24 if shown.sum() < 5_000 else 12
+        ball = pyvista.Sphere(radius=0.5, theta_resolution=fine, phi_resolution=fine)
+        balls = _glyphs(position[shown], radius[shown], ball, colours[shown])
+        if scene.is_section:
+            balls = balls.clip(normal=toward, origin=scene.center)
+        look = {"smooth_shading": True, "ambient": 0.2, "specular": 0.2}
+        plotter.add_mesh(balls, scalars="colour", rgb=True, **look)
+    found = set(grains.kind[~grains.boundary])
+    return dict(kind for number, kind in enumerate(kinds) if number in found)
 
 
-def _mixed(colour: str, share: float, white: float = 0.0) -> str:
-    """Multiply a colour by a share, and add white."""
-    return str(
-        pyvista.Color([share * part + white for part in pyvista.Color(colour).float_rgb]).hex_rgb
-    )
-
-
-def _glyphs(places: FloatArray, radius: FloatArray, shape: Any) -> Any:
+def _glyphs(places: FloatArray, radius: FloatArray, shape: Any, colours: FloatArray) -> Any:
     """Copies of a shape of diameter 1 at places, scaled to radii."""
     cloud = pyvista.PolyData(places)
     cloud.point_data["diameter"] = 2.0 * radius
+    cloud.point_data["colour"] = np.rint(255.0 * colours).astype(np.uint8)
     return cloud.glyph(geom=shape, scale="diameter", orient=False)
 
 
 def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) -> None:
     """Draw the surface of an RV, or its outline in a section."""
-    center = tuple(scene.center)
-    if scene.lines is None and not window.is_flat:
-        surface = window_mesh(scene.center, window, nsub=5)
-        smooth = not len(window.planes)
-        plotter.add_mesh(surface, color=COLOURS["blue"], opacity=0.12, smooth_shading=smooth)
-        return
-    if window.is_sphere:
-        radius = window.reach
-        outline = pyvista.Disc(
-            center=center, inner=radius, outer=1.008 * radius, normal=toward, c_res=180
-        )
-    else:
-        mesh = window_mesh(scene.center, window)
-        cut = mesh if window.is_flat else mesh.slice(normal=toward, origin=center)
-        outline = cut.tube(radius=0.004 * window.reach)
-    plotter.add_mesh(outline, color=COLOURS["blue"], lighting=False)
+    mesh, smooth = window_mesh(scene.center, window, nsub=5), not len(window.planes)
+    look: dict[str, Any] = {"opacity": 0.12, "smooth_shading": smooth}
+    if scene.lines is not None or window.is_flat:
+        cut = mesh if window.is_flat else mesh.slice(normal=toward, origin=scene.center)
+        mesh, look = cut.tube(radius=0.004 * window.reach), {"lighting": False}
+    plotter.add_mesh(mesh, color=COLOURS["blue"], **look)
 
 
 def _add_lines(plotter: Any, scene: Scene) -> dict[str, str]:
@@ -229,8 +193,7 @@ def _add_lines(plotter: Any, scene: Scene) -> dict[str, str]:
     thickness = 0.14 * float(scene.grains.radius[~scene.grains.boundary].mean())
     for chosen, colour in ((kept, "black"), (lines.void & ~kept, "vermilion")):
         if chosen.any():
-            segments = pyvista.line_segments_from_points(lines.ends[chosen].reshape(-1, 3))
-            tubes = segments.tube(radius=thickness)
+            tubes = lines_mesh(lines.ends[chosen]).tube(radius=thickness)
             plotter.add_mesh(tubes, color=COLOURS[colour], lighting=False)
     return {"void segment kept": COLOURS["black"], "dropped": COLOURS["vermilion"]}
 
@@ -295,8 +258,7 @@ def _add_scale(plotter: Any) -> None:
         across = 2.0 * plotter.camera.parallel_scale * SIZE[0] / SIZE[1]
         length = rounded_down(0.2 * across)
         left = 1.0 - MARGIN - length / across
-        bar.points[:, 0] = np.where(BAR[:, 0] > 0.5, 1.0 - MARGIN, left)
-        bar.points[:, 1] = BAR[:, 1]
+        bar.points[:, 0] = left + BAR[:, 0] * length / across
         bar.Modified()
         words.SetInput(f"{length:g}")
         words.SetPosition(left, 0.045)
@@ -307,9 +269,8 @@ def _add_scale(plotter: Any) -> None:
 
 def _write(plotter: Any, text: str, x: float, y: float, size: int) -> Any:
     """Write words at a place in shares of the window, from the lower left."""
-    return plotter.add_text(
-        text, position=(x, y), viewport=True, font_size=size, color="black", font="arial"
-    )
+    look: Any = {"font_size": size, "color": "black", "font": "arial"}
+    return plotter.add_text(text, position=(x, y), viewport=True, **look)
 
 
 def _fill(plotter: Any, corners: FloatArray, colour: str) -> Any:

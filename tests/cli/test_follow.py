@@ -212,7 +212,7 @@ def test_files_that_change_before_the_next_frame_are_an_error(folder, finished):
 
 
 def test_the_plot_is_drawn_again(folder, finished, monkeypatch):
-    from scanfab.viz.figures import page
+    from scanfab.viz.figures import figure as page
 
     drawn = []
     monkeypatch.setattr(page, "save_figures", lambda path, figures: drawn.append(path))

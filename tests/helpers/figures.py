@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scanfab.viz.figures.page import make_figures, save_figures
+from scanfab.viz.figures.figure import make_figures, save_figures
 
 BYTES = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 

@@ -10,7 +10,7 @@ import scanfab
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
 from scanfab.table.columns import COLUMNS
-from scanfab.viz.paraview import VtkFolder
+from scanfab.viz.compute_file import VtkFolder
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.lattices import shaken_cubic
 

@@ -1,4 +1,4 @@
-"""The figures evolution and normalised, and what figures of curves over the strain share."""
+"""Figures of curves over the strain: what they share, and the figure columns."""
 
 from __future__ import annotations
 
@@ -11,23 +11,14 @@ from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from scanfab.base.column import no_column
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray
-from scanfab.table.curves import Curve, abscissa_label, abscissa_words, curves_of, is_turned
+from scanfab.table.curves import Curve, abscissa_label, abscissa_words, curves_of
+from scanfab.table.row import numbers_of
 from scanfab.table.table import Table
-from scanfab.viz.figures.figure import Figure, one_of
-from scanfab.viz.figures.style import (
-    COLOURS,
-    CONTACT,
-    LABELS,
-    LOOKS,
-    NAMES,
-    VOID,
-    WIDTH,
-    band,
-    plain,
-    widen,
-)
+from scanfab.viz.figures.figure import Figure
+from scanfab.viz.figures.style import COLOURS, LOOKS, WIDTH, band, plain, widen
 
 Look = dict[str, Any]
 
@@ -44,6 +35,12 @@ MEANINGS = {"a": "whole", "b": "whole, rattlers void", "c": "RV", "d": "RV, ratt
 # Height of each further row of panels, inches.
 ROW = 2.1
 MOST_MARKERS = 25
+# The columns that are drawn if no names are given, as far as the table has them.
+FIRST = (
+    "p", "q", "void_ratio", "coordination_mechanical", "acst_vs", "acst_c",
+    "alpha_bn_axial", "alpha_fn_axial", "alpha_ft_axial", "alpha_gc_strong_axial",
+    "f_vs", "f_c", "vs_a4", "c_a4",
+)  # fmt: skip
 
 
 class Drawn(NamedTuple):
@@ -118,7 +115,7 @@ class Quantity(NamedTuple):
     label: str
     factor: float = 1.0
     errors: Literal["total", "column", ""] = ""
-    """Errors of the band: scan and sample together, the column ``NAME_se``, or no band."""
+    """Errors of the band: scan and sample together, or the column ``NAME_se``, if there is one."""
     bars: bool = False
     """Whether bars show the scan's part of the errors, from the column ``NAME_se``."""
     smallest: float = 1.0
@@ -126,13 +123,8 @@ class Quantity(NamedTuple):
 
     def errors_of(self, curve: Curve) -> FloatArray:
         """The standard errors of a curve, shape (F,); NaN where there is none."""
-        if self.errors == "total":
-            return curve.total_errors(self.column)
-        found = curve.errors(f"{self.column}_se")
-        return found if self.errors else np.full_like(found, np.nan)
-
-
-ANGLE = Quantity("coaxiality_deg", "coaxiality, degrees")
+        is_total, name = self.errors == "total", self.column
+        return curve.total_errors(name) if is_total else curve.errors(f"{name}_se")
 
 
 class Curves(Figure):
@@ -152,32 +144,23 @@ class Curves(Figure):
         super().__init__(data)
         self.groups = groups_of(data)
         self.quantities = tuple(quantities)
-        self.looks = {one.name: one.look for group in self.groups for one in group.drawn}
+        drawn = [one for group in self.groups for one in group.drawn]
+        self.curves = [one.curve for one in drawn]
+        self.looks = {one.name: one.look for one in drawn}
+        self.rows = -(-len(self.quantities) // self.across)
+        """How many rows of panels each group has."""
 
     @property
     def note(self) -> str:
         """The lines above the legend."""
         return ""
 
-    @property
-    def curves(self) -> list[Curve]:
-        """All curves of the figure."""
-        return [one.curve for group in self.groups for one in group.drawn]
-
-    @property
-    def rows(self) -> int:
-        """How many rows of panels each group has."""
-        return -(-len(self.quantities) // self.across)
-
     def draw(self, ax: Axes) -> None:
         """The first quantity, with the legend in the panel."""
         group = group_of(self.groups)
         self._draw_panel(ax, group.drawn, self.quantities[0])
         self._set_abscissa(ax)
-        for name, look in self.looks.items():
-            # an entry of the legend without the error bars of the curve
-            ax.plot([], [], label=name, **look)
-        ax.legend()
+        ax.legend(self._handles(), list(self.looks))
 
     def panels(self, part: FigureBase) -> list[Axes]:
         """Some rows of panels for each group, and the legend above, so that it covers no data."""
@@ -196,11 +179,14 @@ class Curves(Figure):
         for axes in found[-across:]:
             self._set_abscissa(axes)
             axes.xaxis.set_tick_params(labelbottom=True)
-        handles = [Line2D([], [], **look) for look in self.looks.values()]
-        columns = 2 if max(map(len, self.looks)) > 12 else 4
+        columns = min(len(self.looks), 2 if max(map(len, self.looks)) > 12 else 4)
         above: dict[str, Any] = {"loc": "outside upper center", "title": self.note or None}
-        part.legend(handles, list(self.looks), ncols=min(len(handles), columns), **above)
+        part.legend(self._handles(), list(self.looks), ncols=columns, **above)
         return found
+
+    def _handles(self) -> list[Line2D]:
+        """Entries of the legend, without the error bars of the curves."""
+        return [Line2D([], [], **look) for look in self.looks.values()]
 
     def _draw_panel(self, axes: Axes, drawn: Sequence[Drawn], quantity: Quantity) -> None:
         """Values, their errors as bands, and the scan's part as bars."""
@@ -236,125 +222,86 @@ class Curves(Figure):
             axes.xaxis.set_major_locator(MaxNLocator(most, integer=True))
 
 
-class Evolution(Curves):
+class Columns(Curves):
     """
-    Void and contact anisotropy over the strain, or over the frames.
+    Columns of the table over the strain, or over the frames.
 
-    Bands are total standard errors, bars the scan's part. If the principal axes are not the loading
-    axis, as in simple shear, intensities are drawn, and the angle between both major axes.
+    Each column has a panel. Bands are standard errors, from the columns named ``NAME_se``.
 
     Parameters
     ----------
     data : Table
         A fabric table; on one Axes of one source, or of one variant.
-    of : str, optional
-        ``"voids"`` or ``"contacts"``, to draw these alone; on one Axes voids by default.
+    of : str or sequence of str, optional
+        Names of columns; in a text they are separated by commas. One Axes shows the first column.
+        The default are the columns of stress, forces, invariants and harmonics that the table has
+        (see the option `with_`).
 
     Raises
     ------
     SettingsError
-        If there is nothing to draw, or too much for one Axes.
+        If there is no such column, or nothing to draw.
 
     Examples
     --------
     >>> import scanfab
-    >>> from matplotlib.figure import Figure
-    >>> table = scanfab.load("sample_data/yade_triaxial/engine.csv")
-    >>> table = scanfab.Table(
-    ...     dict(row, source="s", variant="c", alpha_vs_axial=0.001 * k, alpha_c_axial=0.01 * k)
-    ...     for k, row in enumerate(table)
-    ... )
-    >>> ax = Figure().subplots()
-    >>> table.plot.evolution(ax=ax, of="contacts") is ax
-    True
+    >>> from matplotlib.figure import Figure as Page
+    >>> rows = [
+    ...     dict(source="s", frame=k, strain=0.1 * k, variant="c", alpha_vs_axial=0.0, p=2.0 + k)
+    ...     for k in range(3)
+    ... ]
+    >>> ax = scanfab.Table(rows).plot.columns(ax=Page().subplots(), of="p")
+    >>> ax.get_ylabel(), ax.lines[0].get_ydata().tolist()
+    ('p', [2.0, 3.0, 4.0])
     """
 
-    order = 1
-    columns = ("variant", "alpha_vs_axial", "strain", "alpha_c_axial")
-    height: ClassVar[float] = 2.9
-    """Of a single row of panels, inches."""
+    order = 4
+    columns = ("variant", "alpha_vs_axial", "strain")
+    across = 2
 
-    def __init__(self, data: Table, of: str | None = None) -> None:
-        self.turned = is_turned(data)
-        self.of = one_of(of, ("voids", "contacts"))
-        chosen = [self._quantity(name) for name in self.of]
-        self.has_angle = self.turned and not self.share and of is None
-        super().__init__(data, [*chosen, ANGLE] if self.has_angle else chosen)
+    def __init__(self, data: Table, of: str | Sequence[str] | None = None) -> None:
+        self.names = _named(data, of)
+        panels = [Quantity(one, plain(one), errors="column", smallest=1e-12) for one in self.names]
+        super().__init__(data, panels)
 
-    def _quantity(self, name: str) -> Quantity:
-        """The anisotropy along the loading axis, or the intensity if principal axes are turned."""
-        voids = name == "voids"
-        column = ("alpha_vs" if voids else "alpha_c") + ("" if self.turned else "_axial")
-        label, factor = LABELS[column], 1e3 if voids else 1e2
-        if self.share:
-            label, factor = f"{NAMES[column]} / largest", 1.0
-        bars = voids and not self.turned and not self.share
-        return Quantity(column, label, factor, "" if self.turned else "total", bars)
+    @classmethod
+    def parse(cls, argument: str) -> dict[str, Any] | None:
+        """Read names of columns, separated by commas."""
+        return {"of": argument} if argument else None
+
+    @classmethod
+    def suits(cls, data: Table) -> bool:
+        """Whether the table has columns that are drawn by default."""
+        return bool(_first(data))
 
     @property
     def size(self) -> tuple[float, float]:
-        """A row of panels for each group, and as many lines of legend."""
-        lines = -(-len(self.looks) // 2)
-        return WIDTH, self.height + ROW * (len(self.groups) - 1) + 0.15 * max(lines - 2, 0)
+        """Width and height for rows of two panels, inches."""
+        return WIDTH, ROW * self.rows * len(self.groups) + 0.8
 
     @property
     def caption(self) -> str:
-        """With the x axis, and with the quantities that have errors."""
-        what = f"{' and '.join(one.removesuffix('s') for one in self.of)} anisotropy"
-        drawn = f"{what.capitalize()} along the loading axis"
-        if self.turned:
-            angle = ", and the angle between their major axes" if self.has_angle else ""
-            drawn = f"Intensity of {what}{angle}"
-        divided = ", each curve divided by its own largest absolute value" if self.share else ""
-        banded = [
-            name
-            for name, one in zip(self.of, self.quantities, strict=False)
-            if one.errors and self._has_errors(one.column)
-        ]
-        errors = f"with total standard errors of {' and '.join(banded)}"
-        return (
-            f"{drawn}, over {abscissa_words(self.data)}{divided}; "
-            f"{errors if banded else 'without total errors'}."
-        )
-
-    @property
-    def note(self) -> str:
-        """The meaning of bands and bars."""
-        if self.turned:
-            return "without errors: the table has those of the axial values only"
-        alone = any(curve.contact_alone for curve in self.curves)
-        which = "contacts taken as independent" if alone else "the sample's"
-        parts = [f"of {VOID} scan and sample together"] * self._has_errors("alpha_vs_axial")
-        parts += [f"of {CONTACT} {which}"] * self._has_errors("alpha_c_axial")
-        # two lines, because one would be wider than the page
-        lines = ["bands: one total standard error,", ", ".join(parts)] if parts else []
-        scan = np.concatenate([curve.errors("alpha_vs_axial_se") for curve in self.curves])
-        if np.isfinite(scan).any() and not self.share:
-            largest = f"{1e3 * np.nanmax(scan):.2g}"
-            lines.append(rf"bars: the scan's part, at most ${largest}\times10^{{-3}}$")
-        return "\n".join(lines)
-
-    def _has_errors(self, column: str) -> bool:
-        return any(np.isfinite(curve.total_errors(column)).any() for curve in self.curves)
+        """The names of the columns and of the x axis."""
+        has_errors = any(f"{name}_se" in self.data.names for name in self.names)
+        errors = "; bands are their standard errors, as the table has them" if has_errors else ""
+        return f"{', '.join(self.names)} over {abscissa_words(self.data)}{errors}."
 
 
-class Normalised(Evolution):
-    """
-    Void and contact anisotropy over the strain, each curve divided by its own largest value.
+def _named(data: Table, of: str | Sequence[str] | None) -> list[str]:
+    """Names of the columns to draw; SettingsError if a column is missing or has no numbers."""
+    asked = of.split(",") if isinstance(of, str) else of or ()
+    names = [name.strip() for name in asked] or _first(data)
+    if not names:
+        reason = "the table has no columns that `with_` adds"
+        raise SettingsError(f"figure columns: name those to draw: {reason}")
+    for name in names:
+        if name not in data.names:
+            raise SettingsError(f"figure columns: {no_column(name, data.names)}")
+        if not numbers_of(data, name):
+            raise SettingsError(f"figure columns: the column {name} holds no numbers")
+    return names
 
-    Parameters
-    ----------
-    data : Table
-        A fabric table; on one Axes of one source, or of one variant.
-    of : str, optional
-        ``"voids"`` or ``"contacts"``, to draw these alone; on one Axes voids by default.
 
-    Raises
-    ------
-    SettingsError
-        If there is nothing to draw, or too much for one Axes.
-    """
-
-    order = 2
-    height = 2.7
-    share = True
+def _first(data: Table) -> list[str]:
+    """Names of the columns that are drawn by default."""
+    return [name for name in FIRST if numbers_of(data, name)]

@@ -1,17 +1,25 @@
-"""The base of all figures: a class with data, size, caption and a way to be drawn."""
+"""The base of all figures, and figures found by name, one or several on a page or in a file."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cached_property
+from inspect import signature
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
 from scanfab.base.errors import SettingsError
-from scanfab.viz.figures.style import COLUMN, DIRECTIONAL, STYLE, letter
+from scanfab.base.files import whole_file
+from scanfab.table.plots import figures_of
+from scanfab.table.table import Table
+from scanfab.viz.figures import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Page
     from matplotlib.figure import FigureBase
 
     from scanfab.viz.scanned_frames import ScannedFrame, ScannedFrames
@@ -78,7 +86,7 @@ class Figure:
     @property
     def size(self) -> tuple[float, float]:
         """Width and height, inches."""
-        return COLUMN, 2.6
+        return style.COLUMN, 2.6
 
     @property
     def caption(self) -> str:
@@ -104,18 +112,17 @@ class Figure:
         if place is None:
             from matplotlib import pyplot
 
-            with pyplot.rc_context(STYLE):
+            with pyplot.rc_context(style.STYLE):
                 page = pyplot.figure(layout="constrained")
                 return self.on(page.subplots(subplot_kw={"projection": self.projection}))
         if hasattr(place, "subplots"):
             panels = self.panels(place)
             if self.lettered:
-                letter(panels)
+                style.letter(panels)
             return place
         if not hasattr(place, "plot"):
-            raise SettingsError(
-                f"ax: expected Axes, a Figure or a SubFigure of matplotlib, found {place!r}"
-            )
+            expected = "Axes, a Figure or a SubFigure of matplotlib"
+            raise SettingsError(f"ax: expected {expected}, found {place!r}")
         if self.projection is not None and place.name != self.projection:
             raise SettingsError(
                 f"ax: expected {self.projection} Axes, found {place.name}: make them by "
@@ -180,11 +187,9 @@ class DirectionalFigure(FrameFigure):
         ``"voids"`` or ``"contacts"``, to draw only these. On one Axes the default is voids.
     """
 
-    def __init__(
-        self, data: ScannedFrames, frame: int | None = None, of: str | None = None
-    ) -> None:
+    def __init__(self, data: Any, frame: int | None = None, of: str | None = None) -> None:
         super().__init__(data, frame)
-        self.of = one_of(of, tuple(DIRECTIONAL))
+        self.of = one_of(of, tuple(style.DIRECTIONAL))
 
     @cached_property
     def frames(self) -> list[ScannedFrame]:
@@ -205,8 +210,7 @@ class DirectionalFigure(FrameFigure):
     def panels(self, part: FigureBase) -> list[Axes]:
         """A row for each frame, a column each for voids and contacts."""
         polar = {"projection": self.projection}
-        shape = len(self.frames), len(self.of)
-        panels = part.subplots(*shape, squeeze=False, subplot_kw=polar)
+        panels = part.subplots(len(self.frames), len(self.of), squeeze=False, subplot_kw=polar)
         self.add_legend(part, self._draw_grid(panels, "left"))
         return list(panels.ravel())
 
@@ -215,14 +219,121 @@ class DirectionalFigure(FrameFigure):
         for kind, column in zip(self.of, panels.T, strict=False):
             scales[kind] = self.draw_column(list(column), frames, kind)
             for axes, one in zip(column, frames, strict=True):
-                axes.set_title(f"{DIRECTIONAL[kind]}\n{one.title}", loc=loc)
+                axes.set_title(f"{style.DIRECTIONAL[kind]}\n{one.title}", loc=loc)
         return scales
 
 
 def one_of(which: str | None, known: tuple[str, ...]) -> tuple[str, ...]:
     """The panels to draw: all, or the one that the option ``of`` chooses."""
-    if which is None:
-        return known
-    if which not in known:
+    if which not in (None, *known):
         raise SettingsError(f"of: expected {' or '.join(known)}, found {which!r}")
-    return (which,)
+    return known if which is None else (which,)
+
+
+def find_figure(text: str, *kinds: str) -> tuple[type[Figure], dict[str, Any]]:
+    """
+    A figure by its name, and the options that stand behind a colon.
+
+    Parameters
+    ----------
+    text : str
+        Name and options, for instance ``rose:30,60,90``.
+    *kinds : str
+        Kinds of data to search: ``table``, ``frames``, ``calibration``, ``map``.
+
+    Raises
+    ------
+    SettingsError
+        If there is no such figure. The message lists the figures.
+
+    Examples
+    --------
+    >>> from scanfab.viz.figures.figure import find_figure
+    >>> figure, options = find_figure("rose:45,90", "table", "frames")
+    >>> figure.kind, options
+    ('frames', {'angles': (45.0, 90.0)})
+    """
+    name, colon, argument = text.partition(":")
+    offered = {name: one for kind in kinds for name, one in figures_of(kind).items()}
+    found: type[Figure] | None = offered.get(name)
+    options = {} if found is None or not colon else found.parse(argument)
+    if found is None or options is None:
+        raise SettingsError(f"figure: expected {', '.join(offered)}, found {text!r}")
+    return found, options
+
+
+def make_figures(data: Any, kind: str, text: str | None = None, **offered: Any) -> list[Figure]:
+    """
+    The figure of a name, or all of a kind.
+
+    Parameters
+    ----------
+    data : Table, rows of one, ScannedFrames or sequence of StepRow
+        The data to be drawn.
+    kind : str
+        ``table``, ``frames``, ``calibration`` or ``map``.
+    text : str, optional
+        See :func:`find_figure`. By default all figures whose columns the table has.
+    **offered
+        Options, which are given to the figures that take them.
+
+    Raises
+    ------
+    SettingsError
+        If there is no such figure, it needs a column that the table lacks, or there is nothing to
+        draw.
+    """
+    if kind == "table" and not isinstance(data, Table):
+        data = Table(data)
+    every: list[Any] = [(one, {}) for one in figures_of(kind).values()]
+    found = []
+    for figure, options in every if text is None else [find_figure(text, kind)]:
+        names = data.names if isinstance(data, Table) else figure.columns
+        lacking = [name for name in figure.columns if name not in names]
+        if lacking and text is not None:
+            named = ", ".join(lacking)
+            raise SettingsError(f"figure: {text} needs {named}, which the table does not have")
+        if text is not None or (not lacking and figure.suits(data)):
+            known = {k: v for k, v in offered.items() if k in signature(figure).parameters}
+            found.append(figure(data, **{**known, **options}))
+    return found
+
+
+def save_figures(path: Path, figures: Sequence[Figure], dpi: int = style.DPI) -> None:
+    """
+    Draw figures to a file, all on one page.
+
+    Parameters
+    ----------
+    path : Path
+        ``.png``, ``.svg`` or ``.pdf``.
+    figures : sequence of Figure
+        See :func:`make_figures`.
+    dpi : int, optional
+        Pixels an inch.
+
+    Raises
+    ------
+    SettingsError
+        If the file has another suffix.
+    """
+    style.check_plot_file(path)
+    # drawn in memory first, as the PDF writer fails with an unclear error on a full disk
+    with drawn_page(figures) as page:
+        drawn = style.figure_bytes(page, path.suffix.lower().lstrip("."), dpi)
+    with whole_file(path) as part:
+        part.write_bytes(drawn)
+
+
+@contextmanager
+def drawn_page(figures: Sequence[Figure]) -> Iterator[Page]:
+    """Figures below one another, lettered through, in the style of the package."""
+    widths, heights = zip(*(one.size for one in figures), strict=True)
+    with style.new_figure(max(widths), sum(heights)) as page:
+        parts: Any = [page]
+        if len(figures) > 1:
+            parts = page.subfigures(len(figures), 1, height_ratios=heights)
+        every = [one.panels(part) for part, one in zip(parts, figures, strict=True)]
+        if len(figures) > 1 or figures[0].lettered:
+            style.letter([axes for panels in every for axes in panels])
+        yield page

@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
 from matplotlib.figure import FigureBase
+from matplotlib.transforms import nonsingular
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.table.row import column_of, number_of, numbers_of, total_error
+from scanfab.table.curves import Curve
+from scanfab.table.row import column_of, numbers_of
 from scanfab.viz.figures.curves import Quantity
 from scanfab.viz.figures.figure import Figure
 from scanfab.viz.figures.style import FRAME_LOOKS, LABELS, WIDTH, band
@@ -69,10 +72,8 @@ class Map(Figure):
         known = [one for one in QUANTITIES if numbers_of(self.rows, one.column)]
         self.quantities = [one for one in known if quantity in (None, one.column)]
         if not self.quantities:
-            raise SettingsError(
-                f"there is nothing to draw: no block of variant {self.variant} has "
-                f"{quantity or 'a value'}"
-            )
+            none = f"no block of variant {self.variant} has {quantity or 'a value'}"
+            raise SettingsError(f"there is nothing to draw: {none}")
 
     @cached_property
     def frames(self) -> list[list[Any]]:
@@ -89,9 +90,8 @@ class Map(Figure):
         """Whether blocks follow one another along a line, or about a centre."""
         if self.rows[0].get("r_outer") is not None:
             return True
-        middles = _middles(self.frames[-1])
-        spread = np.linalg.svd(middles - middles.mean(axis=0), compute_uv=False)
-        return bool(len(spread) < 2 or spread[1] <= SAME * spread[0] or spread[0] == 0)
+        number, _ = lattice_of(_middles(self.frames[-1]))
+        return int((number.max(axis=0) > 0).sum()) < 2
 
     @property
     def size(self) -> tuple[float, float]:
@@ -153,18 +153,14 @@ class Map(Figure):
         looks = FRAME_LOOKS[-len(self.frames) :]
         for rows, look in zip(self.frames, looks, strict=True):
             place, label = _places(rows)
-            every = one.factor * column_of(rows, one.column)
-            outer = _at_surface(rows)
+            curve, outer = Curve("", str(self.variant), place, rows), _at_surface(rows)
+            every = one.factor * curve.values(one.column)
             value = np.where(outer, np.nan, every)
-            error = column_of(rows, f"{one.column}_se")
-            if one.errors == "total":
-                error = np.array([total_error(row, one.column) for row in rows], np.float64)
-            band(axes, place, value, one.factor * error, look)
-            strain = number_of(rows[0], "strain")
-            name = f"frame {rows[0].get('frame')}"
-            name += "" if strain is None else f", strain {strain:.3g}"
+            band(axes, place, value, one.factor * one.errors_of(curve), look)
+            told = [f"frame {rows[0].get('frame')}"]
+            told += [f"strain {strain:.3g}" for strain in numbers_of(rows[:1], "strain")]
             line = {key: look[key] for key in ("color", "marker", "ls")}
-            axes.plot(place, value, label=name, **line)
+            axes.plot(place, value, label=", ".join(told), **line)
             # the surface takes segments from these blocks, so they must not set the scale
             grey = {"ls": "", "marker": look["marker"], "color": "0.75", "scaley": False}
             legend = SURFACE if rows is self.frames[-1] and outer.any() else None
@@ -176,35 +172,32 @@ class Map(Figure):
     def _draw_plane(self, axes: Axes, one: Quantity, axis: int) -> Any:
         """The blocks next to the middle along an axis."""
         rows = self.frames[-1]
-        middles, values = _middles(rows), one.factor * column_of(rows, one.column)
+        middles, outer = _middles(rows), _at_surface(rows)
         number, steps = lattice_of(middles)
+        values = np.where(outer, np.nan, one.factor * column_of(rows, one.column))
         # of two planes next to the middle the lower one
         chosen = np.flatnonzero(number[:, axis] == number[:, axis].max() // 2)
         across, up = (other for other in range(3) if other != axis)
         columns, lines = number[chosen, across], number[chosen, up]
-        picture = np.full((lines.max() + 1, columns.max() + 1), np.nan)
-        outer = _at_surface(rows)
-        values = np.where(outer, np.nan, values)
-        picture[lines, columns] = values[chosen]
+        shape = lines.max() + 1, columns.max() + 1
+        picture, hatched = np.full(shape, np.nan), np.zeros(shape, bool)
+        picture[lines, columns], hatched[lines, columns] = values[chosen], outer[chosen]
         # corners of the blocks: half a step about their middles
-        at_column, at_line = np.meshgrid(*(np.arange(n + 1) - 0.5 for n in picture.T.shape))
+        at_column, at_line = np.meshgrid(*(np.arange(n + 1) - 0.5 for n in shape[::-1]))
         places = middles[chosen[0]] - columns[0] * steps[across] - lines[0] * steps[up]
         places = places + at_column[..., None] * steps[across] + at_line[..., None] * steps[up]
         x, y = places[..., across], places[..., up]
-        colours, low, high = _limits(values, one.errors == "total")
-        drawn = axes.pcolormesh(
-            x,
-            y,
-            np.ma.masked_invalid(picture),
-            cmap=colormaps[colours].with_extremes(bad=MISSING),
-            vmin=low,
-            vmax=high,
-        )
-        outer = outer[chosen]
-        hatched: Any = {"facecolor": "none", "edgecolor": "0.35", "hatch": "////", "lw": 0}
-        for line, column in zip(lines[outer], columns[outer], strict=True):
+        # the colours hold for all blocks, which may have no value where another frame has some
+        known = values[np.isfinite(values)] if np.isfinite(values).any() else np.zeros(1)
+        signed = one.errors == "total"
+        largest = float(np.abs(known).max()) or 1.0
+        ends = (-largest, largest) if signed else nonsingular(known.min(), known.max(), 0.05)
+        colours = colormaps["RdBu_r" if signed else "viridis"].with_extremes(bad=MISSING)
+        values = np.ma.masked_invalid(picture)
+        drawn = axes.pcolormesh(x, y, values, cmap=colours, norm=Normalize(*ends))
+        for line, column in np.argwhere(hatched):
             around = [line, line, line + 1, line + 1], [column, column + 1, column + 1, column]
-            axes.fill(x[around], y[around], **hatched)
+            axes.fill(x[around], y[around], fc="none", ec="0.35", hatch="////", lw=0)
         place = float(np.mean(middles[chosen, axis]))
         axes.set_title(f"{AXES[axis]} = {place:.3g}", loc="left")
         axes.set(xlabel=AXES[across], ylabel=AXES[up], aspect="equal")
@@ -212,19 +205,6 @@ class Map(Figure):
         # a narrow panel has no room for many digits
         axes.ticklabel_format(style="sci", scilimits=(-1, 3))
         return drawn
-
-
-def _limits(values: FloatArray, signed: bool) -> tuple[str, float, float]:
-    """Colours, and the values at their ends."""
-    # this frame may have none where another one has some
-    known = values[np.isfinite(values)] if np.isfinite(values).any() else np.zeros(1)
-    if signed:
-        largest = float(np.abs(known).max()) or 1.0
-        return "RdBu_r", -largest, largest
-    low, high = float(known.min()), float(known.max())
-    # if all values are one, each plane would make a scale of its own
-    wider = 0.0 if high > low else 0.05 * abs(low) or 1.0
-    return "viridis", low - wider, high + wider
 
 
 def _middles(rows: Sequence[Any]) -> FloatArray:
@@ -269,9 +249,8 @@ def lattice_of(middles: FloatArray) -> tuple[IntArray, FloatArray]:
         # blocks along one axis follow one another at equal steps
         rest = middles[::stride]
         step = rest[1] - rest[0]
-        expected = rest[0] + np.arange(len(rest))[:, None] * step
-        off = np.linalg.norm(rest - expected, axis=1) > 0.01 * np.linalg.norm(step)
-        count = int(np.argmax(off)) if off.any() else len(rest)
+        off = np.linalg.norm(np.diff(rest, axis=0) - step, axis=1) > 0.01 * np.linalg.norm(step)
+        count = int(np.argmax(off)) + 1 if off.any() else len(rest)
         axis = max(free, key=lambda one: abs(float(step[one])))
         free.remove(axis)
         numbers[:, axis] = np.arange(len(middles)) // stride % count

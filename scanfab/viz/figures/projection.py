@@ -12,12 +12,7 @@ from matplotlib.axes import Axes
 
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.distribution import (
-    HIGHEST_DEGREE,
-    direction_points,
-    harmonics_of,
-    mean_length_function,
-)
+from scanfab.fabric import distribution
 from scanfab.table.row import number_of, total_error
 from scanfab.viz.figures.figure import DirectionalFigure
 from scanfab.viz.figures.style import COLOURS, WIDTH
@@ -25,8 +20,9 @@ from scanfab.viz.figures.style import COLOURS, WIDTH
 if TYPE_CHECKING:
     from scanfab.viz.scanned_frames import ScannedFrame
 
-# Rings and rays of the disk on which a hemisphere is projected.
-DISK = (41, 121)
+# Rings and rays of the disk on which a hemisphere is projected, as numpy.mgrid counts them.
+DISK = (41j, 121j)
+DEVIATION = "deviation from the mean in %"
 # k of the kernel exp(k (n·m)²) that smooths contact normals; it has half its height at 19 degrees.
 CONCENTRATION = 6.5
 # The largest lobe of pure noise is 2 to 3 standard errors.
@@ -88,15 +84,13 @@ class Projection(DirectionalFigure):
         if drawn is not None:
             page = column[0].figure
             bar = page.colorbar(drawn, ax=column, shrink=0.8, pad=0.03, aspect=30)
-            bar.set_label("deviation from the mean in %")
+            bar.set_label(DEVIATION)
 
 
 def _draw_curve(axes: Axes, value: FloatArray | None, plane: Space, largest: float) -> None:
     """Draw a curve over the directions of a plane."""
     first, second = ("xyz"[k] for k in sorted(plane.along))
-    axes.set(
-        xlim=(0, 180), ylim=(-1.1 * largest, 1.1 * largest), ylabel="deviation from the mean in %"
-    )
+    axes.set(xlim=(0, 180), ylim=(-1.1 * largest, 1.1 * largest), ylabel=DEVIATION)
     axes.set(xlabel=f"direction, degrees from {first} to {second}", xticks=range(0, 181, 45))
     axes.axhline(0, color="0.6", lw=0.6, zorder=0)
     if value is None:
@@ -120,17 +114,9 @@ def _draw_disk(axes: Axes, value: FloatArray | None, largest: float) -> Any:
     if value is None:
         axes.text(0, -0.3, "no contacts", ha="center")
         return None
-    places, _ = places_of(SPACE)
-    return axes.pcolormesh(
-        *np.moveaxis(places, -1, 0),
-        value,
-        cmap="PuOr_r",
-        vmin=-largest,
-        vmax=largest,
-        shading="gouraud",
-        rasterized=True,
-        zorder=0,
-    )
+    x, y = np.moveaxis(places_of(SPACE)[0], -1, 0)
+    scale: dict[str, Any] = {"cmap": "PuOr_r", "vmin": -largest, "vmax": largest}
+    return axes.pcolormesh(x, y, value, shading="gouraud", rasterized=True, zorder=0, **scale)
 
 
 def places_of(space: Space) -> tuple[FloatArray, FloatArray]:
@@ -150,14 +136,10 @@ def places_of(space: Space) -> tuple[FloatArray, FloatArray]:
         first, second = (np.eye(3)[k] for k in sorted(space.along))
         turn = np.radians(angle)[:, None]
         return angle, np.cos(turn) * first + np.sin(turn) * second
-    rho, theta = np.meshgrid(
-        np.linspace(0, 1, DISK[0]), np.linspace(0, 2 * np.pi, DISK[1]), indexing="ij"
-    )
+    rho, theta = np.mgrid[0.0 : 1.0 : DISK[0], 0.0 : 2.0 * np.pi : DISK[1]]
     polar = 2 * np.arcsin(rho / np.sqrt(2))
     along = np.stack([np.cos(theta), np.sin(theta)], axis=-1)
-    directions = np.concatenate(
-        [np.sin(polar)[..., None] * along, np.cos(polar)[..., None]], axis=-1
-    )
+    directions = np.dstack([np.sin(polar)[..., None] * along, np.cos(polar)])
     return rho[..., None] * along, directions
 
 
@@ -165,13 +147,13 @@ def deviations_of(frame: ScannedFrame) -> dict[str, FloatArray | None]:
     """Deviations from the mean over all directions at :func:`places_of` a frame, per cent."""
     measured, space, normals = frame.measurement, frame.space, frame.normals
     _, directions = places_of(space)
-    mean_length = mean_length_function(measured.sums.axes, *measured.kept(frame.variant), space)
+    axes, (lengths, counts) = measured.sums.axes, measured.kept(frame.variant)
+    mean_length = distribution.mean_length_function(axes, lengths, counts, space)
     assert mean_length is not None
-    points, weights = direction_points(space)
+    points, weights = distribution.direction_points(space)
     mean = float(weights @ mean_length(points))
-    contacts = None
-    if len(normals):
-        contacts = 100 * (smoothed_density(normals, directions, space) - 1)
+    density = smoothed_density(normals, directions, space) if len(normals) else None
+    contacts = None if density is None else 100 * (density - 1)
     return {"voids": 100 * (mean_length(directions) / mean - 1), "contacts": contacts}
 
 
@@ -179,13 +161,12 @@ def smoothed_density(
     normals: FloatArray, directions: FloatArray, space: Space = SPACE
 ) -> FloatArray:
     """Density of the normals (n or -n) about each direction, relative to isotropic normals."""
-    points, weights = direction_points(space)
+    points, weights = distribution.direction_points(space)
     isotropic = float(weights @ np.exp(CONCENTRATION * points[:, max(space.along)] ** 2))
-    flat = directions.reshape(-1, 3)
-    density: FloatArray = np.array(
-        [np.exp(CONCENTRATION * (normals @ one) ** 2).mean() for one in flat]
-    )
-    return density.reshape(directions.shape[:-1]) / isotropic
+    every = directions.reshape(-1, 3)
+    means = np.array([np.exp(CONCENTRATION * (normals @ one) ** 2).mean() for one in every])
+    density: FloatArray = means.reshape(directions.shape[:-1]) / isotropic
+    return density
 
 
 def noise_note(frame: ScannedFrame, deviations: Mapping[str, FloatArray | None]) -> str:
@@ -217,8 +198,9 @@ def void_noise(row: Mapping[str, Any], space: Space = SPACE) -> float | None:
     scan, sample = (number_of(row, f"alpha_vs_axial_{part}") for part in ("se", "sample_se"))
     if sample is None:
         return None
-    second = harmonics_of(2, space)
-    fitted = sum(harmonics_of(degree, space) for degree in range(2, HIGHEST_DEGREE + 1, 2))
+    second = distribution.harmonics_of(2, space)
+    degrees = range(2, distribution.HIGHEST_DEGREE + 1, 2)
+    fitted = sum(distribution.harmonics_of(degree, space) for degree in degrees)
     parts = math.sqrt(fitted) * (scan or 0.0), math.sqrt(second) * sample
     return 100.0 * math.sqrt(second) * math.hypot(*parts)
 
@@ -228,7 +210,7 @@ def contact_noise(row: Mapping[str, Any], space: Space = SPACE) -> float | None:
     alone, error = number_of(row, "alpha_c_axial_se"), total_error(row, "alpha_c_axial")
     if not alone or error is None:
         return None
-    points, weights = direction_points(space)
+    points, weights = distribution.direction_points(space)
     kernel = np.exp(CONCENTRATION * points[:, max(space.along)] ** 2)
     spread = float(weights @ kernel**2) / float(weights @ kernel) ** 2 - 1.0
     # neighbouring contacts are not independent; the errors of the anisotropy tell by how much

@@ -48,8 +48,6 @@ BARS = {"voids": "of the scan", "contacts": "of a count of contacts"}
 class Ring:
     """Values around one polar angle, relative to the mean over all directions."""
 
-    phi: float
-    """Polar angle, degrees."""
     theta: FloatArray
     """Azimuths, degrees."""
     value: FloatArray
@@ -64,6 +62,18 @@ class Ring:
         far = np.abs(self.value - 1.0) + np.nan_to_num(self.error)
         curve = np.ones(1) if self.curve is None else self.curve(AROUND)
         return max(0.02, float(np.nanmax(far, initial=0.0)), float(np.abs(curve - 1.0).max()))
+
+    def draw(self, axes: Axes, look: Mapping[str, Any]) -> None:
+        """Draw values with bars on polar Axes, along the smooth curve or along a closed line."""
+        theta, value, error, line = self.theta, self.value, self.error, "none"
+        if self.curve is not None:
+            axes.plot(np.radians(AROUND), self.curve(AROUND), color=look["color"], ls=look["ls"])
+        else:
+            # the first point follows the last one, so that the line is closed
+            theta, value, error = (np.append(a, a[:1]) for a in (theta, value, error))
+            line = look["ls"]
+        style = {**look, "ls": line, "elinewidth": 0.5, "capsize": 0}
+        axes.errorbar(np.radians(theta), value, error, **style)
 
 
 class Rose(DirectionalFigure):
@@ -131,10 +141,8 @@ class Rose(DirectionalFigure):
         space = self.frames[0].space
         if space.is_plane and self.angles not in (POLAR_ANGLES, EQUATOR):
             angles = ",".join(f"{one:g}" for one in self.angles)
-            raise SettingsError(
-                f"figure: discs in {space} have no polar angles, found {angles}: choose "
-                f"`figure=rose`"
-            )
+            reason = f"discs in {space} have no polar angles, found {angles}"
+            raise SettingsError(f"figure: {reason}: choose `figure=rose`")
         return space
 
     @property
@@ -154,16 +162,21 @@ class Rose(DirectionalFigure):
     def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> float:
         """Draw rings about 1 at the polar angles; gives back the reach of the scale from 1."""
         looks = self.looks
-        if kind == "voids":
-            every = [void_rings(one, list(looks)) for one in frames]
-        else:
-            every = [
-                [contact_ring(one.normals, phi, one.space) for phi in looks if len(one.normals)]
-                for one in frames
-            ]
+        rings_of = void_rings if kind == "voids" else contact_rings
+        every = [rings_of(one, list(looks)) for one in frames]
         reach = max((ring.reach for rings in every for ring in rings), default=0.02)
+        middle, circles = _scale(reach)
         for axes, rings in zip(column, every, strict=True):
-            _draw_rings(axes, rings, reach, looks)
+            # without contacts there is no ring
+            for ring, look in zip(rings, looks.values(), strict=False):
+                ring.draw(axes, look)
+            axes.plot(np.radians(AROUND), np.ones_like(AROUND), color="0.4", lw=0.6)
+            axes.set_ylim(middle, 1.0 + 1.1 * reach)
+            # the legend names the circles, as words in the panel would cover data
+            axes.set_yticks(circles, [])
+            axes.set_xticks(np.radians(np.arange(0, 360, 45)))
+            axes.grid(color="0.85", lw=0.5)
+            axes.spines["polar"].set_color("0.7")
         return reach
 
     def add_legend(self, place: Any, scales: dict[str, Any]) -> None:
@@ -194,35 +207,9 @@ class Rose(DirectionalFigure):
 
 def _checked_angles(angles: Sequence[float], found: object) -> tuple[float, ...]:
     if not 0 < len(angles) <= len(LOOKS) or not all(0 < angle <= 90 for angle in angles):
-        raise SettingsError(
-            f"figure: expected one to four polar angles above 0 and up to 90 degrees, such as "
-            f"rose:30,60,90, found {found!r}"
-        )
+        expected = "one to four polar angles above 0 and up to 90 degrees, such as rose:30,60,90"
+        raise SettingsError(f"figure: expected {expected}, found {found!r}")
     return tuple(angles)
-
-
-def _draw_rings(
-    axes: Axes, rings: Sequence[Ring], reach: float, looks: Mapping[float, dict[str, Any]]
-) -> None:
-    for ring in rings:
-        look = looks[ring.phi]
-        theta, value, error = ring.theta, ring.value, ring.error
-        if ring.curve is None:
-            # the first point follows the last one, so that the line is closed
-            theta, value, error = (np.append(a, a[:1]) for a in (theta, value, error))
-        line = look["ls"] if ring.curve is None else "none"
-        style = {**look, "ls": line, "elinewidth": 0.5, "capsize": 0}
-        axes.errorbar(np.radians(theta), value, error, **style)
-        if ring.curve is not None:
-            axes.plot(np.radians(AROUND), ring.curve(AROUND), color=look["color"], ls=look["ls"])
-    axes.plot(np.radians(AROUND), np.ones_like(AROUND), color="0.4", lw=0.6)
-    middle, circles = _scale(reach)
-    axes.set_ylim(middle, 1.0 + 1.1 * reach)
-    # the legend names the circles, as words in the panel would cover data
-    axes.set_yticks(circles, [])
-    axes.set_xticks(np.radians(np.arange(0, 360, 45)))
-    axes.grid(color="0.85", lw=0.5)
-    axes.spines["polar"].set_color("0.7")
 
 
 def _scale(reach: float) -> tuple[float, list[float]]:
@@ -240,16 +227,14 @@ def void_rings(frame: ScannedFrame, angles: Sequence[float]) -> list[Ring]:
     measured, variant, plan = frame.measurement, frame.variant, frame.measurement.plan
     # at the equator θ and θ + 180° are one line
     thetas = [np.arange(0.0, 180.0 if phi == 90 else 360.0, THETA_STEP) for phi in angles]
-    each = zip(thetas, angles, strict=True)
-    axes = np.concatenate([_vectors(theta, phi, frame.space) for theta, phi in each])
-    # choose the spacing that gives the wanted number of segments
-    segments = measured.sums.kept(variant)[1].mean()
-    spacing = plan.spacing * plan.space.apart(segments * REPLICATES / SEGMENTS)
+    axes = np.concatenate([_vectors(*one, plan.space) for one in zip(thetas, angles, strict=True)])
     weights = np.full(len(axes), 1 / len(axes))
+    # the spacing that gives the wanted number of segments
+    segments = measured.sums.kept(variant)[1].mean()
     rose = scan_gaps(
         measured.solids,
         DirectionRule("rose", axes, weights, None, turned=False, space=plan.space),
-        spacing=float(spacing),
+        spacing=float(plan.spacing * plan.space.apart(segments * REPLICATES / SEGMENTS)),
         cutoffs=[plan.cutoff],
         blocks=measured.blocks,
         variants=variant,
@@ -258,19 +243,18 @@ def void_rings(frame: ScannedFrame, angles: Sequence[float]) -> list[Ring]:
         workers=plan.workers,
         most_steps=plan.max_chords,
     )
-    sums_of, numbers = rose.kept(variant, 0, plan.settings.moment)
+    lengths, numbers = rose.kept(variant, 0, plan.settings.moment)
     every, counts = measured.kept(variant)
     mean = every.sum() / counts.sum()
     with np.errstate(invalid="ignore", divide="ignore"):
-        value = sums_of.sum(axis=0) / numbers.sum(axis=0) / mean
-        scatter = np.nanstd(sums_of / numbers, axis=0, ddof=1) / mean / np.sqrt(REPLICATES)
-    found, end = [], 0
-    for phi, theta in zip(angles, thetas, strict=True):
-        start, end = end, end + len(theta)
+        values = lengths.sum(axis=0) / numbers.sum(axis=0) / mean
+        errors = np.nanstd(lengths / numbers, axis=0, ddof=1) / mean / np.sqrt(REPLICATES)
+    found, ends = [], np.cumsum([len(theta) for theta in thetas])[:-1]
+    each = zip(angles, thetas, np.split(values, ends), np.split(errors, ends), strict=True)
+    for phi, theta, value, error in each:
         turns = 2 if phi == 90 else 1
         around = np.concatenate([theta + 180.0 * turn for turn in range(turns)])
-        own, error = np.tile(value[start:end], turns), np.tile(scatter[start:end], turns)
-        found.append(Ring(phi, around, own, error))
+        found.append(Ring(around, np.tile(value, turns), np.tile(error, turns)))
     return found
 
 
@@ -280,6 +264,12 @@ def _vectors(theta: FloatArray, phi: float, space: Space) -> FloatArray:
     flat, basis = np.sin(polar), np.eye(3)[sorted(space.along)]
     parts = [flat * np.cos(azimuth), flat * np.sin(azimuth), np.full(len(theta), np.cos(polar))]
     return np.column_stack(parts[: len(basis)]) @ basis
+
+
+def contact_rings(frame: ScannedFrame, angles: Sequence[float]) -> list[Ring]:
+    """The :func:`contact_ring` at some polar angles; none if there are no contacts."""
+    normals = frame.normals
+    return [contact_ring(normals, phi, frame.space) for phi in angles if len(normals)]
 
 
 def contact_ring(normals: FloatArray, phi: float, space: Space = SPACE) -> Ring:
@@ -311,4 +301,4 @@ def contact_ring(normals: FloatArray, phi: float, space: Space = SPACE) -> Ring:
         return values
 
     middle = 0.5 * (edges[1:] + edges[:-1])
-    return Ring(phi, middle, count / expected, np.sqrt(count) / expected, density)
+    return Ring(middle, count / expected, np.sqrt(count) / expected, density)

@@ -98,32 +98,28 @@ STYLE: Any = {
 def check_plot_file(path: Path) -> None:
     """SettingsError if no figure can be written to a file of this name."""
     if path.suffix.lower() not in PLOT_FORMATS:
-        raise SettingsError(
-            f"{path}: figures can be written as {', '.join(PLOT_FORMATS)}, "
-            f"not as {path.suffix or 'a file without a suffix'}"
-        )
+        known, found = ", ".join(PLOT_FORMATS), path.suffix or "a file without a suffix"
+        raise SettingsError(f"{path}: figures can be written as {known}, not as {found}")
     check_folder(path)
 
 
 @contextmanager
 def new_figure(width: float, height: float) -> Iterator[Figure]:
     """A figure of so many inches in the common style, drawn and saved inside the block."""
-    import matplotlib as mpl
+    from matplotlib import style
     from matplotlib.figure import Figure
 
     # do not depend on the user's matplotlibrc
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
+    with style.context(STYLE, after_reset=True):
         yield Figure(figsize=(width, height), layout="constrained")
 
 
 def figure_bytes(figure: Figure, kind: str, dpi: int = DPI) -> bytes:
     """A figure as ``png``, ``svg`` or ``pdf``; no file is made."""
     # without a date, the same input gives the same bytes
-    dates = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    date: Any = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
     drawn = BytesIO()
-    figure.savefig(drawn, format=kind, dpi=dpi, metadata=dates[kind])
+    figure.savefig(drawn, format=kind, dpi=dpi, metadata=date)
     return drawn.getvalue()
 
 

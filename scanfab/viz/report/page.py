@@ -14,8 +14,7 @@ from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder
 from scanfab.base.typing import FloatArray
-from scanfab.viz.figures.figure import Figure
-from scanfab.viz.figures.page import drawn_page
+from scanfab.viz.figures.figure import Figure, drawn_page
 from scanfab.viz.figures.style import COLOURS, figure_bytes
 from scanfab.viz.scene import SHADES, Scene, towards_viewer
 
@@ -26,7 +25,6 @@ KIND_COLOURS = ((COLOURS["sky"], "#B4DDF5"), ("#C9CED3", "#E8EAEC"), (COLOURS["o
 
 # CSS pixels an inch, and pixels an inch of pictures that are no vectors.
 PIXELS, DPI = 96, 130
-KINDS = {"svg": "image/svg+xml", "png": "image/png"}
 
 
 class Picture(NamedTuple):
@@ -43,7 +41,7 @@ def picture_of(figure: Figure, kind: Literal["svg", "png"]) -> Picture:
     """A figure with its caption, as vectors or as pixels."""
     with drawn_page([figure]) as page:
         data = base64.b64encode(figure_bytes(page, kind, DPI)).decode("ascii")
-    url = f"data:{KINDS[kind]};base64,{data}"
+    url = f"data:image/{'svg+xml' if kind == 'svg' else kind};base64,{data}"
     return Picture(url, figure.caption, round(PIXELS * figure.size[0]))
 
 
@@ -64,9 +62,8 @@ def render_page(**content: Any) -> str:
     import jinja2
 
     # escapes everything, and JSON in scripts too (the filter tojson)
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.undefined = jinja2.StrictUndefined
     environment.filters["symbols"] = _symbols
     folder = files("scanfab.viz.report")
     template = environment.from_string((folder / "page.html").read_text("utf-8"))
@@ -95,8 +92,7 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     """
     grains = scene.grains
     shown = ~grains.boundary
-    position = grains.position[shown] - scene.center
-    radius = grains.radius[shown]
+    position, radius = grains.position[shown] - scene.center, grains.radius[shown]
     distance = np.linalg.norm(grains.places[shown] - scene.center, axis=1)
     nearest = np.argsort(distance, kind="stable")[:MOST_GRAINS]
     reach = np.linalg.norm(position[nearest], axis=1) + radius[nearest]
@@ -106,16 +102,13 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     # the rotation (rows) after which the axis is z; y leads away from the viewer
     away = -towards_viewer(up, scene.space)
     turn = np.stack([np.cross(away, up), away, up])
-    kinds = np.where(grains.rattler, 2, np.where(grains.in_window, 0, 1))[shown]
     names = ["grains in the RV", "grains outside" if scene.window else "grains", "rattlers"]
+    named = zip(names, KIND_COLOURS, strict=True)
     shades = [] if grains.body is None else [grains.shade[shown]]
     numbers = np.rint(np.column_stack([position @ turn.T, radius]) * scale)
-    spheres = np.column_stack([numbers, kinds, *shades]).astype(int)[nearest]
+    spheres = np.column_stack([numbers, grains.kind[shown], *shades]).astype(int)[nearest]
     return {
-        "kinds": [
-            {"name": name, "colour": colour, "pale": pale}
-            for name, (colour, pale) in zip(names, KIND_COLOURS, strict=True)
-        ],
+        "kinds": [{"name": name, "colour": one, "pale": pale} for name, (one, pale) in named],
         "spheres": spheres.tolist(),
         "shades": SHADES if shades else [1.0],
         "axes": _axes(up, turn),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
@@ -15,7 +15,6 @@ from scanfab.base.files import whole_file
 from scanfab.io.families import PathLike
 from scanfab.io.series import Series
 from scanfab.packing.cell import Cell
-from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox
 from scanfab.pipeline.options import Told, as_options, listening
 from scanfab.pipeline.record import read_manifest, reopen, repeat_command, restored_settings
@@ -26,17 +25,9 @@ from scanfab.table.curves import spelt_strain, strain_column
 from scanfab.table.formats import read_rows
 from scanfab.table.row import numbers_of
 from scanfab.table.selection import MAP, choose_rows
-from scanfab.viz.figures.page import make_figures
-from scanfab.viz.report.caveats import caveats_of
+from scanfab.viz.figures.figure import make_figures
+from scanfab.viz.report import tables as words
 from scanfab.viz.report.page import Picture, check_page_file, picture_of, render_page, view_data
-from scanfab.viz.report.tables import (
-    block_table,
-    frame_table,
-    input_table,
-    overview,
-    results_tables,
-    settings_table,
-)
 from scanfab.viz.scanned_frames import ScannedFrames
 from scanfab.viz.scene import Look, look_at
 
@@ -52,11 +43,10 @@ class Input(NamedTuple):
     manifest: dict[str, Any] | None
     cutoff: float | None
     """The cut-off whose rows were chosen from several."""
+    is_map: bool
 
-    @property
-    def is_map(self) -> bool:
-        """Whether it is a table of a map."""
-        return bool(self.rows) and MAP in self.rows[0]
+
+Inputs = list[Input]
 
 
 @dataclass(frozen=True)
@@ -164,11 +154,9 @@ def make_report(
         maps = [one.rows for one in inputs if one.is_map]
         comparison = compare_tables(rows)
         figures = []
-        with suppress(SettingsError):  # there are no figures without a void fabric
-            figures += make_figures(rows, "table", comparison=comparison)
-        for blocks in maps:
-            with suppress(SettingsError):
-                figures += make_figures(blocks, "map")
+        for kind, data in [("table", rows), *(("map", blocks) for blocks in maps)]:
+            with suppress(SettingsError):  # there are no figures without a void fabric
+                figures += make_figures(data, kind, comparison=comparison)
         pictures = [picture_of(one, "svg") for one in figures]
     # warnings about the sources read again stand only in the page
     with listening(lambda _: None) as of_sources:
@@ -177,18 +165,20 @@ def make_report(
         pictures += section["shown"]["pictures"] if section["shown"] else []
     every = [row for one in inputs for row in one.rows]
     asked = [one.manifest["settings"] for one in inputs if one.manifest is not None]
-    doubts = [*told.warnings, *of_sources.warnings, *map(as_options, caveats_of(rows, asked))]
+    doubts = [*told.warnings, *of_sources.warnings, *map(as_options, words.caveats_of(rows, asked))]
+    names = [Path(one).name or one for one in dict.fromkeys(str(row["source"]) for row in every)]
+    about = ", ".join(names) if len(names) < 4 else f"{len(names)} samples"
     page = render_page(
-        title=title or _usual_title(every),
+        title=title or f"Void fabric of {about}",
         author=author,
         date=(today or datetime.now(UTC).astimezone().date()).isoformat(),
-        summary=[overview(one.path, one.rows) for one in inputs],
-        results=results_tables(comparison.summary, rows),
+        summary=[words.overview(one.path, one.rows) for one in inputs],
+        results=words.results_tables(comparison.summary, rows),
         pictures=pictures,
         warnings=list(dict.fromkeys(doubts)),
         notes=list(dict.fromkeys([*told.notes, *of_sources.notes])),
         sections=sections,
-        frames=[*([frame_table(rows)] if rows else []), *map(block_table, maps)],
+        frames=[*([words.frame_table(rows)] if rows else []), *map(words.block_table, maps)],
     )
     return Report(page, any(row["alpha_vs_axial"] is not None for row in every))
 
@@ -197,9 +187,7 @@ def make_report(
 report = make_report
 
 
-def read_inputs(
-    tables: Sequence[Path], cutoff: float | None = None, labels: Sequence[str] | None = None
-) -> list[Input]:
+def read_inputs(tables: list[Path], cutoff: float | None, labels: Sequence[str] | None) -> Inputs:
     """
     Read tables and manifests.
 
@@ -208,29 +196,19 @@ def read_inputs(
     ScanfabError
         If one cannot be read or is neither a fabric table nor a map, or if no table has a row.
     """
-    # tables may lack the columns of source and strain
-    read = [
-        (path, [{"source": path.stem, "strain": None, **row} for row in read_rows(path)])
-        for path in tables
-    ]
-    is_map = [bool(rows) and MAP in rows[0] for _, rows in read]
-    kept = [one for one, of_map in zip(read, is_map, strict=True) if not of_map]
-    chosen = iter(choose_rows(kept, cutoff, labels))
-    inputs = [
-        Input(path, rows if of_map else next(chosen), read_manifest(path), cutoff)
-        for (path, rows), of_map in zip(read, is_map, strict=True)
-    ]
+    read, of_frames = [], []
+    for path in tables:
+        # tables may lack the columns of source and strain
+        rows = [{"source": path.stem, "strain": None, **row} for row in read_rows(path)]
+        is_map = bool(rows) and MAP in rows[0]
+        read.append(Input(path, rows, read_manifest(path), cutoff, is_map))
+        of_frames += [(path, rows)] * (not is_map)
+    chosen = iter(choose_rows(of_frames, cutoff, labels))
+    inputs = [one if one.is_map else one._replace(rows=next(chosen)) for one in read]
     if not any(one.rows for one in inputs):
-        raise SettingsError(
-            f"{', '.join(map(str, tables))}: there is nothing to report: no row in the table"
-        )
+        names = ", ".join(map(str, tables))
+        raise SettingsError(f"{names}: there is nothing to report: no row in the table")
     return inputs
-
-
-def _usual_title(rows: Sequence[Mapping[str, Any]]) -> str:
-    sources = list(dict.fromkeys(str(row["source"]) for row in rows))
-    names = [Path(source).name or source for source in sources]
-    return f"Void fabric of {', '.join(names) if len(names) < 4 else f'{len(names)} samples'}"
 
 
 def _section(one: Input, told: Told) -> dict[str, Any]:
@@ -255,9 +233,9 @@ def _section(one: Input, told: Told) -> dict[str, Any]:
     return {
         **section,
         "command": repeat_command(asked, one.path.name, [str(name) for name in overridden]),
-        "settings": settings_table(asked),
+        "settings": words.settings_table(asked),
         "versions": [(str(k), str(v)) for k, v in (one.manifest.get("versions") or {}).items()],
-        "inputs": input_table(one.manifest),
+        "inputs": words.input_table(one.manifest),
     }
 
 
@@ -321,19 +299,18 @@ def _facts(look: Look) -> list[tuple[str, str]]:
         if not window.shape.is_sphere:
             facts.append(("shape of the RV", str(window.shape)))
             continue
-        part, now = _fraction(first, radius), ""
         # relative to the first sample, and to the sample of this frame if that differs
-        if look.sample.gathered.any() and _fraction(look.sample, radius) != part:
-            now = f" in the first frame that has grains, {_fraction(look.sample, radius)} in frame "
-            now += str(look.number)
+        part, *others = (
+            f"{2 * radius / SurfaceBox.of(one.packing, one.gathered).smallest_extent:.3g}"
+            for one in (first, look.sample)
+            if one.gathered.any()
+        )
+        now = ""
+        if others not in ([], [part]):
+            now = f" in the first frame that has grains, {others[0]} in frame {look.number}"
         size = f"{radius:.4g}, {part} of half the sample's smallest extent{now}"
         facts.append(("radius of the RV", f"{size}, {radius / radii.mean():.3g} mean radii"))
     return facts
-
-
-def _fraction(sample: Sample, radius: float) -> str:
-    extent = SurfaceBox.of(sample.packing, sample.gathered).smallest_extent
-    return f"{2 * radius / extent:.3g}"
 
 
 def _cell(cell: Cell | None) -> str:
@@ -351,18 +328,17 @@ def _pictures(rows: list[dict[str, Any]], series: Series, settings: Settings) ->
     """Figures of the first and the last frame, from one scan."""
     # the least tolerance of a row, which may follow from the sample's error
     errors = numbers_of(rows, "alpha_vs_axial_sample_se")
-    rougher, asked = "", settings.aim(min(errors, default=None))
-    tolerance = asked
+    tolerance = asked = settings.aim(min(errors, default=None))
     if settings.spacing is None or settings.directions is None:
         # rougher, so that the scan is short enough to wait for
         most = max(numbers_of(rows, "segments"), default=0.0)
         tolerance *= max(1.0, most / MOST_SEGMENTS) ** 0.5
-    if tolerance > asked:
-        rougher = (
-            f"Scanned to a standard error of {tolerance:.2g} instead of the table's "
-            f"{asked:.2g}, which would take too long for a picture."
-        )
-    frames = ScannedFrames(series, replace(settings, tolerance=tolerance), rows, rougher)
+    rougher = (
+        f"Scanned to a standard error of {tolerance:.2g} instead of the table's {asked:.2g}, which "
+        f"would take too long for a picture."
+    )
+    told = rougher if tolerance > asked else ""
+    frames = ScannedFrames(series, replace(settings, tolerance=tolerance), rows, told)
     # drawn as pixels, as the coloured disks are pixels anyway
     figures = [figure for figure in make_figures(frames, "frames") if not figure.slow]
     return [picture_of(figure, "png") for figure in figures]

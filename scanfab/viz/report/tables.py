@@ -1,26 +1,33 @@
-"""The tables of the report as text: results, frames, inputs and settings."""
+"""The tables of the report as text, and its warnings about the numbers in plain words."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from scanfab.base.errors import SettingsError
 from scanfab.base.option import flag_of
+from scanfab.base.spelling import counted
 from scanfab.pipeline.options import MEANINGS
 from scanfab.pipeline.record import HIDDEN, given_settings
+from scanfab.scan.directions import direction_rule
 from scanfab.table.curves import STRAINS, is_turned, spelt_strain, strain_column
 from scanfab.table.row import Row as TableRow
-from scanfab.table.row import groups_of, number_of, numbers_of, total_error, variant_of
+from scanfab.table.row import groups_of, number_of, numbers_of, total_error, variant_of, with_error
 
 Row = Mapping[str, Any]
 
 # The table shows at most about so many frames of a source and variant.
 MOST_FRAMES = 12
 MOST_INPUTS, MOST_BLOCKS = 20, 200
-PLACES = ("x", "y", "z", "r_inner", "r_outer")
 VOID, CONTACT = "alpha_vs_axial", "alpha_c_axial"
+# The report warns of an error above this share of the largest void anisotropy.
+NOTABLE = 0.1
+# The report warns of scan directions with a larger bias than this.
+SOME_BIAS = 1e-5
 
 TURNED = (
     "The loading axis is not the axis of the contact fabric, as in simple shear, so no line of the "
@@ -28,16 +35,35 @@ TURNED = (
     "way the axes point: never negative, so noise raises them. The table has no errors of them."
 )
 
-# Further columns of the frame table, with the titles that readers see.
-MORE_COLUMNS = {
-    "grains": "grains",
-    "rattlers": "rattlers",
-    "contacts": "contacts",
-    "coordination": "coordination",
+# Lines of the results with their columns below, for the first frame, the last, and turned axes; {}
+# stands for the strain or the frame.
+FIRST_LINES = {"α_vs{}": "α_vs ±", "α_c{}": "α_c ±"}
+ERROR_LINES = {"its error: scan": "scan", "its error: sample": "sample"}
+LAST_LINES = {"α_vs{}": "α_vs ±", **ERROR_LINES, "α_c{}": "α_c ±"}
+TURNED_LINES = {
+    "intensity α_vs{}": "void intensity",
+    "intensity α_c{}": "contact intensity",
+    "angle between their axes{}": "angle",
+    "α_vs along the loading axis{}": "α_vs ±",
+}
+# Columns of the table that are shown as they are, with the titles that readers see.
+TITLES = {
+    **{name: name for name in ("frame", "block", "x", "y", "z", "r_inner", "r_outer", "grains")},
+    **{name: name for name in ("rattlers", "contacts", "coordination")},
     "solid_fraction": "solid fraction",
     "mean_length": "mean void length",
     "segments": "void segments",
 }
+# Titles of the columns of frames, and of blocks; a column that is empty in all rows is left out.
+INTENSITIES = ("void intensity", "contact intensity")
+FRAME_COLUMNS = (
+    "α_vs", "± total", "scan", "sample", "α_c", "± of α_c", "grains", "rattlers", "contacts",
+    "coordination", "solid fraction", "mean void length", "void segments",
+)  # fmt: skip
+BLOCK_COLUMNS = (
+    "block", "variant", "x", "y", "z", "r_inner", "r_outer", "grains", "α_vs", "± total", "α_c",
+    "± of α_c", "solid fraction", "coordination", "at a surface",
+)  # fmt: skip
 
 
 class Part(NamedTuple):
@@ -54,13 +80,10 @@ def overview(table: Path, rows: Sequence[Row]) -> str:
     if not rows:
         return f"{table}: an empty table."
     sources = list(dict.fromkeys(str(row["source"]) for row in rows))
-    frames = len({(row["source"], row["frame"]) for row in rows})
+    frames = len(set(map(_of_frame, rows)))
     variants = ", ".join(sorted({str(row["variant"]) for row in rows}))
     column = strain_column(rows)
-    parts = [
-        f"{frames} {'frame' if frames == 1 else 'frames'} of {', '.join(sources)}",
-        f"variants {variants}",
-    ]
+    parts = [f"{counted(frames, 'frame')} of {', '.join(sources)}", f"variants {variants}"]
     if numbers_of(rows, "grains"):
         # variants count all grains, grains in the RV, or grains without rattlers
         grains = {
@@ -84,53 +107,37 @@ def _span(rows: Sequence[Row], column: str, spelling: str, factor: float = 1.0) 
 
 def results_tables(summary: Iterable[TableRow], rows: Sequence[Row]) -> list[Part]:
     """A table for each source, with a column for each variant."""
-    sources: dict[str, list[TableRow]] = {}
-    for one in summary:
-        sources.setdefault(one.source, []).append(one)
-    return [
-        _results(source, lines, [row for row in rows if row["source"] == source])
-        for source, lines in sources.items()
-    ]
+    sources = dict.fromkeys(one.source for one in summary)
+    return [_results(source, summary, rows) for source in sources]
 
 
-def _results(source: str, summary: Sequence[TableRow], rows: Sequence[Row]) -> Part:
+def _results(source: str, summary: Iterable[TableRow], rows: Sequence[Row]) -> Part:
+    summary = [one for one in summary if one.source == source]
+    rows = [row for row in rows if row["source"] == source]
+    turned = is_turned(rows)
     filled = groups_of(row for row in rows if row[VOID] is not None)
     each = [filled.get((source, variant_of(one)), [{}]) for one in summary]
     first, last = [one[0] for one in each], [one[-1] for one in each]
     column = strain_column(rows)
     if len({spelt_strain(row, column) for row in (*first, *last)}) < 2:
         column = None
-    here, there = _where("last", last, column), _where("first", first, column)
+    # no line is fitted to turned axes, as axial values miss their fabric
+    at_end, at_start = (TURNED_LINES, TURNED_LINES) if turned else (LAST_LINES, FIRST_LINES)
     lines: dict[str, list[str]] = {}
-    if is_turned(rows):
-        # no line is fitted, as axial values miss a fabric with turned axes
-        for ends, at in ((last, here), (first, there)):
-            lines |= {
-                f"intensity α_vs{at}": [_intensity(row, VOID) for row in ends],
-                f"intensity α_c{at}": [_intensity(row, CONTACT) for row in ends],
-                f"angle between their axes{at}": [_degrees(row) for row in ends],
-                f"α_vs along the loading axis{at}": [_value(row, VOID) for row in ends],
-            }
-    else:
-        lines = {
-            f"α_vs{here}": [_value(row, VOID) for row in last],
-            "its error: scan": [_error(row, f"{VOID}_se") for row in last],
-            "its error: sample": [_error(row, f"{VOID}_sample_se") for row in last],
-            f"α_c{here}": [_value(row, CONTACT) for row in last],
-        }
-    if first != last and not is_turned(rows):
+    for names, which, ends in ((at_end, "last", last), (at_start, "first", first)):
+        at, cells = _where(which, ends, column), [_cells(row) if row else {} for row in ends]
+        for name, cell in names.items():
+            lines[name.format(at)] = [one.get(cell, "-") for one in cells]
+    if first != last and not turned:
         lines |= {
-            f"α_vs{there}": [_value(row, VOID) for row in first],
-            f"α_c{there}": [_value(row, CONTACT) for row in first],
-            "slope of α_vs on α_c": [_with_error(one.slope, one.slope_se) for one in summary],
+            "slope of α_vs on α_c": [with_error(one.slope, one.slope_se, ".5f") for one in summary],
             "R² of that line": [_spell(one.r2) for one in summary],
             "largest α_vs": [_spell(one.peak) for one in summary],
             "frames in the line": [str(one.frames) for one in summary],
         }
     # leave out lines that are empty for all variants
     shown = [[name, *cells] for name, cells in lines.items() if any(one != "-" for one in cells)]
-    note = TURNED if is_turned(rows) else ""
-    return Part(["variant", *map(variant_of, summary)], shown, note, source)
+    return Part(["variant", *map(variant_of, summary)], shown, TURNED if turned else "", source)
 
 
 def _where(which: str, rows: Sequence[Row], column: str | None) -> str:
@@ -146,134 +153,97 @@ def _value(row: Row, name: str) -> str:
     """Spell a value with its total error, or with the digits that the scan's error allows."""
     error = total_error(row, name)
     if error is None:
-        return _with_error(number_of(row, name), number_of(row, f"{name}_se")).partition(" ±")[0]
-    return _with_error(number_of(row, name), error)
+        return _alone(number_of(row, name), number_of(row, f"{name}_se"))
+    return with_error(number_of(row, name), error, ".5f")
 
 
 def _intensity(row: Row, axial: str) -> str:
     """Spell an intensity with the digits that the error of the axial value allows."""
     error = total_error(row, axial) or number_of(row, f"{axial}_se")
-    return _with_error(number_of(row, axial.removesuffix("_axial")), error).partition(" ±")[0]
+    return _alone(number_of(row, axial.removesuffix("_axial")), error)
 
 
-def _with_error(value: float | None, error: float | None) -> str:
-    """Spell a small number with two digits of its error, if the error is known."""
+def _alone(value: float | None, error: float | None) -> str:
+    """Spell a value with the digits that its error allows."""
+    return with_error(value, error, ".5f").partition(" ±")[0]
+
+
+def _spell(value: Any, spelling: str = ".4g", unit: str = "") -> str:
     if value is None:
         return "-"
-    if error is None or error <= 0:
-        return f"{value:.5f}"
-    # count the digits of the rounded error: 0.00099999 is 0.0010
-    digits = max(0, 1 - math.floor(math.log10(float(f"{error:.1e}"))))
-    return f"{value:.{digits}f} ± {error:.{digits}f}"
+    return f"{value:{spelling}}{unit}" if isinstance(value, float) else str(value)
 
 
-def _error(row: Row, name: str) -> str:
-    error = number_of(row, name)
-    return "-" if error is None else f"{error:#.2g}"
+def _cells(row: Row) -> dict[str, str]:
+    """The cells of a frame or block, by the titles of their columns."""
+    # spell the value of the table, so that counts stay whole numbers
+    numbers = {title: row[name] for name, title in TITLES.items() if numbers_of([row], name)}
+    void, contact = (_value(row, name) for name in (VOID, CONTACT))
+    errors = {
+        "± total": total_error(row, VOID),
+        "scan": number_of(row, f"{VOID}_se"),
+        "sample": number_of(row, f"{VOID}_sample_se"),
+        "± of α_c": number_of(row, f"{CONTACT}_sample_se"),
+    }
+    return {
+        **{title: _spell(value) for title, value in numbers.items()},
+        **{title: _spell(error, "#.2g") for title, error in errors.items()},
+        "variant": variant_of(row),
+        "α_vs ±": void,
+        "α_vs": void.partition(" ±")[0],
+        "α_c ±": contact,
+        "α_c": contact.partition(" ±")[0],
+        "void intensity": _intensity(row, VOID),
+        "contact intensity": _intensity(row, CONTACT),
+        "angle": _spell(number_of(row, "coaxiality_deg"), ".0f", "°"),
+        "at a surface": "yes" if row.get("at_surface") else "-",
+    }
 
 
-def _degrees(row: Row) -> str:
-    angle = number_of(row, "coaxiality_deg")
-    return "-" if angle is None else f"{angle:.0f}°"
-
-
-def _spell(value: Any) -> str:
-    if value is None:
-        return "-"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+def _part(columns: Iterable[str], lines: Sequence[Mapping[str, str]], note: str) -> Part:
+    """A table of cells by column, without the columns that are empty in all lines."""
+    filled = [name for name in columns if any(line.get(name, "-") != "-" for line in lines)]
+    return Part(filled, [[line.get(name, "-") for name in filled] for line in lines], note)
 
 
 def frame_table(rows: Sequence[Row]) -> Part:
     """A table of some frames; the first columns have the anisotropies and their errors."""
-    numbers = list(dict.fromkeys((row["source"], row["frame"]) for row in rows))
-    step = -(-len(numbers) // MOST_FRAMES)
-    shown = {*numbers[::step], numbers[-1]}
-    sources = {row["source"] for row in rows}
+    numbers = list(dict.fromkeys(map(_of_frame, rows)))
+    shown = {*numbers[:: -(-len(numbers) // MOST_FRAMES)], numbers[-1]}
+    sources = {source: [row for row in rows if row["source"] == source] for source, _ in numbers}
     # axial strain is the default, also if it does not tell the frames of a source apart
-    column = {
-        source: strain_column([row for row in rows if row["source"] == source]) or "strain"
-        for source in sources
-    }
-    turned = is_turned(rows)
-    table = [
-        _frame_line(row, column[row["source"]], len(sources) > 1, turned)
-        for row in rows
-        if (row["source"], row["frame"]) in shown
-    ]
-    columns = [name for name in table[0] if any(line[name] != "-" for line in table)]
+    strains = {source: strain_column(own) or "strain" for source, own in sources.items()}
+    turned, lines = is_turned(rows), []
+    for row in rows:
+        if _of_frame(row) in shown:
+            column = strains[row["source"]]
+            strain = "".join(f"{100 * value:.3g} %" for value in numbers_of([row], column)) or "-"
+            source = str(row["source"]) if len(sources) > 1 else "-"
+            lines.append({**_cells(row), column.replace("_", " "): strain, "source": source})
+    main = [*INTENSITIES, "angle", *FRAME_COLUMNS] if turned else [*FRAME_COLUMNS, *INTENSITIES]
     note = "" if len(shown) == len(numbers) else f"{len(shown)} of {len(numbers)} frames are shown."
-    return Part(columns, [[line[name] for name in columns] for line in table], note)
+    columns = ["frame", "variant", "strain", "shear strain", *main, "source"]
+    return _part(columns, lines, note)
 
 
 def block_table(rows: Sequence[Row]) -> Part:
     """A table of the blocks of a map in its last frame."""
-    last = [row for row in rows if (row["source"], row["frame"]) == _of_frame(rows[-1])]
-    table = [
-        {
-            "block": str(row["block"]),
-            "variant": variant_of(row),
-            **{name: _spell(number_of(row, name)) for name in PLACES},
-            "grains": _spell(row.get("grains")),
-            "α_vs": _value(row, VOID).partition(" ±")[0],
-            "± total": _error({"total": total_error(row, VOID)}, "total"),
-            "α_c": _value(row, CONTACT).partition(" ±")[0],
-            "± of α_c": _error(row, f"{CONTACT}_sample_se"),
-            "solid fraction": _spell(number_of(row, "solid_fraction")),
-            "coordination": _spell(number_of(row, "coordination")),
-            "at a surface": "yes" if row["at_surface"] else "-",
-        }
-        for row in last[:MOST_BLOCKS]
-    ]
-    columns = [name for name in table[0] if any(line[name] != "-" for line in table)]
+    last = [row for row in rows if _of_frame(row) == _of_frame(rows[-1])]
     note = f"Blocks in frame {last[0]['frame']} of {last[0]['source'] or 'the sample'}."
     if len(last) > MOST_BLOCKS:
         note += f" The first {MOST_BLOCKS} of {len(last)} are shown."
-    return Part(columns, [[line[name] for name in columns] for line in table], note)
+    return _part(BLOCK_COLUMNS, [_cells(row) for row in last[:MOST_BLOCKS]], note)
 
 
 def _of_frame(row: Row) -> tuple[Any, Any]:
     return row["source"], row["frame"]
 
 
-def _frame_line(row: Row, column: str, several: bool, turned: bool) -> dict[str, str]:
-    """The cells of a row, the most important first."""
-    strain, total = number_of(row, column), total_error(row, VOID)
-    spelt = "-" if strain is None else f"{100 * strain:.3g} %"
-    intensities = {
-        "void intensity": _intensity(row, VOID),
-        "contact intensity": _intensity(row, CONTACT),
-        "angle": _degrees(row) if turned else "-",
-    }
-    more = {
-        # spell the value of the table, so that counts stay whole numbers
-        title: "-" if number_of(row, name) is None else _spell(row[name])
-        for name, title in MORE_COLUMNS.items()
-    }
-    return {
-        "frame": str(row["frame"]),
-        "variant": variant_of(row),
-        "strain": spelt if column == "strain" else "-",
-        "shear strain": spelt if column == "shear_strain" else "-",
-        **(intensities if turned else {}),
-        "α_vs": _value(row, VOID).partition(" ±")[0],
-        "± total": _error({"total": total}, "total"),
-        "scan": _error(row, f"{VOID}_se"),
-        "sample": _error(row, f"{VOID}_sample_se"),
-        "α_c": _value(row, CONTACT).partition(" ±")[0],
-        "± of α_c": _error(row, f"{CONTACT}_sample_se"),
-        **more,
-        **intensities,
-        "source": str(row["source"]) if several else "-",
-    }
-
-
 def input_table(manifest: Mapping[str, Any]) -> Part:
     """The first input files with size and hash."""
     files = list(manifest.get("inputs") or [])
-    lines = [
-        [str(one.get("path")), str(one.get("size")), str(one.get("sha256"))]
-        for one in files[:MOST_INPUTS]
-    ]
+    names = ("path", "size", "sha256")
+    lines = [[str(one.get(name)) for name in names] for one in files[:MOST_INPUTS]]
     more = len(files) - len(lines)
     note = f"and {more} more, in the manifest" if more else ""
     return Part(["file", "bytes", "SHA-256"], lines, note)
@@ -291,3 +261,79 @@ def settings_table(asked: Mapping[str, Any]) -> list[tuple[str, str, str]]:
                 value = ", ".join(map(str, value))
             found.append((flag_of(name)[2:], str(value), MEANINGS.get(name, "")))
     return found
+
+
+def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, Any]]) -> list[str]:
+    """
+    Warnings about tables, each in one or two sentences.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        The rows of the fabric tables.
+    asked : iterable of mapping
+        The settings in their manifests.
+    """
+    found = []
+    for one in asked:
+        with suppress(SettingsError):
+            name = str(one.get("directions") or "")
+            bias = direction_rule(name).bias if name else 0.0
+            if bias >= SOME_BIAS:
+                found.append(
+                    f"The scan directions ({name}) are not spread evenly: a sample without any "
+                    f"anisotropy would get α = {bias:.2g}. Changes of α between frames mean more "
+                    f"than its value."
+                )
+    filled = [row for row in rows if row[VOID] is not None]
+    if len(filled) < len(rows):
+        found.append(
+            f"{len(rows) - len(filled)} of {len(rows)} rows have no void fabric: no void segment "
+            f"was long enough, or some direction kept none."
+        )
+    groups = groups_of(filled)
+    for (source, variant), group in groups.items():
+        if not numbers_of(group, f"{VOID}_se"):
+            why = "it was made of one replicate"
+            if f"{VOID}_se" not in group[0]:
+                why = f"the table has no column {VOID}_se"
+            found.append(
+                f"Variant {variant} of {source} has no standard error of the scan: {why}. Without "
+                f"that part there is no error in all, and none behind ±."
+            )
+    found += _large_errors(groups)
+    if groups and max(map(len, groups.values())) < 3:
+        found.append(
+            "There are fewer than three frames: no line is fitted to void against contact fabric."
+        )
+    return list(dict.fromkeys(found))
+
+
+def _large_errors(groups: Mapping[tuple[str, str], Sequence[Row]]) -> Iterator[str]:
+    """Warn of sources with a large total error, and say what would make it smaller."""
+    large: dict[str, list[tuple[str, float, float]]] = {}
+    for (source, variant), group in groups.items():
+        peak = max(group, key=lambda row: abs(float(row[VOID])))
+        signal = abs(float(peak[VOID]))
+        # use the errors of other frames only if the frame of the peak has none
+        scan, sample = (
+            max(numbers_of([peak], part) or numbers_of(group, part), default=0.0)
+            for part in (f"{VOID}_se", f"{VOID}_sample_se")
+        )
+        total = math.hypot(scan, sample)
+        if total > NOTABLE * signal:
+            parts = f"scan {scan:.2g}, sample {sample:.2g}"
+            text = f"in variant {variant} ({total:.2g} beside {signal:.2g}; {parts})"
+            large.setdefault(source, []).append((text, scan, sample))
+    for source, doubts in large.items():
+        # a part that is less than half of the other part hardly adds to the total error
+        lines = any(scan > 0.5 * sample for _, scan, sample in doubts)
+        grains = any(sample > 0.5 * scan for _, scan, sample in doubts)
+        cure = "Only more grains would help; more lines cannot."
+        if lines:
+            more = "It takes more grains, and more lines" if grains else "More lines would help"
+            cure = f"{more}: a smaller `tolerance` or `spacing`."
+        yield (
+            f"{source}: where α_vs is largest, its standard error, of scan and sample together, is "
+            f"more than a tenth of it {'; '.join(text for text, _, _ in doubts)}. {cure}"
+        )

@@ -6,7 +6,7 @@ import pytest
 
 import scanfab
 from scanfab.table.compare import compare_tables
-from scanfab.viz.figures.page import drawn_page, make_figures
+from scanfab.viz.figures.figure import drawn_page, make_figures
 from tests.conftest import ROOT, SAMPLE
 
 

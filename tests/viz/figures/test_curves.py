@@ -13,10 +13,9 @@ from scanfab.base.errors import ScanfabNote, SettingsError
 from scanfab.table.compare import compare_tables
 from scanfab.table.curves import abscissa_label
 from scanfab.table.table import Table
-from scanfab.viz.figures.columns import Columns
-from scanfab.viz.figures.correlation import PAPER_SLOPE, Correlation
-from scanfab.viz.figures.curves import groups_of
-from scanfab.viz.figures.page import drawn_page, find_figure, make_figures
+from scanfab.viz.figures.anisotropy import PAPER_SLOPE, Correlation
+from scanfab.viz.figures.curves import Columns, groups_of
+from scanfab.viz.figures.figure import drawn_page, find_figure, make_figures
 from tests.helpers.figures import fitted, legend_of, titles_of, with_samples
 from tests.helpers.tables import curve, sheared
 

@@ -9,9 +9,9 @@ import scanfab
 from scanfab import Cell, Packing, SettingsError
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
+from scanfab.viz.compute_file import VtkFolder
 from scanfab.viz.figures.projection import places_of
 from scanfab.viz.figures.rose import contact_ring
-from scanfab.viz.paraview import VtkFolder
 from scanfab.viz.scene import scene_of, section_lines, towards_viewer
 
 XY, ZX = (scanfab.base.space.Space(k) for k in (2, 1))

@@ -20,7 +20,7 @@ from scanfab.pipeline.settings import Settings
 from scanfab.table.compare import compare_tables
 from scanfab.table.plots import figures_of, installed_figures
 from scanfab.table.table import Table, load
-from scanfab.viz.figures.page import drawn_page, make_figures
+from scanfab.viz.figures.figure import drawn_page, make_figures
 from scanfab.viz.figures.style import check_plot_file
 from scanfab.viz.report.report import make_report
 from scanfab.viz.scanned_frames import ScannedFrames

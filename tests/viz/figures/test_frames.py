@@ -16,9 +16,9 @@ from scanfab.fabric.contact import axial_error
 from scanfab.fabric.distribution import direction_points, fit_even
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
-from scanfab.table.row import total_error
-from scanfab.viz.figures.lengths import CutoffCurve, Cutoffs
-from scanfab.viz.figures.page import drawn_page, find_figure, make_figures
+from scanfab.table.row import column_of, total_errors
+from scanfab.viz.figures.figure import drawn_page, find_figure, make_figures
+from scanfab.viz.figures.parameters import CutoffCurve, Cutoffs
 from scanfab.viz.figures.projection import (
     contact_noise,
     noise_note,
@@ -302,17 +302,20 @@ def test_lengths_have_the_mean_of_the_table(scanned, computed):
         assert mean == pytest.approx(row["mean_length"] / row["cutoff"], rel=0.03)
 
 
+def assert_bands_are_wider_than_bars(curve):
+    total = total_errors(curve.rows, "alpha_vs_axial")
+    assert np.all(total > column_of(curve.rows, "alpha_vs_axial_se"))
+
+
 def test_cut_offs_have_the_values_and_errors_of_the_table(scanned, computed):
     """At the cut-off of the table what it says there, to the last digit but for rounding."""
     for curve, frame in zip(figure_of(scanned, "cutoffs").curves, (0, 6), strict=True):
         row = row_of(computed, frame)
-        (place,) = np.flatnonzero(curve.cutoff == 1.0)
+        (place,) = np.flatnonzero(column_of(curve.rows, "value") == 1.0)
         assert curve.chosen == pytest.approx(1.0)
-        assert curve.alpha[place] == pytest.approx(row["alpha_vs_axial"], rel=1e-9)
-        assert curve.error[place] == pytest.approx(row["alpha_vs_axial_se"], rel=1e-9)
-        total = total_error(row, "alpha_vs_axial")
-        assert curve.total[place] == pytest.approx(total, rel=1e-9)
-        assert np.all(curve.total > curve.error)
+        for name in ("alpha_vs_axial", "alpha_vs_axial_se", "alpha_vs_axial_sample_se"):
+            assert curve.rows[place][name] == pytest.approx(row[name], rel=1e-9)
+        assert_bands_are_wider_than_bars(curve)
     ax = Figure().subplots()
     assert scanned.plot.cutoffs(ax=ax, frame=6) is ax
     at = next(line for line in ax.lines if len(line.get_xdata()) > 2)
@@ -327,9 +330,9 @@ def test_figures_have_the_moment_of_the_table(series):
     rows = [dict(scanfab.compute(series, **words, frames=str(one))[0]) for one in (0, 6)]
     curves = figure_of(ScannedFrames(series, Settings(**words), rows), "cutoffs").curves
     for curve, row in zip(curves, rows, strict=True):
-        (place,) = np.flatnonzero(curve.cutoff == 1.0)
-        near = 4 * np.hypot(curve.error[place], row["alpha_vs_axial_se"])
-        assert abs(curve.alpha[place] - row["alpha_vs_axial"]) < near
+        (found,) = (one for one in curve.rows if one["value"] == 1.0)
+        near = 4 * np.hypot(found["alpha_vs_axial_se"], row["alpha_vs_axial_se"])
+        assert abs(found["alpha_vs_axial"] - row["alpha_vs_axial"]) < near
 
 
 def test_a_rough_scan_has_its_bands_and_its_own_cut_off_and_tells_nothing(series, computed):
@@ -339,15 +342,18 @@ def test_a_rough_scan_has_its_bands_and_its_own_cut_off_and_tells_nothing(series
         warnings.simplefilter("error", scanfab.ScanfabWarning)
         curves = figure_of(ScannedFrames(series, settings, computed.rows), "cutoffs").curves
     for curve in curves:
-        assert np.all(curve.total > curve.error)
-        assert curve.chosen in curve.cutoff
+        assert_bands_are_wider_than_bars(curve)
+        assert curve.chosen in column_of(curve.rows, "value")
 
 
 def test_a_cut_off_without_a_total_error_is_told():
-    values = np.array([1.0, 2.0, 3.0])
-    for total, told in ((values, False), (np.array([1.0, np.nan, 3.0]), True)):
+    errors = {"alpha_vs_axial_se": 1.0, "alpha_vs_axial_sample_se": 1.0}
+    row = {"alpha_vs_axial": 1.0, "predicted": 1.0, **errors}
+    for sample, told in ((1.0, False), (None, True)):
+        second = {**row, "alpha_vs_axial_sample_se": sample}
+        rows = [{**one, "value": k} for k, one in enumerate((row, second, row))]
         figure = Cutoffs(None)
-        figure.curves = [CutoffCurve("one", values, values, values, total, 1.0, values)]
+        figure.curves = [CutoffCurve("one", 1.0, rows)]
         with drawn_page([figure]) as page:
             note = page.legends[0].get_title().get_text()
         assert ("(none where either is not known)" in note) == told

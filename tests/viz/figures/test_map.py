@@ -8,8 +8,8 @@ import pytest
 import scanfab
 from scanfab import Cell, Packing
 from scanfab.scan.blocks import Blocks
+from scanfab.viz.figures.figure import drawn_page
 from scanfab.viz.figures.map import Map, lattice_of
-from scanfab.viz.figures.page import drawn_page
 from tests.helpers.lattices import shaken_cubic
 
 pytestmark = pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")

@@ -13,8 +13,13 @@ from scanfab.io.sources import READING, read_series
 from scanfab.pipeline.options import MEANINGS
 from scanfab.pipeline.settings import Settings
 from scanfab.table.compare import compare_tables
-from scanfab.viz.report.caveats import caveats_of
-from scanfab.viz.report.tables import frame_table, overview, results_tables, settings_table
+from scanfab.viz.report.tables import (
+    caveats_of,
+    frame_table,
+    overview,
+    results_tables,
+    settings_table,
+)
 from tests.helpers.tables import curve, sheared
 
 
