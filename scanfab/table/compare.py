@@ -16,7 +16,7 @@ from scanfab.base.errors import SettingsError, note, warn
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.errors import BLOCKS, variance_without_noise
-from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
+from scanfab.table.columns import KINDS
 from scanfab.table.curves import is_turned, strain_column, why_not_strain
 from scanfab.table.row import (
     Rows,
@@ -42,7 +42,6 @@ TURNED = (
     "angle between their axes instead; or compute with `axis` along the major axis"
 )
 
-KINDS = {column.name: column.kind for column in (*OWN_COLUMNS, *MORE_COLUMNS)}
 KEPT = "as in the fabric table"
 RV = f"{KEPT}; only if that has several RVs"
 

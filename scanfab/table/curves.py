@@ -129,10 +129,8 @@ def why_not_strain(rows: Rows) -> str | None:
     instead, cure = abscissa_words(rows), "chooses the length that it is measured by"
     if strain_column(rows) is not None:
         instead, cure = "shear_strain", "chooses another length"
-    return (
-        f"{instead} is used in place of the axial strain, because {'; '.join(lacking)}: `strain` "
-        f"of compute {cure}"
-    )
+    why = f"because {'; '.join(lacking)}"
+    return f"{instead} is used in place of the axial strain, {why}: `strain` of compute {cure}"
 
 
 def _lacking(rows: Rows, column: str) -> list[str]:

@@ -17,7 +17,7 @@ from scanfab.base.errors import ReadError, SettingsError
 from scanfab.base.files import check_file, named_errors
 from scanfab.base.plugins import having, load_plugins
 from scanfab.base.spelling import counted
-from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
+from scanfab.table.columns import KINDS
 
 if TYPE_CHECKING:
     import polars
@@ -26,7 +26,7 @@ Rows = Iterable[Mapping[str, Any]]
 Columns = Sequence[Column]
 
 # cells of these columns stay text even if they look like numbers: a source may be named 2024
-TEXT_COLUMNS = {column.name for column in (*OWN_COLUMNS, *MORE_COLUMNS) if column.kind is str}
+TEXT_COLUMNS = {name for name, kind in KINDS.items() if kind is str}
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
@@ -142,9 +142,8 @@ class Json(OwnFormat):
         """Read one row from each object."""
         text = _text(data, name)
         try:
-            lines = [text] if self.is_array else filter(str.strip, text.split("\n"))
-            rows = [json.loads(line) for line in lines]
-            rows = list(rows[0]) if self.is_array else rows
+            lines = filter(str.strip, text.split("\n"))
+            rows = list(json.loads(text)) if self.is_array else [json.loads(one) for one in lines]
         except (ValueError, RecursionError) as error:  # also an integer of too many digits
             raise ReadError(f"{name}: cannot be read as JSON: {error}") from None
         if not all(isinstance(row, dict) for row in rows):
@@ -172,10 +171,8 @@ def json_line(row: Mapping[str, Any]) -> str:
 class Parquet(OwnFormat):
     """Apache Parquet, whose columns keep the kinds that they are declared with."""
 
-    suffix = ".parquet"
-    description = "Apache Parquet"
-    is_text = False
-    start = b"PAR1"
+    suffix, description = ".parquet", "Apache Parquet"
+    is_text, start = False, b"PAR1"
 
     def read(self, data: bytes, name: str) -> list[dict[str, Any]]:
         """Read the rows."""
@@ -228,12 +225,9 @@ OWN_FORMATS: tuple[TableFormat, ...] = (
 @cache
 def foreign_formats() -> tuple[TableFormat, ...]:
     """Formats that other packages offer."""
-    make = having(
-        "an object with the members of scanfab.table.formats.TableFormat",
-        **dict.fromkeys(("suffix", "description"), str),
-        is_text=bool,
-        **dict.fromkeys(("recognises", "read", "write"), Callable),
-    )
+    members: dict[str, Any] = {"suffix": str, "description": str, "is_text": bool}
+    members |= dict.fromkeys(("recognises", "read", "write"), Callable)
+    make = having("an object with the members of scanfab.table.formats.TableFormat", **members)
     offers = load_plugins("scanfab.table_formats", "table format", make)
     return tuple(offer.plugin for offer in offers.values())
 

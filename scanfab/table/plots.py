@@ -52,8 +52,7 @@ class Plots:
     """
 
     def __init__(self, data: Any, kind: str) -> None:
-        self._data = data
-        self._kind = kind
+        self._data, self._kind = data, kind
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         if name.startswith("_"):

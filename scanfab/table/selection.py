@@ -11,16 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import SettingsError, warn
-from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
+from scanfab.table.columns import KINDS
 from scanfab.table.row import is_number, variant_of
 
 Rows = list[dict[str, Any]]
 
 NEEDED = ("source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_c_axial")
-NAMES = ("source", "variant")
-NUMBERS = tuple(
-    column.name for column in (*OWN_COLUMNS, *MORE_COLUMNS) if column.kind in (int, float)
-)
+NUMBERS = tuple(name for name, kind in KINDS.items() if kind in (int, float))
 # a column that only tables of maps have
 MAP = "at_surface"
 # columns that show that a table is no fabric table, with a name for such a table
@@ -71,10 +68,9 @@ def choose_rows(
     """
     named = [(str(name), [dict(row) for row in rows]) for name, rows in tables]
     if labels and len(labels) != len(named):
-        raise SettingsError(
-            f"labels: expected one name for each table, in the same order: found {len(labels)} for "
-            f"{len(named)}"
-        )
+        expected = "one name for each table, in the same order"
+        found = f"{len(labels)} for {len(named)}"
+        raise SettingsError(f"labels: expected {expected}: found {found}")
     for number, (name, rows) in enumerate(named):
         for row in rows:
             if row.get("source", "") is None:
@@ -108,7 +104,7 @@ def check_rows(rows: Sequence[Mapping[str, Any]], table: str = "") -> None:
                 f"{where if number > 1 else before}{problem}: expected a table of scanfab compute, "
                 f"found the columns {textwrap.shorten(', '.join(map(str, row)), 200)}"
             )
-        wrong = [(name, "a name") for name in NAMES if not isinstance(row[name], str)]
+        wrong = [(k, "a name") for k in ("source", "variant") if not isinstance(row[k], str)]
         numbers = [name for name in NUMBERS if row.get(name) is not None]
         wrong += [(name, "a number") for name in numbers if not is_number(row[name])]
         if not wrong and (row["frame"] is None or row["frame"] % 1 != 0):

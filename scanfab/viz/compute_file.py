@@ -152,9 +152,7 @@ def _opened(source: Source | Sequence[Source], options: dict[str, Any]) -> Seque
     return open_sources(paths, **take_reading(options))
 
 
-def vtk_folders(
-    folder: Path, count: int, settings: Settings, go_on: bool
-) -> Sequence[Callable[[FrameResult], None]]:
+def vtk_folders(folder: Path, count: int, settings: Settings, go_on: bool) -> list[VtkFolder]:
     """
     Make the folders for ParaView files; each of several series has a folder of its own.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -48,12 +49,8 @@ def meshes_of(result: FrameResult) -> Meshes:
 def frame_meshes(result: FrameResult) -> Meshes:
     """The grains, contacts and RVs of a frame, and what each variant's scan says."""
     # the name of a file tells its RV only if there are several RVs
-    windows = {
-        _name("window", rv.fraction): rv.window
-        for measured in result.measurements
-        for rv in measured.plan.rvs[:1]
-        if rv.window is not None
-    }
+    rvs = [rv for measured in result.measurements for rv in measured.plan.rvs[:1]]
+    windows = {_name("window", rv.fraction): rv.window for rv in rvs if rv.window is not None}
     # the largest RV holds the others
     window = [None, *windows.values()][-1]
     fields = _fields(result.rows)
@@ -85,8 +82,8 @@ def _variant_meshes(result: FrameResult, row: Row, size: float) -> Meshes:
         yield f"ellipsoids-{name}", ellipsoid_mesh(tensors, center, size, space), fields
         # one point, whose arrays of nine components are for the filter Tensor Glyph
         point = pyvista.PolyData(center[None])
-        flat = {k: one.reshape(1, 9) for k, one in tensors.items()}
-        yield f"tensors-{name}", _with(point, point.point_data, **flat), fields
+        point.point_data.update({k: one.reshape(1, 9) for k, one in tensors.items()})
+        yield f"tensors-{name}", point, fields
 
 
 def map_meshes(result: FrameResult) -> Meshes:
@@ -103,9 +100,8 @@ def map_meshes(result: FrameResult) -> Meshes:
 def grain_mesh(grains: Grains) -> Any:
     """A point for each particle, with its radius, id and other data."""
     mesh = pyvista.PolyData(grains.position) if len(grains.position) else pyvista.PolyData()
-    names = ["radius", "id", "contacts", "rattler", "boundary", "in_window"]
-    names += ["body"] * (grains.body is not None)
-    return _with(mesh, mesh.point_data, **{name: getattr(grains, name) for name in names})
+    kept = {k: v for k, v in vars(grains).items() if k not in ("position", "to_place")}
+    return _with(mesh, mesh.point_data, **kept)
 
 
 def contact_mesh(sample: Sample, window: Window | None) -> Any:
@@ -125,7 +121,7 @@ def contact_mesh(sample: Sample, window: Window | None) -> Any:
         normal=contacts.normal,
         boundary=~sample.contacts_without(sample.boundary),
         in_window=inside(contacts.point, sample, window),
-        force=() if contacts.force is None else contacts.force,
+        force=contacts.force,
     )
 
 
@@ -141,7 +137,8 @@ def line_mesh(measured: Measurement, variant: str) -> Any:
     # along the axis, and along the first direction across it
     across = line_triads(triad[:1], space)[0] if space.is_plane else np.roll(triad, -1, axis=0)
     found = sample_segments(position, radius, np.stack([triad, across]), LINES, window, space)
-    mesh = lines_mesh(found.ends + measured.solids.origin)
+    found = replace(found, ends=found.ends + measured.solids.origin)
+    mesh = lines_mesh(found.ends)
     kept = found.void & (found.length >= measured.plan.cutoff)
     return _with(
         mesh,
@@ -206,12 +203,8 @@ def block_mesh(blocks: Blocks, values: Mapping[str, npt.ArrayLike]) -> Any:
         at = blocks.corner + np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1) @ blocks.edges
         block = np.arange(len(blocks))
     else:
-        azimuth, polar, radius = np.meshgrid(
-            np.linspace(0.0, 2.0 * np.pi, AZIMUTHS + 1),
-            np.linspace(0.0, np.pi, POLAR + 1),
-            blocks.bounds,
-            indexing="ij",
-        )
+        turns = np.linspace(0.0, 2.0 * np.pi, AZIMUTHS + 1), np.linspace(0.0, np.pi, POLAR + 1)
+        azimuth, polar, radius = np.meshgrid(*turns, blocks.bounds, indexing="ij")
         unit = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
         at = blocks.middles[0] + radius[..., None] * np.stack(unit, axis=-1)
         block = np.repeat(np.arange(blocks.shells), AZIMUTHS * POLAR)
@@ -219,10 +212,10 @@ def block_mesh(blocks: Blocks, values: Mapping[str, npt.ArrayLike]) -> Any:
     return _with(mesh, mesh.cell_data, **{k: np.asarray(one)[block] for k, one in values.items()})
 
 
-def _with(mesh: Any, data: Any, **arrays: npt.ArrayLike) -> Any:
+def _with(mesh: Any, data: Any, **arrays: npt.ArrayLike | None) -> Any:
     """Add arrays to the point or cell data of a mesh, but for empty ones, which pyvista refuses."""
     for name, values in arrays.items():
-        if np.size(values):
+        if values is not None and np.size(values):
             data[name] = np.ascontiguousarray(values)
     return mesh
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -22,9 +22,7 @@ from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.settings import Settings
 from scanfab.table.curves import spelt_strain, strain_column
 from scanfab.table.plots import Plots
-from scanfab.table.row import Row, numbers_of, variant_of
-
-Rows = Sequence[Mapping[str, Any]]
+from scanfab.table.row import Row, Rows, numbers_of, variant_of
 
 
 def scan_frames(
@@ -207,9 +205,8 @@ class ScannedFrames:
         """The rows of the variant; SettingsError if there is nothing to draw."""
         own = [row for row in rows if variant_of(row) == self._kind]
         if not numbers_of(own, "alpha_vs_axial"):
-            raise SettingsError(
-                f"there is nothing to draw: no frame has a void fabric of variant {self._kind}"
-            )
+            none = f"no frame has a void fabric of variant {self._kind}"
+            raise SettingsError(f"there is nothing to draw: {none}")
         return own
 
     def __repr__(self) -> str:

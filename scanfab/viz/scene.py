@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -245,13 +244,9 @@ def about_window(scene: Scene) -> Scene:
     images, row = cell.images_near_origin(branch, grains.radius + scene.window.reach)
     other = np.linalg.norm(images - nearest[row], axis=1) > 1e-6 * grains.radius[row]
     rows = np.concatenate([np.arange(len(nearest)), row[other]])
-    position = np.concatenate([nearest, images[other]]) + scene.center
-    shown: dict[str, Any] = {
-        one.name: None if (values := getattr(grains, one.name)) is None else values[rows]
-        for one in fields(grains)
-    }
-    shown["position"] = position
-    moved = Grains(**shown)
+    taken = {name: values[rows] for name, values in vars(grains).items() if values is not None}
+    taken["position"] = np.concatenate([nearest, images[other]]) + scene.center
+    moved = replace(grains, **taken)
     moved.in_window[:] = scene.window.contains(moved.places - scene.center)
     return replace(scene, grains=moved)
 
@@ -263,16 +258,14 @@ def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
     In the dump's coordinates; clipped to the RV, if there is one, in which periodic images of the
     grains are solid too.
     """
-    grains = scene.grains
-    solid = ~grains.boundary
+    grains, solid = scene.grains, ~scene.grains.boundary
     up = np.asarray(axis, dtype=np.float64)
     depth = towards_viewer(up, scene.space)
     across = np.cross(depth, up)
     turn = np.radians(LINE_ANGLE)
     along = np.cos(turn) * across + np.sin(turn) * up
     frame = np.stack([np.cross(depth, along), depth, along])
-    position = grains.position[solid] - scene.center
-    radius = grains.radius[solid]
+    position, radius = grains.position[solid] - scene.center, grains.radius[solid]
     reach = float(np.linalg.norm(position, axis=1).max(initial=0.0))
     if scene.window is not None:
         reach = scene.window.reach

@@ -50,10 +50,8 @@ def check_screen() -> None:
     """
     has_screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if sys.platform.startswith("linux") and not has_screen:
-        raise ScanfabError(
-            "this machine has no screen for a window (DISPLAY is not set): "
-            'write a picture instead: `screenshot="FILE.png"`'
-        )
+        problem = "this machine has no screen for a window (DISPLAY is not set)"
+        raise ScanfabError(f'{problem}: write a picture instead: `screenshot="FILE.png"`')
 
 
 def check_drawing() -> None:
@@ -73,9 +71,7 @@ def check_drawing() -> None:
         raise ScanfabError(f"VTK finds no OpenGL, EGL or OSMesa library to draw with: {ADVICE}")
 
 
-def show_scene(
-    scene: Scene, axis: npt.ArrayLike, title: str = "", screenshot: Path | None = None
-) -> None:
+def show_scene(scene: Scene, axis: npt.ArrayLike, title: str, screenshot: Path | None) -> None:
     """
     Show the grains of a frame, its RV, and scan lines in a section if the scene has lines.
 
@@ -85,9 +81,9 @@ def show_scene(
         If it has ``lines``, the grains in front of them are left out.
     axis : array_like, shape (3,)
         This axis is upright.
-    title : str, optional
+    title : str
         Title of the window.
-    screenshot : Path, optional
+    screenshot : Path or None
         Write a PNG file instead of opening a window.
 
     Raises
@@ -99,9 +95,8 @@ def show_scene(
         check_drawing()
     # VTK would write to standard error; exceptions report what is wrong
     with pyvista.vtk_verbosity("off"):
-        plotter: Any = pyvista.Plotter(
-            off_screen=screenshot is not None, window_size=list(SIZE), title=title or "scanfab"
-        )
+        is_file = screenshot is not None
+        plotter: Any = pyvista.Plotter(off_screen=is_file, window_size=list(SIZE), title=title)
         _draw(plotter, scene, np.asarray(axis, dtype=np.float64), title)
         if screenshot is None:
             plotter.show()
@@ -115,14 +110,12 @@ def _draw(plotter: Any, scene: Scene, up: FloatArray, title: str) -> None:
     """Draw the scene, and place the camera."""
     grains, window, toward = scene.grains, scene.window, towards_viewer(up, scene.space)
     look = toward if scene.is_section else toward + 0.45 * np.cross(up, toward) + 0.35 * up
+    shown = ~grains.boundary
     if scene.is_section:
-        shown = (grains.position - scene.center) @ toward < grains.radius
+        shown &= (grains.position - scene.center) @ toward < grains.radius
     elif window is not None:
         # grains outside the RV and in front of its centre would hide it
-        shown = grains.in_window | ((grains.places - scene.center) @ look <= 0.0)
-    else:
-        shown = np.ones(len(grains.radius), bool)
-    shown &= ~grains.boundary
+        shown &= grains.in_window | ((grains.places - scene.center) @ look <= 0.0)
     names = _add_grains(plotter, scene, shown, toward)
     for one in reversed(scene.windows):
         _add_window(plotter, scene, one, toward)
@@ -265,8 +258,7 @@ def _add_scale(plotter: Any) -> None:
         across = 2.0 * plotter.camera.parallel_scale * SIZE[0] / SIZE[1]
         length = rounded_down(0.2 * across)
         left = 1.0 - MARGIN - length / across
-        bar.points[:, 0] = np.where(BAR[:, 0] > 0.5, 1.0 - MARGIN, left)
-        bar.points[:, 1] = BAR[:, 1]
+        bar.points[:, 0] = left + BAR[:, 0] * length / across
         bar.Modified()
         words.SetInput(f"{length:g}")
         words.SetPosition(left, 0.045)
@@ -277,9 +269,8 @@ def _add_scale(plotter: Any) -> None:
 
 def _write(plotter: Any, text: str, x: float, y: float, size: int) -> Any:
     """Write words at a place in shares of the window, from the lower left."""
-    return plotter.add_text(
-        text, position=(x, y), viewport=True, font_size=size, color="black", font="arial"
-    )
+    look: Any = {"font_size": size, "color": "black", "font": "arial"}
+    return plotter.add_text(text, position=(x, y), viewport=True, **look)
 
 
 def _fill(plotter: Any, corners: FloatArray, colour: str) -> Any:

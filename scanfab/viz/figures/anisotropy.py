@@ -97,9 +97,8 @@ class Evolution(Curves):
         divided = ", each curve divided by its own largest absolute value" if self.share else ""
         named = zip(self.of, self.quantities, strict=False)
         banded = [name for name, one in named if have_errors(self.curves, one.column)]
-        errors = "without total errors"
-        if banded:
-            errors = f"with total standard errors of {' and '.join(banded)}"
+        errors = f"with total standard errors of {' and '.join(banded)}"
+        errors = errors if banded else "without total errors"
         return f"{drawn}, over {abscissa_words(self.data)}{divided}; {errors}."
 
     @property
@@ -115,8 +114,8 @@ class Evolution(Curves):
         lines = ["bands: one total standard error,", ", ".join(parts)] if parts else []
         scan = np.concatenate([curve.errors("alpha_vs_axial_se") for curve in self.curves])
         if np.isfinite(scan).any() and not self.share:
-            largest = f"{1e3 * np.nanmax(scan):.2g}"
-            lines.append(rf"bars: the scan's part, at most ${largest}\times10^{{-3}}$")
+            largest = rf"${1e3 * np.nanmax(scan):.2g}\times10^{{-3}}$"
+            lines.append(f"bars: the scan's part, at most {largest}")
         return "\n".join(lines)
 
 
@@ -173,8 +172,7 @@ class Correlation(Figure):
     ) -> None:
         super().__init__(data)
         self.paper_line = paper_line
-        self.groups = groups_of(data)
-        self.turned = is_turned(data)
+        self.groups, self.turned = groups_of(data), is_turned(data)
         self.part = "" if self.turned else "_axial"
         self.in_plane = any(0.0 in numbers_of(data, f"gvs_{axis}") for axis in ("xx", "yy", "zz"))
         made = compare_tables(data) if comparison is None else comparison
@@ -192,10 +190,9 @@ class Correlation(Figure):
     def caption(self) -> str:
         """With which lines there are."""
         what = "intensity" if self.turned else "anisotropy along the loading axis"
-        drawn = [group.drawn for group in self.groups if not self.turned]
-        fitted = [self.fits[one.place][0].slope is not None for group in drawn for one in group]
-        lines = ["fitted lines"] * any(fitted)
-        lines += ["the paper's slope"] * any(self._reach(group) > 0 for group in drawn)
+        drawn = [] if self.turned else [one for group in self.groups for one in group.drawn]
+        fitted = any(self.fits[one.place][0].slope is not None for one in drawn)
+        lines = ["fitted lines"] * fitted + ["the paper's slope"] * bool(self._reach(drawn) > 0)
         which = f"with {' and '.join(lines)}" if lines else "without a line"
         return f"Void against contact {what}, {which}."
 
@@ -227,8 +224,7 @@ class Correlation(Figure):
         axes.set(xlabel=LABELS[f"alpha_c{self.part}"], ylabel=LABELS[f"alpha_vs{self.part}"])
         axes.axhline(0, color="0.6", lw=0.6, zorder=0)
         widen(axes, 1.0)
-        handles, labels = zip(*entries, strict=True)
-        margin.legend(handles, labels, title=title, **place)
+        margin.legend(*zip(*entries, strict=True), title=title, **place)
 
     def _draw_curve(self, axes: Axes, one: Drawn) -> tuple[Any, str]:
         """The frames of a curve, with their total errors, and its line."""
@@ -255,9 +251,7 @@ class Correlation(Figure):
 
     def _reach(self, drawn: Sequence[Drawn]) -> float:
         """The end of the paper's line: the largest contact anisotropy that is fitted, or 0."""
-        if not self.paper_line:
-            return 0.0
-        fits = [self.fits[one.place] for one in drawn]
+        fits = [self.fits[one.place] for one in drawn if self.paper_line]
         return max((frames[:, 0].max() for fit, frames in fits if fit.slope is not None), default=0)
 
 

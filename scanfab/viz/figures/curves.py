@@ -115,7 +115,7 @@ class Quantity(NamedTuple):
     label: str
     factor: float = 1.0
     errors: Literal["total", "column", ""] = ""
-    """Errors of the band: scan and sample together, the column ``NAME_se``, or no band."""
+    """Errors of the band: scan and sample together, or the column ``NAME_se``, if there is one."""
     bars: bool = False
     """Whether bars show the scan's part of the errors, from the column ``NAME_se``."""
     smallest: float = 1.0
@@ -123,10 +123,8 @@ class Quantity(NamedTuple):
 
     def errors_of(self, curve: Curve) -> FloatArray:
         """The standard errors of a curve, shape (F,); NaN where there is none."""
-        if self.errors == "total":
-            return curve.total_errors(self.column)
-        found = curve.errors(f"{self.column}_se")
-        return found if self.errors else np.full_like(found, np.nan)
+        is_total, name = self.errors == "total", self.column
+        return curve.total_errors(name) if is_total else curve.errors(f"{name}_se")
 
 
 class Curves(Figure):
@@ -294,9 +292,8 @@ def _named(data: Table, of: str | Sequence[str] | None) -> list[str]:
     asked = of.split(",") if isinstance(of, str) else of or ()
     names = [name.strip() for name in asked] or _first(data)
     if not names:
-        raise SettingsError(
-            "figure columns: name those to draw: the table has no columns that `with_` adds"
-        )
+        reason = "the table has no columns that `with_` adds"
+        raise SettingsError(f"figure columns: name those to draw: {reason}")
     for name in names:
         if name not in data.names:
             raise SettingsError(f"figure columns: {no_column(name, data.names)}")

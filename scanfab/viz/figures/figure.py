@@ -121,9 +121,8 @@ class Figure:
                 style.letter(panels)
             return place
         if not hasattr(place, "plot"):
-            raise SettingsError(
-                f"ax: expected Axes, a Figure or a SubFigure of matplotlib, found {place!r}"
-            )
+            expected = "Axes, a Figure or a SubFigure of matplotlib"
+            raise SettingsError(f"ax: expected {expected}, found {place!r}")
         if self.projection is not None and place.name != self.projection:
             raise SettingsError(
                 f"ax: expected {self.projection} Axes, found {place.name}: make them by "
@@ -211,8 +210,7 @@ class DirectionalFigure(FrameFigure):
     def panels(self, part: FigureBase) -> list[Axes]:
         """A row for each frame, a column each for voids and contacts."""
         polar = {"projection": self.projection}
-        shape = len(self.frames), len(self.of)
-        panels = part.subplots(*shape, squeeze=False, subplot_kw=polar)
+        panels = part.subplots(len(self.frames), len(self.of), squeeze=False, subplot_kw=polar)
         self.add_legend(part, self._draw_grid(panels, "left"))
         return list(panels.ravel())
 
@@ -227,11 +225,9 @@ class DirectionalFigure(FrameFigure):
 
 def one_of(which: str | None, known: tuple[str, ...]) -> tuple[str, ...]:
     """The panels to draw: all, or the one that the option ``of`` chooses."""
-    if which is None:
-        return known
-    if which not in known:
+    if which not in (None, *known):
         raise SettingsError(f"of: expected {' or '.join(known)}, found {which!r}")
-    return (which,)
+    return known if which is None else (which,)
 
 
 def find_figure(text: str, *kinds: str) -> tuple[type[Figure], dict[str, Any]]:
@@ -295,9 +291,8 @@ def make_figures(data: Any, kind: str, text: str | None = None, **offered: Any) 
         names = data.names if isinstance(data, Table) else figure.columns
         lacking = [name for name in figure.columns if name not in names]
         if lacking and text is not None:
-            raise SettingsError(
-                f"figure: {text} needs {', '.join(lacking)}, which the table does not have"
-            )
+            named = ", ".join(lacking)
+            raise SettingsError(f"figure: {text} needs {named}, which the table does not have")
         if text is not None or (not lacking and figure.suits(data)):
             known = {k: v for k, v in offered.items() if k in signature(figure).parameters}
             found.append(figure(data, **{**known, **options}))

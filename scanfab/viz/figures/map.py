@@ -15,7 +15,8 @@ from matplotlib.transforms import nonsingular
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.table.row import column_of, numbers_of, total_errors
+from scanfab.table.curves import Curve
+from scanfab.table.row import column_of, numbers_of
 from scanfab.viz.figures.curves import Quantity
 from scanfab.viz.figures.figure import Figure
 from scanfab.viz.figures.style import FRAME_LOOKS, LABELS, WIDTH, band
@@ -152,13 +153,10 @@ class Map(Figure):
         looks = FRAME_LOOKS[-len(self.frames) :]
         for rows, look in zip(self.frames, looks, strict=True):
             place, label = _places(rows)
-            every = one.factor * column_of(rows, one.column)
-            outer = _at_surface(rows)
+            curve, outer = Curve("", str(self.variant), place, rows), _at_surface(rows)
+            every = one.factor * curve.values(one.column)
             value = np.where(outer, np.nan, every)
-            error = column_of(rows, f"{one.column}_se")
-            if one.errors == "total":
-                error = total_errors(rows, one.column)
-            band(axes, place, value, one.factor * error, look)
+            band(axes, place, value, one.factor * one.errors_of(curve), look)
             told = [f"frame {rows[0].get('frame')}"]
             told += [f"strain {strain:.3g}" for strain in numbers_of(rows[:1], "strain")]
             line = {key: look[key] for key in ("color", "marker", "ls")}
@@ -251,9 +249,8 @@ def lattice_of(middles: FloatArray) -> tuple[IntArray, FloatArray]:
         # blocks along one axis follow one another at equal steps
         rest = middles[::stride]
         step = rest[1] - rest[0]
-        expected = rest[0] + np.arange(len(rest))[:, None] * step
-        off = np.linalg.norm(rest - expected, axis=1) > 0.01 * np.linalg.norm(step)
-        count = int(np.argmax(off)) if off.any() else len(rest)
+        off = np.linalg.norm(np.diff(rest, axis=0) - step, axis=1) > 0.01 * np.linalg.norm(step)
+        count = int(np.argmax(off)) + 1 if off.any() else len(rest)
         axis = max(free, key=lambda one: abs(float(step[one])))
         free.remove(axis)
         numbers[:, axis] = np.arange(len(middles)) // stride % count

@@ -30,12 +30,12 @@ ALPHA = "alpha_vs_axial"
 LINES = 6_000
 # cut-offs that are drawn, in units of the smallest radius
 CUTOFFS = (0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0)
-# For each ladder: label of the x axis, whether it is logarithmic, and the value in the 2017 paper.
-PANELS: dict[str, tuple[str, bool, float | None]] = {
-    "spacing": ("spacing of lines $s/r_{min}$", True, 0.1),
-    "directions": ("number of directions", True, None),
-    "cutoff": ("cut-off $c/r_{min}$", False, 1.0),
-    "rv": ("RV radius / half extent", False, 0.67),
+# For each ladder: label and scale of the x axis, and the value in the 2017 paper.
+PANELS: dict[str, tuple[str, str, float | None]] = {
+    "spacing": ("spacing of lines $s/r_{min}$", "log", 0.1),
+    "directions": ("number of directions", "log", None),
+    "cutoff": ("cut-off $c/r_{min}$", "linear", 1.0),
+    "rv": ("RV radius / half extent", "linear", 0.67),
 }
 
 
@@ -250,20 +250,17 @@ class Ladders(Figure):
             source, frame = self.data[0].source, self.data[0].frame
             name = style.plain(short_names([source])[source])
             lines.insert(0, f"{f'{name}, ' if name else ''}frame {frame}")
-        handles, labels = panels[0].get_legend_handles_labels()
         above: dict[str, Any] = {"loc": "outside upper center", "title": "\n".join(lines)}
-        part.legend(handles, labels, ncols=4, **above)
+        part.legend(*panels[0].get_legend_handles_labels(), ncols=4, **above)
         return panels
 
     def _draw_ladder(self, panel: Axes, ladder: str) -> None:
         """Draw a curve for each variant."""
-        label, logarithmic, paper = PANELS[ladder]
+        label, scale, paper = PANELS[ladder]
         rows = [row for row in self.data if row.ladder == ladder and row[ALPHA] is not None]
         for variant in sorted({row.variant for row in rows}):
             steps = [row for row in rows if row.variant == variant]
             draw_alpha(panel, steps, style.LOOKS[variant], f"variant {variant}")
         if paper is not None:
             panel.axvline(paper, color="0.6", linewidth=0.8, linestyle=":")
-        if logarithmic:
-            panel.set_xscale("log")
-        panel.set(xlabel=label, ylabel=style.LABELS[ALPHA])
+        panel.set(xlabel=label, xscale=scale, ylabel=style.LABELS[ALPHA])

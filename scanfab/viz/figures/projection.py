@@ -152,9 +152,8 @@ def deviations_of(frame: ScannedFrame) -> dict[str, FloatArray | None]:
     assert mean_length is not None
     points, weights = distribution.direction_points(space)
     mean = float(weights @ mean_length(points))
-    contacts = None
-    if len(normals):
-        contacts = 100 * (smoothed_density(normals, directions, space) - 1)
+    density = smoothed_density(normals, directions, space) if len(normals) else None
+    contacts = None if density is None else 100 * (density - 1)
     return {"voids": 100 * (mean_length(directions) / mean - 1), "contacts": contacts}
 
 
@@ -164,11 +163,10 @@ def smoothed_density(
     """Density of the normals (n or -n) about each direction, relative to isotropic normals."""
     points, weights = distribution.direction_points(space)
     isotropic = float(weights @ np.exp(CONCENTRATION * points[:, max(space.along)] ** 2))
-    flat = directions.reshape(-1, 3)
-    density: FloatArray = np.array(
-        [np.exp(CONCENTRATION * (normals @ one) ** 2).mean() for one in flat]
-    )
-    return density.reshape(directions.shape[:-1]) / isotropic
+    every = directions.reshape(-1, 3)
+    means = np.array([np.exp(CONCENTRATION * (normals @ one) ** 2).mean() for one in every])
+    density: FloatArray = means.reshape(directions.shape[:-1]) / isotropic
+    return density
 
 
 def noise_note(frame: ScannedFrame, deviations: Mapping[str, FloatArray | None]) -> str:

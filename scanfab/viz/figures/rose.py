@@ -141,10 +141,8 @@ class Rose(DirectionalFigure):
         space = self.frames[0].space
         if space.is_plane and self.angles not in (POLAR_ANGLES, EQUATOR):
             angles = ",".join(f"{one:g}" for one in self.angles)
-            raise SettingsError(
-                f"figure: discs in {space} have no polar angles, found {angles}: choose "
-                f"`figure=rose`"
-            )
+            reason = f"discs in {space} have no polar angles, found {angles}"
+            raise SettingsError(f"figure: {reason}: choose `figure=rose`")
         return space
 
     @property
@@ -209,10 +207,8 @@ class Rose(DirectionalFigure):
 
 def _checked_angles(angles: Sequence[float], found: object) -> tuple[float, ...]:
     if not 0 < len(angles) <= len(LOOKS) or not all(0 < angle <= 90 for angle in angles):
-        raise SettingsError(
-            f"figure: expected one to four polar angles above 0 and up to 90 degrees, such as "
-            f"rose:30,60,90, found {found!r}"
-        )
+        expected = "one to four polar angles above 0 and up to 90 degrees, such as rose:30,60,90"
+        raise SettingsError(f"figure: expected {expected}, found {found!r}")
     return tuple(angles)
 
 
@@ -231,8 +227,7 @@ def void_rings(frame: ScannedFrame, angles: Sequence[float]) -> list[Ring]:
     measured, variant, plan = frame.measurement, frame.variant, frame.measurement.plan
     # at the equator θ and θ + 180° are one line
     thetas = [np.arange(0.0, 180.0 if phi == 90 else 360.0, THETA_STEP) for phi in angles]
-    vectors = [_vectors(*one, frame.space) for one in zip(thetas, angles, strict=True)]
-    axes = np.concatenate(vectors)
+    axes = np.concatenate([_vectors(*one, plan.space) for one in zip(thetas, angles, strict=True)])
     weights = np.full(len(axes), 1 / len(axes))
     # the spacing that gives the wanted number of segments
     segments = measured.sums.kept(variant)[1].mean()

@@ -98,10 +98,8 @@ STYLE: Any = {
 def check_plot_file(path: Path) -> None:
     """SettingsError if no figure can be written to a file of this name."""
     if path.suffix.lower() not in PLOT_FORMATS:
-        raise SettingsError(
-            f"{path}: figures can be written as {', '.join(PLOT_FORMATS)}, "
-            f"not as {path.suffix or 'a file without a suffix'}"
-        )
+        known, found = ", ".join(PLOT_FORMATS), path.suffix or "a file without a suffix"
+        raise SettingsError(f"{path}: figures can be written as {known}, not as {found}")
     check_folder(path)
 
 

@@ -62,9 +62,8 @@ def render_page(**content: Any) -> str:
     import jinja2
 
     # escapes everything, and JSON in scripts too (the filter tojson)
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.undefined = jinja2.StrictUndefined
     environment.filters["symbols"] = _symbols
     folder = files("scanfab.viz.report")
     template = environment.from_string((folder / "page.html").read_text("utf-8"))
@@ -93,8 +92,7 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     """
     grains = scene.grains
     shown = ~grains.boundary
-    position = grains.position[shown] - scene.center
-    radius = grains.radius[shown]
+    position, radius = grains.position[shown] - scene.center, grains.radius[shown]
     distance = np.linalg.norm(grains.places[shown] - scene.center, axis=1)
     nearest = np.argsort(distance, kind="stable")[:MOST_GRAINS]
     reach = np.linalg.norm(position[nearest], axis=1) + radius[nearest]
@@ -105,14 +103,12 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     away = -towards_viewer(up, scene.space)
     turn = np.stack([np.cross(away, up), away, up])
     names = ["grains in the RV", "grains outside" if scene.window else "grains", "rattlers"]
+    named = zip(names, KIND_COLOURS, strict=True)
     shades = [] if grains.body is None else [grains.shade[shown]]
     numbers = np.rint(np.column_stack([position @ turn.T, radius]) * scale)
     spheres = np.column_stack([numbers, grains.kind[shown], *shades]).astype(int)[nearest]
     return {
-        "kinds": [
-            {"name": name, "colour": colour, "pale": pale}
-            for name, (colour, pale) in zip(names, KIND_COLOURS, strict=True)
-        ],
+        "kinds": [{"name": name, "colour": one, "pale": pale} for name, (one, pale) in named],
         "spheres": spheres.tolist(),
         "shades": SHADES if shades else [1.0],
         "axes": _axes(up, turn),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
@@ -44,6 +44,9 @@ class Input(NamedTuple):
     cutoff: float | None
     """The cut-off whose rows were chosen from several."""
     is_map: bool
+
+
+Inputs = list[Input]
 
 
 @dataclass(frozen=True)
@@ -163,8 +166,10 @@ def make_report(
     every = [row for one in inputs for row in one.rows]
     asked = [one.manifest["settings"] for one in inputs if one.manifest is not None]
     doubts = [*told.warnings, *of_sources.warnings, *map(as_options, words.caveats_of(rows, asked))]
+    names = [Path(one).name or one for one in dict.fromkeys(str(row["source"]) for row in every)]
+    about = ", ".join(names) if len(names) < 4 else f"{len(names)} samples"
     page = render_page(
-        title=title or _usual_title(every),
+        title=title or f"Void fabric of {about}",
         author=author,
         date=(today or datetime.now(UTC).astimezone().date()).isoformat(),
         summary=[words.overview(one.path, one.rows) for one in inputs],
@@ -182,9 +187,7 @@ def make_report(
 report = make_report
 
 
-def read_inputs(
-    tables: Sequence[Path], cutoff: float | None = None, labels: Sequence[str] | None = None
-) -> list[Input]:
+def read_inputs(tables: list[Path], cutoff: float | None, labels: Sequence[str] | None) -> Inputs:
     """
     Read tables and manifests.
 
@@ -193,29 +196,19 @@ def read_inputs(
     ScanfabError
         If one cannot be read or is neither a fabric table nor a map, or if no table has a row.
     """
-    # tables may lack the columns of source and strain
-    read = [
-        (path, [{"source": path.stem, "strain": None, **row} for row in read_rows(path)])
-        for path in tables
-    ]
-    is_map = [bool(rows) and MAP in rows[0] for _, rows in read]
-    tables_of_frames = [one for one, of_map in zip(read, is_map, strict=True) if not of_map]
-    chosen = iter(choose_rows(tables_of_frames, cutoff, labels))
-    inputs = [
-        Input(path, rows if of_map else next(chosen), read_manifest(path), cutoff, of_map)
-        for (path, rows), of_map in zip(read, is_map, strict=True)
-    ]
+    read, of_frames = [], []
+    for path in tables:
+        # tables may lack the columns of source and strain
+        rows = [{"source": path.stem, "strain": None, **row} for row in read_rows(path)]
+        is_map = bool(rows) and MAP in rows[0]
+        read.append(Input(path, rows, read_manifest(path), cutoff, is_map))
+        of_frames += [(path, rows)] * (not is_map)
+    chosen = iter(choose_rows(of_frames, cutoff, labels))
+    inputs = [one if one.is_map else one._replace(rows=next(chosen)) for one in read]
     if not any(one.rows for one in inputs):
-        raise SettingsError(
-            f"{', '.join(map(str, tables))}: there is nothing to report: no row in the table"
-        )
+        names = ", ".join(map(str, tables))
+        raise SettingsError(f"{names}: there is nothing to report: no row in the table")
     return inputs
-
-
-def _usual_title(rows: Sequence[Mapping[str, Any]]) -> str:
-    sources = dict.fromkeys(str(row["source"]) for row in rows)
-    names = [Path(source).name or source for source in sources]
-    return f"Void fabric of {', '.join(names) if len(names) < 4 else f'{len(names)} samples'}"
 
 
 def _section(one: Input, told: Told) -> dict[str, Any]:
@@ -344,9 +337,8 @@ def _pictures(rows: list[dict[str, Any]], series: Series, settings: Settings) ->
         f"Scanned to a standard error of {tolerance:.2g} instead of the table's {asked:.2g}, which "
         f"would take too long for a picture."
     )
-    frames = ScannedFrames(
-        series, replace(settings, tolerance=tolerance), rows, rougher if tolerance > asked else ""
-    )
+    told = rougher if tolerance > asked else ""
+    frames = ScannedFrames(series, replace(settings, tolerance=tolerance), rows, told)
     # drawn as pixels, as the coloured disks are pixels anyway
     figures = [figure for figure in make_figures(frames, "frames") if not figure.slow]
     return [picture_of(figure, "png") for figure in figures]

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.option import flag_of
+from scanfab.base.spelling import counted
 from scanfab.pipeline.options import MEANINGS
 from scanfab.pipeline.record import HIDDEN, given_settings
 from scanfab.scan.directions import direction_rule
@@ -18,8 +19,6 @@ from scanfab.table.row import Row as TableRow
 from scanfab.table.row import groups_of, number_of, numbers_of, total_error, variant_of, with_error
 
 Row = Mapping[str, Any]
-Groups = Mapping[tuple[str, str], Sequence[Row]]
-"""Rows by source and variant."""
 
 # The table shows at most about so many frames of a source and variant.
 MOST_FRAMES = 12
@@ -36,6 +35,17 @@ TURNED = (
     "way the axes point: never negative, so noise raises them. The table has no errors of them."
 )
 
+# Lines of the results with their columns below, for the first frame, the last, and turned axes; {}
+# stands for the strain or the frame.
+FIRST_LINES = {"α_vs{}": "α_vs ±", "α_c{}": "α_c ±"}
+ERROR_LINES = {"its error: scan": "scan", "its error: sample": "sample"}
+LAST_LINES = {"α_vs{}": "α_vs ±", **ERROR_LINES, "α_c{}": "α_c ±"}
+TURNED_LINES = {
+    "intensity α_vs{}": "void intensity",
+    "intensity α_c{}": "contact intensity",
+    "angle between their axes{}": "angle",
+    "α_vs along the loading axis{}": "α_vs ±",
+}
 # Columns of the table that are shown as they are, with the titles that readers see.
 TITLES = {
     **{name: name for name in ("frame", "block", "x", "y", "z", "r_inner", "r_outer", "grains")},
@@ -70,13 +80,10 @@ def overview(table: Path, rows: Sequence[Row]) -> str:
     if not rows:
         return f"{table}: an empty table."
     sources = list(dict.fromkeys(str(row["source"]) for row in rows))
-    frames = len({(row["source"], row["frame"]) for row in rows})
+    frames = len(set(map(_of_frame, rows)))
     variants = ", ".join(sorted({str(row["variant"]) for row in rows}))
     column = strain_column(rows)
-    parts = [
-        f"{frames} {'frame' if frames == 1 else 'frames'} of {', '.join(sources)}",
-        f"variants {variants}",
-    ]
+    parts = [f"{counted(frames, 'frame')} of {', '.join(sources)}", f"variants {variants}"]
     if numbers_of(rows, "grains"):
         # variants count all grains, grains in the RV, or grains without rattlers
         grains = {
@@ -100,44 +107,29 @@ def _span(rows: Sequence[Row], column: str, spelling: str, factor: float = 1.0) 
 
 def results_tables(summary: Iterable[TableRow], rows: Sequence[Row]) -> list[Part]:
     """A table for each source, with a column for each variant."""
-    sources: dict[str, list[TableRow]] = {}
-    for one in summary:
-        sources.setdefault(one.source, []).append(one)
-    return [
-        _results(source, lines, [row for row in rows if row["source"] == source])
-        for source, lines in sources.items()
-    ]
+    sources = dict.fromkeys(one.source for one in summary)
+    return [_results(source, summary, rows) for source in sources]
 
 
-def _results(source: str, summary: Sequence[TableRow], rows: Sequence[Row]) -> Part:
+def _results(source: str, summary: Iterable[TableRow], rows: Sequence[Row]) -> Part:
+    summary = [one for one in summary if one.source == source]
+    rows = [row for row in rows if row["source"] == source]
+    turned = is_turned(rows)
     filled = groups_of(row for row in rows if row[VOID] is not None)
     each = [filled.get((source, variant_of(one)), [{}]) for one in summary]
     first, last = [one[0] for one in each], [one[-1] for one in each]
     column = strain_column(rows)
     if len({spelt_strain(row, column) for row in (*first, *last)}) < 2:
         column = None
-    here, there = _where("last", last, column), _where("first", first, column)
+    # no line is fitted to turned axes, as axial values miss their fabric
+    at_end, at_start = (TURNED_LINES, TURNED_LINES) if turned else (LAST_LINES, FIRST_LINES)
     lines: dict[str, list[str]] = {}
-    if is_turned(rows):
-        # no line is fitted, as axial values miss a fabric with turned axes
-        for ends, at in ((last, here), (first, there)):
-            lines |= {
-                f"intensity α_vs{at}": [_intensity(row, VOID) for row in ends],
-                f"intensity α_c{at}": [_intensity(row, CONTACT) for row in ends],
-                f"angle between their axes{at}": [_degrees(row) for row in ends],
-                f"α_vs along the loading axis{at}": [_value(row, VOID) for row in ends],
-            }
-    else:
-        lines = {
-            f"α_vs{here}": [_value(row, VOID) for row in last],
-            "its error: scan": [_error(number_of(row, f"{VOID}_se")) for row in last],
-            "its error: sample": [_error(number_of(row, f"{VOID}_sample_se")) for row in last],
-            f"α_c{here}": [_value(row, CONTACT) for row in last],
-        }
-    if first != last and not is_turned(rows):
+    for names, which, ends in ((at_end, "last", last), (at_start, "first", first)):
+        at, cells = _where(which, ends, column), [_cells(row) if row else {} for row in ends]
+        for name, cell in names.items():
+            lines[name.format(at)] = [one.get(cell, "-") for one in cells]
+    if first != last and not turned:
         lines |= {
-            f"α_vs{there}": [_value(row, VOID) for row in first],
-            f"α_c{there}": [_value(row, CONTACT) for row in first],
             "slope of α_vs on α_c": [with_error(one.slope, one.slope_se, ".5f") for one in summary],
             "R² of that line": [_spell(one.r2) for one in summary],
             "largest α_vs": [_spell(one.peak) for one in summary],
@@ -145,8 +137,7 @@ def _results(source: str, summary: Sequence[TableRow], rows: Sequence[Row]) -> P
         }
     # leave out lines that are empty for all variants
     shown = [[name, *cells] for name, cells in lines.items() if any(one != "-" for one in cells)]
-    note = TURNED if is_turned(rows) else ""
-    return Part(["variant", *map(variant_of, summary)], shown, note, source)
+    return Part(["variant", *map(variant_of, summary)], shown, TURNED if turned else "", source)
 
 
 def _where(which: str, rows: Sequence[Row], column: str | None) -> str:
@@ -177,37 +168,34 @@ def _alone(value: float | None, error: float | None) -> str:
     return with_error(value, error, ".5f").partition(" ±")[0]
 
 
-def _error(error: float | None) -> str:
-    return "-" if error is None else f"{error:#.2g}"
-
-
-def _degrees(row: Row) -> str:
-    angle = number_of(row, "coaxiality_deg")
-    return "-" if angle is None else f"{angle:.0f}°"
-
-
-def _spell(value: Any) -> str:
+def _spell(value: Any, spelling: str = ".4g", unit: str = "") -> str:
     if value is None:
         return "-"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return f"{value:{spelling}}{unit}" if isinstance(value, float) else str(value)
 
 
 def _cells(row: Row) -> dict[str, str]:
     """The cells of a frame or block, by the titles of their columns."""
     # spell the value of the table, so that counts stay whole numbers
     numbers = {title: row[name] for name, title in TITLES.items() if numbers_of([row], name)}
+    void, contact = (_value(row, name) for name in (VOID, CONTACT))
+    errors = {
+        "± total": total_error(row, VOID),
+        "scan": number_of(row, f"{VOID}_se"),
+        "sample": number_of(row, f"{VOID}_sample_se"),
+        "± of α_c": number_of(row, f"{CONTACT}_sample_se"),
+    }
     return {
         **{title: _spell(value) for title, value in numbers.items()},
+        **{title: _spell(error, "#.2g") for title, error in errors.items()},
         "variant": variant_of(row),
-        "α_vs": _value(row, VOID).partition(" ±")[0],
-        "± total": _error(total_error(row, VOID)),
-        "scan": _error(number_of(row, f"{VOID}_se")),
-        "sample": _error(number_of(row, f"{VOID}_sample_se")),
-        "α_c": _value(row, CONTACT).partition(" ±")[0],
-        "± of α_c": _error(number_of(row, f"{CONTACT}_sample_se")),
+        "α_vs ±": void,
+        "α_vs": void.partition(" ±")[0],
+        "α_c ±": contact,
+        "α_c": contact.partition(" ±")[0],
         "void intensity": _intensity(row, VOID),
         "contact intensity": _intensity(row, CONTACT),
-        "angle": _degrees(row),
+        "angle": _spell(number_of(row, "coaxiality_deg"), ".0f", "°"),
         "at a surface": "yes" if row.get("at_surface") else "-",
     }
 
@@ -228,10 +216,10 @@ def frame_table(rows: Sequence[Row]) -> Part:
     turned, lines = is_turned(rows), []
     for row in rows:
         if _of_frame(row) in shown:
-            column, strain = strains[row["source"]], number_of(row, strains[row["source"]])
-            line = {**_cells(row), "source": str(row["source"]) if len(sources) > 1 else "-"}
-            line[column.replace("_", " ")] = "-" if strain is None else f"{100 * strain:.3g} %"
-            lines.append(line)
+            column = strains[row["source"]]
+            strain = "".join(f"{100 * value:.3g} %" for value in numbers_of([row], column)) or "-"
+            source = str(row["source"]) if len(sources) > 1 else "-"
+            lines.append({**_cells(row), column.replace("_", " "): strain, "source": source})
     main = [*INTENSITIES, "angle", *FRAME_COLUMNS] if turned else [*FRAME_COLUMNS, *INTENSITIES]
     note = "" if len(shown) == len(numbers) else f"{len(shown)} of {len(numbers)} frames are shown."
     columns = ["frame", "variant", "strain", "shear strain", *main, "source"]
@@ -254,10 +242,8 @@ def _of_frame(row: Row) -> tuple[Any, Any]:
 def input_table(manifest: Mapping[str, Any]) -> Part:
     """The first input files with size and hash."""
     files = list(manifest.get("inputs") or [])
-    lines = [
-        [str(one.get("path")), str(one.get("size")), str(one.get("sha256"))]
-        for one in files[:MOST_INPUTS]
-    ]
+    names = ("path", "size", "sha256")
+    lines = [[str(one.get(name)) for name in names] for one in files[:MOST_INPUTS]]
     more = len(files) - len(lines)
     note = f"and {more} more, in the manifest" if more else ""
     return Part(["file", "bytes", "SHA-256"], lines, note)
@@ -288,7 +274,17 @@ def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, A
     asked : iterable of mapping
         The settings in their manifests.
     """
-    found = [*_biases(asked)]
+    found = []
+    for one in asked:
+        with suppress(SettingsError):
+            name = str(one.get("directions") or "")
+            bias = direction_rule(name).bias if name else 0.0
+            if bias >= SOME_BIAS:
+                found.append(
+                    f"The scan directions ({name}) are not spread evenly: a sample without any "
+                    f"anisotropy would get α = {bias:.2g}. Changes of α between frames mean more "
+                    f"than its value."
+                )
     filled = [row for row in rows if row[VOID] is not None]
     if len(filled) < len(rows):
         found.append(
@@ -296,7 +292,16 @@ def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, A
             f"was long enough, or some direction kept none."
         )
     groups = groups_of(filled)
-    found += [*_unknown_errors(groups), *_large_errors(groups)]
+    for (source, variant), group in groups.items():
+        if not numbers_of(group, f"{VOID}_se"):
+            why = "it was made of one replicate"
+            if f"{VOID}_se" not in group[0]:
+                why = f"the table has no column {VOID}_se"
+            found.append(
+                f"Variant {variant} of {source} has no standard error of the scan: {why}. Without "
+                f"that part there is no error in all, and none behind ±."
+            )
+    found += _large_errors(groups)
     if groups and max(map(len, groups.values())) < 3:
         found.append(
             "There are fewer than three frames: no line is fitted to void against contact fabric."
@@ -304,34 +309,7 @@ def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, A
     return list(dict.fromkeys(found))
 
 
-def _biases(asked: Iterable[Mapping[str, Any]]) -> Iterator[str]:
-    """Warn of rules of scan directions that find anisotropy in an isotropic sample."""
-    for one in asked:
-        with suppress(SettingsError):
-            name = str(one.get("directions") or "")
-            bias = direction_rule(name).bias if name else 0.0
-            if bias >= SOME_BIAS:
-                yield (
-                    f"The scan directions ({name}) are not spread evenly: a sample without any "
-                    f"anisotropy would get α = {bias:.2g}. Changes of α between frames mean more "
-                    f"than its value."
-                )
-
-
-def _unknown_errors(groups: Groups) -> Iterator[str]:
-    """Warn of variants without a standard error of the scan."""
-    for (source, variant), group in groups.items():
-        if not numbers_of(group, f"{VOID}_se"):
-            why = "it was made of one replicate"
-            if f"{VOID}_se" not in group[0]:
-                why = f"the table has no column {VOID}_se"
-            yield (
-                f"Variant {variant} of {source} has no standard error of the scan: {why}. Without "
-                f"that part there is no error in all, and none behind ±."
-            )
-
-
-def _large_errors(groups: Groups) -> Iterator[str]:
+def _large_errors(groups: Mapping[tuple[str, str], Sequence[Row]]) -> Iterator[str]:
     """Warn of sources with a large total error, and say what would make it smaller."""
     large: dict[str, list[tuple[str, float, float]]] = {}
     for (source, variant), group in groups.items():
@@ -344,10 +322,8 @@ def _large_errors(groups: Groups) -> Iterator[str]:
         )
         total = math.hypot(scan, sample)
         if total > NOTABLE * signal:
-            text = (
-                f"in variant {variant} ({total:.2g} beside {signal:.2g}; scan {scan:.2g}, sample "
-                f"{sample:.2g})"
-            )
+            parts = f"scan {scan:.2g}, sample {sample:.2g}"
+            text = f"in variant {variant} ({total:.2g} beside {signal:.2g}; {parts})"
             large.setdefault(source, []).append((text, scan, sample))
     for source, doubts in large.items():
         # a part that is less than half of the other part hardly adds to the total error
