@@ -32,31 +32,19 @@ SHEAR_STRAIN = Column("shear_strain", float, "", SHEAR)
 JACKKNIFE = re.compile(r"_(without|half)_\d$")
 
 
-def _parts_last(columns: Iterable[Column]) -> tuple[Column, ...]:
+def _ordered(columns: Iterable[Column]) -> tuple[Column, ...]:
     return tuple(sorted(columns, key=lambda column: JACKKNIFE.search(column.name) is not None))
 
 
-OWN_COLUMNS = _parts_last(
-    [
-        *FRAME_COLUMNS,
-        *SAMPLE_COLUMNS,
-        *SCAN_COLUMNS,
-        *(column for fabric in OWN_FABRICS.values() for column in fabric.columns),
-        SHEAR_STRAIN,
-    ]
-)
+IN_FABRICS = [column for fabric in OWN_FABRICS.values() for column in fabric.columns]
+OWN_COLUMNS = _ordered([*FRAME_COLUMNS, *SAMPLE_COLUMNS, *SCAN_COLUMNS, *IN_FABRICS, SHEAR_STRAIN])
 """Columns of every fabric table."""
 
 COLUMNS: tuple[str, ...] = tuple(column.name for column in OWN_COLUMNS)
 """Names of the columns of every fabric table."""
 
-MORE_COLUMNS = (
-    RV_COLUMN,
-    WINDOW_ALPHA,
-    *EDGE_COLUMNS,
-    PREDICTED_ALPHA,
-    *(column for group in GROUPS.values() for column in group.columns),
-)
+IN_GROUPS = [column for group in GROUPS.values() for column in group.columns]
+MORE_COLUMNS = (RV_COLUMN, WINDOW_ALPHA, *EDGE_COLUMNS, PREDICTED_ALPHA, *IN_GROUPS)
 """Columns that a table has only if options ask for them."""
 
 KINDS = {column.name: column.kind for column in (*OWN_COLUMNS, *MORE_COLUMNS)}
@@ -103,7 +91,7 @@ def table_columns(more: Collection[str] = ()) -> tuple[Column, ...]:
     """
     chosen = (column for column in MORE_COLUMNS if column.name in more)
     others = (column for fabric in installed_fabrics().values() for column in fabric.columns)
-    return _parts_last([*OWN_COLUMNS, *chosen, *others])
+    return _ordered([*OWN_COLUMNS, *chosen, *others])
 
 
 def map_columns(more: Collection[str] = (), *, shells: bool = False) -> tuple[Column, ...]:

@@ -225,12 +225,9 @@ OWN_FORMATS: tuple[TableFormat, ...] = (
 @cache
 def foreign_formats() -> tuple[TableFormat, ...]:
     """Formats that other packages offer."""
-    make = having(
-        "an object with the members of scanfab.table.formats.TableFormat",
-        **dict.fromkeys(("suffix", "description"), str),
-        is_text=bool,
-        **dict.fromkeys(("recognises", "read", "write"), Callable),
-    )
+    members: dict[str, Any] = {"suffix": str, "description": str, "is_text": bool}
+    members |= dict.fromkeys(("recognises", "read", "write"), Callable)
+    make = having("an object with the members of scanfab.table.formats.TableFormat", **members)
     offers = load_plugins("scanfab.table_formats", "table format", make)
     return tuple(offer.plugin for offer in offers.values())
 

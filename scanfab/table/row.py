@@ -36,9 +36,8 @@ SHOWN = {
 ANISOTROPIES = ("alpha_vs_axial", "alpha_c_axial")
 # these columns are not shown if all rows have the same value
 OFTEN_SAME = ("source", "strain", "shear_strain", "cutoff")
-MOST_COLUMNS = 8
-# number of rows shown at each end of a long table
-ENDS = 5
+# number of columns shown, and number of rows shown at each end of a long table
+MOST_COLUMNS, ENDS = 8, 5
 
 
 class Record(Mapping[str, Any]):
@@ -95,10 +94,9 @@ class Row(Mapping[str, Any]):
         self._values = values
 
     def __getitem__(self, name: str) -> Any:
-        try:
-            return self._values[name]
-        except KeyError:
-            raise NoColumnError(name, tuple(self)) from None
+        if name not in self._values:
+            raise NoColumnError(name, tuple(self))
+        return self._values[name]
 
     def __getattr__(self, name: str) -> Any:
         # Python itself looks up names such as __deepcopy__

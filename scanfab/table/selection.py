@@ -17,7 +17,6 @@ from scanfab.table.row import is_number, variant_of
 Rows = list[dict[str, Any]]
 
 NEEDED = ("source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_c_axial")
-NAMES = ("source", "variant")
 NUMBERS = tuple(name for name, kind in KINDS.items() if kind in (int, float))
 # a column that only tables of maps have
 MAP = "at_surface"
@@ -105,7 +104,7 @@ def check_rows(rows: Sequence[Mapping[str, Any]], table: str = "") -> None:
                 f"{where if number > 1 else before}{problem}: expected a table of scanfab compute, "
                 f"found the columns {textwrap.shorten(', '.join(map(str, row)), 200)}"
             )
-        wrong = [(name, "a name") for name in NAMES if not isinstance(row[name], str)]
+        wrong = [(k, "a name") for k in ("source", "variant") if not isinstance(row[k], str)]
         numbers = [name for name in NUMBERS if row.get(name) is not None]
         wrong += [(name, "a number") for name in numbers if not is_number(row[name])]
         if not wrong and (row["frame"] is None or row["frame"] % 1 != 0):
