@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
-from scanfab.scan.kernels.bins import Partition
+from scanfab.scan.kernels.strips import Partition
 from scanfab.scan.lines import line_triads
 
 

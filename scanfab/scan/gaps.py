@@ -18,7 +18,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.scan.blocks import Blocks, partition_of
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import ENDS
-from scanfab.scan.kernels.bins import Bins
+from scanfab.scan.kernels.strips import Bins
 from scanfab.scan.kernels.sweep import TALLY_SIZE
 from scanfab.scan.lines import drawn_lines
 from scanfab.scan.scan import ScanSums, in_parts, sums_of

@@ -14,8 +14,8 @@ from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.scan.edges import CLIP, ENDS
 from scanfab.scan.kernels import sweep
 from scanfab.scan.kernels.axes import Axes, Followed, scan_axes, scan_cell
-from scanfab.scan.kernels.bins import OF_WHOLE, OF_WINDOW, Bins, no_bins
-from scanfab.scan.kernels.strips import Counts, Edge
+from scanfab.scan.kernels.bins import OF_WHOLE, OF_WINDOW, no_bins
+from scanfab.scan.kernels.strips import Bins, Counts, Edge
 from scanfab.scan.solids import Solids, clip_of, shortest_gap
 
 # Spheres whose radius is this fraction of the spacing, for each variant, are scanned as fast row by

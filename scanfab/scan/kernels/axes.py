@@ -8,7 +8,7 @@ import numpy as np
 
 from scanfab.base.jit import LANES, ZERO, Flag, kernel, part
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
-from scanfab.scan.kernels.bins import Bins, bins_along
+from scanfab.scan.kernels.bins import bins_along
 from scanfab.scan.kernels.cells import Cells
 from scanfab.scan.kernels.grid import (
     Bounds,
@@ -34,6 +34,7 @@ from scanfab.scan.kernels.resolve import Beyond, follow_beyond, follow_measured,
 from scanfab.scan.kernels.strips import (
     MOST_LINES,
     STATE_SIZE,
+    Bins,
     Clip,
     Counts,
     Section,

@@ -8,15 +8,12 @@ two ends of the last gap, and two that both sets share, where the line enters an
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from scanfab.base.jit import LANES, Flag, inner, kernel, part
 from scanfab.base.typing import FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from scanfab.scan.kernels.bins import Bins
 
 # place of a line along u and v, and the depths at which it enters and leaves the window
 Line = tuple[float, float, float, float]
@@ -133,6 +130,55 @@ class Strip(NamedTuple):
     pitch: int
     low: IntArray
     high: IntArray
+
+
+class Partition(NamedTuple):
+    """Blocks of space as numbers; each array has a row for the whole and one for the window."""
+
+    to_block: FloatArray
+    """Affine maps of places to three coordinates, shape (2, 3, 4)."""
+    parts: FloatArray
+    """Number of equal parts of each coordinate, and number of shells, shape (2, 4)."""
+    repeats: FloatArray
+    """1 where the fractional part of a coordinate counts, else 0, shape (2, 3)."""
+    form: FloatArray
+    """
+    Quadratic form of the coordinates minus ½ that gives the squared distance from the middle.
+
+    Shape (2, 6). The outermost shell ends at the distance 1. Zeros if there are no shells.
+    """
+    halves: Flag
+    """True for octants, that is halves of coordinates that repeat, which are found faster."""
+
+
+class Bins(NamedTuple):
+    """What gaps are added to."""
+
+    partition: Partition
+    """In which block a gap's middle lies."""
+    cutoffs: FloatArray
+    """
+    Cut-offs in ascending order, shape (C,); a gap goes to the bin of the largest that it reaches.
+
+    If there is none, gaps are tallied instead.
+    """
+    sums: FloatArray
+    """
+    Number, length and squared length of the gaps in B blocks, shape (D, 2, 2, B * C, 3).
+
+    The axes of the array are: direction, whole or window, set of solids, block and cut-off, sum. A
+    kernel sees one direction, without D. Gaps are weighted by the rule at the window's surface. For
+    ``ends`` the three sums are half the number of ends, the length inside, and the number of gaps
+    that are kept.
+    """
+
+    def of_whole(self, center: FloatArray) -> Bins:
+        """The same bins, by the whole's blocks for what lies in a window about a centre."""
+        to_block, parts, repeats, form, halves = self.partition
+        to_block = to_block[::-1].copy()
+        to_block[:, :, 3] += to_block[:, :, :3] @ center
+        parts, repeats, form = parts[::-1].copy(), repeats[::-1].copy(), form[::-1].copy()
+        return self._replace(partition=Partition(to_block, parts, repeats, form, halves))
 
 
 class Task(NamedTuple):

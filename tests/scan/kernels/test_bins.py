@@ -5,7 +5,7 @@ import pytest
 
 from scanfab import Solids
 from scanfab.scan.blocks import Blocks, partition_of
-from scanfab.scan.kernels.bins import Bins
+from scanfab.scan.kernels.strips import Bins
 from scanfab.scan.lines import line_triads
 from scanfab.scan.tallies import tally_triads
 from tests.helpers import naive
