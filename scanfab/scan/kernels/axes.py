@@ -18,6 +18,7 @@ from scanfab.scan.kernels.grid import (
     project,
     room_to_project,
     sort_into_strips,
+    sphere_at,
     strip_of,
 )
 from scanfab.scan.kernels.lists import (
@@ -42,7 +43,7 @@ from scanfab.scan.kernels.strips import (
     begin,
     section_along,
 )
-from scanfab.scan.kernels.sweep import STEPS, settle, visit_all
+from scanfab.scan.kernels.sweep import NOTHING, STEPS, settle, visit
 
 
 class Axes(NamedTuple):
@@ -67,6 +68,27 @@ class Followed(NamedTuple):
 
     A scan that needs more ends early, and its tallies mean nothing.
     """
+
+
+@part()
+def visit_all(task: Task, spheres: Spheres, chosen: IntArray, reach: float) -> None:
+    """
+    Visit the chosen spheres.
+
+    ``reach`` is the radius of the ball that holds the window. Spheres beside it meet no line that
+    meets the window.
+    """
+    counts = task.counts
+    for k in chosen:
+        sphere = sphere_at(spheres, k)
+        kept = np.nan if spheres.removed[k] else NOTHING
+        if counts.whole is not None and counts.window is not None:
+            away = reach + sphere.radius
+            if sphere.u * sphere.u + sphere.v * sphere.v > away * away:
+                aside = Counts(counts.least, counts.second, True, None, None)
+                visit(Task(task.lines, task.strip, aside, task.tally, task.bins), sphere, kept)
+                continue
+        visit(task, sphere, kept)
 
 
 @part()

@@ -43,9 +43,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from scanfab.base.jit import LANES, REORDERED, inner, part
-from scanfab.base.typing import FloatArray, IntArray
-from scanfab.scan.kernels.grid import Spheres, sphere_at
+from scanfab.base.jit import LANES, REORDERED, inner
+from scanfab.base.typing import FloatArray
 from scanfab.scan.kernels.strips import (
     BEFORE,
     BEHIND,
@@ -338,27 +337,6 @@ def visit(task: Task, sphere: Sphere, kept: float) -> None:
     add(task.tally, 0, sums)
     if counts.second is not None:
         add(task.tally, 1, sums2)
-
-
-@part()
-def visit_all(task: Task, spheres: Spheres, chosen: IntArray, reach: float) -> None:
-    """
-    Visit the chosen spheres.
-
-    ``reach`` is the radius of the ball that holds the window. Spheres beside it meet no line that
-    meets the window.
-    """
-    counts = task.counts
-    for k in chosen:
-        sphere = sphere_at(spheres, k)
-        kept = np.nan if spheres.removed[k] else NOTHING
-        if counts.whole is not None and counts.window is not None:
-            away = reach + sphere.radius
-            if sphere.u * sphere.u + sphere.v * sphere.v > away * away:
-                aside = Counts(counts.least, counts.second, True, None, None)
-                visit(Task(task.lines, task.strip, aside, task.tally, task.bins), sphere, kept)
-                continue
-        visit(task, sphere, kept)
 
 
 @inner(fastmath=REORDERED, error_model="numpy")
