@@ -1,5 +1,3 @@
-import itertools
-
 """A scan along an axis equals its slow twin on random packings of every awkward kind."""
 
 import itertools
