@@ -36,10 +36,11 @@ BLOCK_REPLICATES = 2
 # few hundred grains would change with the seed by a quarter; with these, by a tenth or less.
 AXES_TIMES_GRAINS = 80_000
 # Most chords of this scan. Dense packings of similar grains need 1,250 per grain; grains that
-# overlap many times or differ much in size would need more. The most leave a noise of about 4e-5 in
-# alpha, a fifth of the error due to a random sample of ten million grains.
+# overlap many times or differ much in size would need more. The most leave a noise of about 8e-5 in
+# alpha, which is subtracted: less than half of the error due to a random sample of ten million
+# grains, and a twentieth of that of a hundred thousand.
 CHORDS_A_GRAIN = 2_000
-FEWEST_CHORDS, MOST_CHORDS = 3e7, 2e8
+FEWEST_CHORDS, MOST_CHORDS = 3e7, 5e7
 # the user is warned if a larger fraction of the segments leaves the sample
 MOST_LEFT_OUT = 0.01
 
