@@ -49,6 +49,9 @@ class Touching:
 
     def numbers_without(self, left_out: BoolArray) -> IntArray:
         """Numbers of neighbours, shape (N,), without some contacts, shape (M,)."""
+        if self.bodies is None:
+            return self.numbers - self.ends(np.compress(left_out, self.contacts.pairs, axis=0))
+        # clumps that touch in several points stay neighbours while one contact is left
         left = self.contacts.neighbours(self.bodies, left_out)
         return self.numbers - self.ends(self.neighbours) + self.ends(left)
 
@@ -59,7 +62,9 @@ class Touching:
 
     def ends(self, pairs: RowArray) -> IntArray:
         """How many of some pairs each grain belongs to, at each of its spheres, shape (N,)."""
-        numbers = np.bincount(pairs.ravel(), minlength=len(self.grains))
+        # one column at a time, as bincount copies what it counts
+        first, second = (np.bincount(rows, minlength=len(self.grains)) for rows in pairs.T)
+        numbers = first + second
         return numbers if self.bodies is None else numbers[self.bodies.head]
 
 
