@@ -63,6 +63,16 @@ def test_a_section_lies_in_one_plane_and_in_the_window(sample, axis):
     assert lines.void.any()
 
 
+def test_a_section_has_as_many_lines_in_any_unit():
+    packing = simple_cubic(4)
+    found = []
+    for unit in (1.0, 1e-3):
+        scaled = scanfab.Packing(unit * packing.position, unit * packing.radius, contacts=[])
+        scene = scene_of(Sample(scaled, np.zeros(len(packing.radius), bool)), None)
+        found.append(section_lines(scene, (0, 0, 1)).line.max())
+    assert found[0] == found[1] > 0
+
+
 def test_a_section_cuts_periodic_images_too():
     """A crystal looks the same about each of its grains, also one at the corner of the cell."""
     position, radius = simple_cubic(4)
