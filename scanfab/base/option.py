@@ -69,7 +69,12 @@ class Option:
     first: bool = False
     """Whether it is listed among the few options that most users need."""
     decides: bool = True
-    """Whether it decides a result; if so, the report lists it, and scanfab.toml may hold it."""
+    """
+    Whether it decides a result.
+
+    If so, manifest and report list it, ``resume`` and ``merge`` ask for the same value, and
+    scanfab.toml may hold it.
+    """
 
     @property
     def flag(self) -> str:
