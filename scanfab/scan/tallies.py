@@ -151,7 +151,7 @@ class _Lines(NamedTuple):
 
     def listed(self, radius: FloatArray, variants: int) -> Flag:
         """Whether to list chords, as most are of spheres that meet few lines; bins do so anyhow."""
-        few = np.sum(radius**2) < FEW_LINES * variants * self.axes.spacing * np.sum(radius)
+        few = radius @ radius < FEW_LINES * variants * self.axes.spacing * np.sum(radius)
         return True if few and not self.bins.cutoffs.size else None
 
     def scan_cell(self) -> None:
@@ -224,14 +224,17 @@ class _Lines(NamedTuple):
         if self.solids.edge != ENDS and not quick:
             self.scan(True, None, None)
             return
-        if self.solids.edge != ENDS:
+        if self.solids.edge == ENDS:
+            if inner is None:
+                return
+            alone = self._replace(bins=self.bins.of_whole(inner.center))
+            alone.scan(None, WEIGHED, inner.shape, inner.center, self.solids.near_inner)
+        else:
             alone = self._replace(bins=self.bins.of_whole(np.zeros(3)))
             alone.scan(None, CLIPPED, None)
             # the void and the length of a line without an end mean nothing
             found[..., [sweep.WINDOW + sweep.VOID, sweep.WINDOW + sweep.LINE_LENGTH]] = 0.0
-        elif inner is not None:
-            alone = self._replace(bins=self.bins.of_whole(inner.center))
-            alone.scan(None, WEIGHED, inner.shape, inner.center, self.solids.near_inner)
+        # what was found in the window belongs to the whole
         of_whole, of_window = found[..., : sweep.WINDOW], found[..., sweep.WINDOW : sweep.CHORDS]
         of_whole[:], of_window[:] = of_window, 0.0
         sums[:, OF_WHOLE], sums[:, OF_WINDOW] = sums[:, OF_WINDOW], 0.0

@@ -61,7 +61,7 @@ class Evolution(Curves):
     order = 1
     columns = ("variant", "alpha_vs_axial", "strain", "alpha_c_axial")
     height: ClassVar[float] = 2.9
-    """Of a single row of panels, inches."""
+    """Height of a single row of panels, inches."""
 
     def __init__(self, data: Table, of: str | None = None) -> None:
         self.turned = is_turned(data)
@@ -177,7 +177,7 @@ class Correlation(Figure):
         self.in_plane = any(0.0 in numbers_of(data, f"gvs_{axis}") for axis in ("xx", "yy", "zz"))
         made = compare_tables(data) if comparison is None else comparison
         self.fits = list(zip(made.summary, made.points, strict=True))
-        """Of each curve its line, and contact and void anisotropy of the fitted frames."""
+        """For each curve its line, and contact and void anisotropy of the fitted frames."""
 
     @property
     def size(self) -> tuple[float, float]:
@@ -188,7 +188,7 @@ class Correlation(Figure):
 
     @property
     def caption(self) -> str:
-        """With which lines there are."""
+        """Says which lines are drawn."""
         what = "intensity" if self.turned else "anisotropy along the loading axis"
         drawn = [] if self.turned else [one for group in self.groups for one in group.drawn]
         fitted = any(self.fits[one.place][0].slope is not None for one in drawn)

@@ -102,7 +102,7 @@ class Map(Figure):
 
     @property
     def caption(self) -> str:
-        """With the variant."""
+        """Names the variant, and says if blocks lie at the surface."""
         text = f"Fabric by place, variant {self.variant}."
         last = self.frames[-1]
         if all(row.get("at_surface") for row in last):
@@ -149,7 +149,7 @@ class Map(Figure):
         return used
 
     def _draw_profile(self, axes: Axes, one: Quantity) -> None:
-        """Of the first and the last frame."""
+        """Draw the profiles of the first and the last frame."""
         looks = FRAME_LOOKS[-len(self.frames) :]
         for rows, look in zip(self.frames, looks, strict=True):
             place, label = _places(rows)
