@@ -13,8 +13,13 @@ class Offer(NamedTuple):
     """An object that a package offers."""
 
     plugin: Any
-    package: str
-    """The name of the package."""
+    point: Any
+    """The entry point."""
+
+    @property
+    def package(self) -> str:
+        """The name of the package; it stands in a long file, which is read only when needed."""
+        return self.point.dist.name if self.point.dist is not None else "unknown package"
 
 
 def having(expected: str, **members: Any) -> Callable[[Any], Any]:
@@ -62,19 +67,19 @@ def load_plugins(group: str, what: str, make: Callable[[Any], Any]) -> dict[str,
     """
     offers: dict[str, Offer] = {}
     for point in sorted(entry_points(group=group), key=lambda point: (point.name, point.value)):
-        package = point.dist.name if point.dist is not None else "unknown package"
+        offer = Offer(None, point)
         try:
-            plugin = make(point.load())
+            offer = Offer(make(point.load()), point)
         except (Exception, SystemExit) as error:  # a foreign package may fail in any way
             warn(
-                f"the {what} {point.name!r} of {package} cannot be loaded: "
+                f"the {what} {point.name!r} of {offer.package} cannot be loaded: "
                 f"{type(error).__name__}: {error}"
             )
             continue
         if point.name in offers:
             raise ScanfabError(
                 f"two packages offer a {what} called {point.name!r}: "
-                f"{offers[point.name].package} and {package}; remove one of them"
+                f"{offers[point.name].package} and {offer.package}; remove one of them"
             )
-        offers[point.name] = Offer(plugin, package)
+        offers[point.name] = offer
     return offers

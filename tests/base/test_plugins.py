@@ -32,7 +32,8 @@ def test_they_come_by_name_with_their_package_and_a_broken_one_is_a_warning(offe
     offered += [point("b", lambda: 2), point("bad", lambda: 1 / 0), point("a", lambda: 1)]
     with pytest.warns(ScanfabWarning, match="the thing 'bad' of one .*ZeroDivisionError: div"):
         found = load_plugins("some.group", "thing", str)
-    assert list(found.items()) == [("a", ("1", "one")), ("b", ("2", "one"))]
+    said = [(name, offer.plugin, offer.package) for name, offer in found.items()]
+    assert said == [("a", "1", "one"), ("b", "2", "one")]
 
 
 def test_one_name_twice_is_an_error_that_names_both_packages(offered):

@@ -7,9 +7,9 @@ scanfab writes PolyData (``.vtp``). Data without a usual name (cell, images) get
 from __future__ import annotations
 
 import re
+from html import escape
 from pathlib import Path
 from typing import Any, Literal
-from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -305,7 +305,7 @@ def _array(name: str, values: AnyArray) -> Any:
         table = values.reshape(len(values), int(np.prod(values.shape[1:])))
         table = table.astype(np.uint8) if values.dtype.kind == "b" else table
         array = numpy_to_vtk(np.ascontiguousarray(table), deep=True)  # type: ignore[no-untyped-call]
-    array.SetName(escape(name, {'"': "&quot;"}))
+    array.SetName(escape(name))
     return array
 
 
