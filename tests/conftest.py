@@ -13,6 +13,9 @@ import pytest
 from scanfab.cli.main import run
 from scanfab.table.formats import read_rows
 
+# programs that tests start would otherwise compile all modules anew
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 ROOT = Path(__file__).parents[1]
 SAMPLE = "sample_data/yade_triaxial"
 
