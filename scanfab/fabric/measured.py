@@ -121,8 +121,6 @@ class Measured:
     """Sums without each block of the sample, from other lines in the same frame."""
     normals: FloatArray
     """Unit normals of the contacts, shape (M, 3)."""
-    points: FloatArray
-    """Contact points, shape (M, 3), dump's length unit."""
     blocks: IntArray
     """Block of the sample that each contact point lies in, from 0, shape (M,)."""
     space: Space = SPACE

@@ -13,6 +13,7 @@ import numpy as np
 from scanfab.base.arrays import compressed, in_parts
 from scanfab.base.errors import Note, PackingError, ScanfabNote, joined
 from scanfab.base.spelling import spelt_apart
+from scanfab.base.typing import BoolArray, IntArray
 from scanfab.fabric import predicted
 from scanfab.fabric.forces import doubts_of_forces
 from scanfab.fabric.measured import Measured
@@ -235,10 +236,6 @@ class VariantColumns:
         name, place, groups = self.variant.name, self.place, plan.settings.with_
         length, segments = measurement.kept(name, place)
         chosen = sample.fabric_contacts(self.variant, self.window)
-        points = places = compressed(chosen, sample.contacts.point)
-        if self.window is not None:
-            # images of the points next to the centre of the RV
-            places = self.window.center + self.window.branches(points, sample.packing)
         state = sample_state(sample, self.variant, self.window) if "state" in groups else None
         return Measured(
             axis=np.asarray(plan.settings.axis),
@@ -248,14 +245,23 @@ class VariantColumns:
             segments=segments,
             meets_solids=not self.lack and bool(sample.solids(self.variant, self.window).any()),
             blocked=blocked_sums(measurement.blocked, measurement.block_rule, plan, name, place),
+            blocks=self._blocks_of(chosen),
             normals=compressed(chosen, sample.contacts.normal),
-            points=points,
-            blocks=in_parts(measurement.blocks[self.variant.in_window].of, places),
             space=plan.space,
             segment_count=int(measurement.kept(name, place, moment=1)[1].sum()),
             forces=contact_forces(sample, chosen) if "forces" in groups else None,
             state=state,
         )
+
+    def _blocks_of(self, chosen: BoolArray) -> IntArray:
+        """The block of the sample that each chosen contact lies in."""
+        places = compressed(chosen, self.sample.contacts.point)
+        if self.window is not None:
+            # images of the points next to the centre of the RV
+            places = self.window.center + self.window.branches(places, self.sample.packing)
+        blocks = self.measurement.blocks[self.variant.in_window]
+        numbers: IntArray = in_parts(blocks.of, places)
+        return numbers
 
     @cached_property
     def solid_fraction(self) -> float | None:

@@ -49,7 +49,6 @@ def made(name, rng):
         meets_solids=True,
         blocked=None,
         normals=n,
-        points=n,
         blocks=np.zeros(COUNT, int),
         space=space,
         segment_count=1600 * len(rule),

@@ -29,7 +29,7 @@ def measured(length=(1.0, 1.0, 2.0), normals=8 * ((1.0, 0.0, 0.0),), meets=True,
     }
     return Measured(
         axes=axes, weights=THIRDS, length=lengths, segments=number, meets_solids=meets,
-        normals=places, points=places, **{**usual, **more},
+        normals=places, **{**usual, **more},
     )  # fmt: skip
 
 
