@@ -151,7 +151,7 @@ class _Lines(NamedTuple):
 
     def listed(self, radius: FloatArray, variants: int) -> Flag:
         """Whether to list chords, as most are of spheres that meet few lines; bins do so anyhow."""
-        few = radius @ radius < FEW_LINES * variants * self.axes.spacing * np.sum(radius)
+        few = np.sum(radius**2) < FEW_LINES * variants * self.axes.spacing * np.sum(radius)
         return True if few and not self.bins.cutoffs.size else None
 
     def scan_cell(self) -> None:
