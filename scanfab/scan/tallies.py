@@ -192,7 +192,8 @@ class _Lines(NamedTuple):
         solid = slice(None) if self.first else ~solids.removed
         if near is not None:
             solid = near & (self.first | ~solids.removed)
-        position, radius = np.ascontiguousarray(solids.position[solid]), solids.radius[solid]
+        position = np.ascontiguousarray(solids.position[solid])
+        radius = np.ascontiguousarray(solids.radius[solid])
         if center is not None:
             position = position - center
         followed, before = None, float(self.tallies[:, 0, sweep.STEPS].sum())
