@@ -84,6 +84,14 @@ def test_without_octants_of_all_frames_the_slope_has_no_error(column):
     assert summary_of(with_octants(curve())[:2]).slope_se is None
 
 
+def test_why_the_slope_has_no_error_is_told():
+    rows = with_octants(curve())
+    rows[1]["alpha_vs_axial_without_1"] = None
+    for some, reason in ((rows, "some frame has no fabric"), (curve(), "the table has no parts")):
+        with pytest.warns(ScanfabNote, match=f"slope_se is empty for variant .: {reason}"):
+            summary_of(some)
+
+
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_under_three_frames_the_slope_is_empty(count):
     comparison = compare_tables(curve()[:count])
