@@ -85,15 +85,6 @@ def test_a_body_through_a_face_has_its_place_next_to_its_first_sphere():
     assert len(find_contacts(packing).contacts) == 0
 
 
-def test_a_body_that_touches_its_own_image_has_two_neighbours():
-    """As a sphere that does; the inner contact of the body is none."""
-    cell = Cell([4.0, 20.0, 20.0])
-    sample = grains([[0.5, 5, 5], [2.2, 5, 5]], [6, 6], 1.2, cell=cell)
-    assert sample.contacts.pairs.tolist() == [[0, 1]]
-    assert sample.contact_numbers.tolist() == [2, 2]
-    assert not sample.rattlers.any()
-
-
 def small_clumps(random, size):
     """Spheres a few of which, close together, are one body each, shaken all over a cube."""
     position, radius, number = [], [], []
