@@ -94,25 +94,18 @@ def test_a_section_without_window_or_grains_is_no_error(sample):
     assert len(section_lines(empty, (0, 0, 1)).length) == 0
 
 
-def clumps(**options):
+def test_grains_of_clumps_have_their_numbers_and_places_and_are_seen_whole():
     """Two of them, one through the face x = 10, and a sphere alone."""
     position = [[9.6, 5, 5], [0.8, 5, 5], [4.0, 5, 5], [5.2, 5, 5], [2.6, 5, 5]]
     cell = scanfab.Cell([10.0, 10.0, 10.0])
-    packing = scanfab.Packing(position, 1.0, bodies=[3, 3, 8, 8, -1], cell=cell, **options)
-    return Sample(scanfab.find_contacts(packing), np.zeros(5, bool))
-
-
-def test_grains_of_clumps_have_their_numbers_and_places():
-    sample = clumps()
+    packing = scanfab.Packing(position, 1.0, bodies=[3, 3, 8, 8, -1], cell=cell)
+    sample = Sample(scanfab.find_contacts(packing), np.zeros(5, bool))
     grains = grains_of(sample, Window(np.array([0.2, 5.0, 5.0]), sphere(0.1)))
     assert grains.body.tolist() == [3, 3, 8, 8, -1]
     assert grains.contacts.tolist() == [1, 1, 1, 1, 2]
     assert grains.in_window.tolist() == [True, True, False, False, False]
     np.testing.assert_allclose(grains.places[:, 0], [10.2, 0.2, 4.6, 4.6, 2.6])
-
-
-def test_a_clump_is_seen_whole_next_to_the_window():
-    sample = clumps()
+    # next to a window
     window = Window(np.array([4.7, 5.0, 5.0]), sphere(2.0))
     grains = about_window(scene_of(sample, window)).grains
     first = grains.position[grains.body == 3]
