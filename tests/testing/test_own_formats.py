@@ -26,6 +26,13 @@ READERS = {
 SMALL = ("plain", "everything", "no grains")
 
 
+@pytest.fixture(autouse=True)
+def few_damages(monkeypatch):
+    """Each reader gets files of any bytes elsewhere, too."""
+    monkeypatch.setattr("scanfab.testing.readers.CUTS", 15)
+    monkeypatch.setattr("scanfab.testing.readers.DAMAGES", 40)
+
+
 @pytest.mark.parametrize("name", WRITERS)
 def test_what_is_written_is_read_back_to_the_last_bit(tmp_path, name):
     check_writer(writer_named(name), tmp_path)
