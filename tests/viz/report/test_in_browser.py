@@ -11,7 +11,7 @@ import pytest
 
 from scanfab.cli.main import run
 from tests.conftest import ROOT, SAMPLE
-from tests.helpers.browser import Browser, missing
+from tests.viz.report.browser import Browser, missing
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
 
