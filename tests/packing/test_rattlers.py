@@ -65,13 +65,13 @@ def random_network(seed):
     return pairs, size, boundary, walls
 
 
-@pytest.mark.parametrize("seed", range(25))
 @pytest.mark.parametrize("least", [1, 2, 3, 4])
-def test_recursive_is_its_naive_twin(seed, least):
-    pairs, size, boundary, walls = random_network(seed)
-    sample = network(pairs, size, boundary=boundary, walls=walls, least=least)
-    held = naive.held_grains(pairs.tolist(), walls.tolist(), sample.grains.tolist(), least)
-    assert set(np.flatnonzero(sample.grains & ~sample.rattlers).tolist()) == held
+def test_recursive_is_its_naive_twin(least):
+    for seed in range(25):
+        pairs, size, boundary, walls = random_network(seed)
+        sample = network(pairs, size, boundary=boundary, walls=walls, least=least)
+        held = naive.held_grains(pairs.tolist(), walls.tolist(), sample.grains.tolist(), least)
+        assert set(np.flatnonzero(sample.grains & ~sample.rattlers).tolist()) == held
 
 
 def test_a_rule_that_gives_something_else_is_an_error():
