@@ -35,8 +35,9 @@ sys.path[0] = str(ROOT)
 import pyvista  # noqa: E402
 
 from scanfab.io.writer import installed_writers, writer_named  # noqa: E402
-from tests.helpers import fuzzing, sound_files, versions  # noqa: E402
-from tests.helpers.versions import Reading  # noqa: E402
+from tests.campaigns import versions  # noqa: E402
+from tests.campaigns.versions import Reading  # noqa: E402
+from tests.helpers import fuzzing, sound_files  # noqa: E402
 
 DATA = "sample_data"
 

@@ -16,12 +16,26 @@ from scanfab.table.table import Table
 from scanfab.viz.figures.anisotropy import PAPER_SLOPE, Correlation
 from scanfab.viz.figures.curves import Columns, groups_of
 from scanfab.viz.figures.figure import drawn_page, find_figure, make_figures
-from tests.helpers.figures import fitted, legend_of, titles_of, with_samples
+from tests.helpers.figures import fitted
 from tests.helpers.tables import curve, sheared
 
 VOID_SAMPLE = {"alpha_vs_axial_sample_se": 2e-3}
 CONTACT_SAMPLE = {"alpha_c_axial_sample_se": 1e-2}
 TURNED = "ignore:the loading axis|shear_strain stands"
+
+
+def legend_of(axes):
+    return [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+def titles_of(figure):
+    return [axes.get_title(loc="left") for axes in figure.axes]
+
+
+def with_samples(rows):
+    return [
+        {**row, "alpha_vs_axial_sample_se": 2e-3, "alpha_c_axial_sample_se": 1e-2} for row in rows
+    ]
 
 
 def bars_of(axes):

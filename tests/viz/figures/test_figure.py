@@ -20,7 +20,8 @@ from scanfab.pipeline.settings import Settings
 from scanfab.table.compare import compare_tables
 from scanfab.table.plots import figures_of, installed_figures
 from scanfab.table.table import Table, load
-from scanfab.viz.figures.figure import drawn_page, make_figures
+from scanfab.viz.figures.figure import Figure as PackagesFigure
+from scanfab.viz.figures.figure import FrameFigure, drawn_page, make_figures
 from scanfab.viz.figures.style import check_plot_file
 from scanfab.viz.report.report import make_report
 from scanfab.viz.scanned_frames import ScannedFrames
@@ -36,6 +37,26 @@ OWN = (
 )  # fmt: skip
 TABLE_FIGURES = ("evolution", "normalised", "correlation")
 FAST = ["--boundary", "mask=3", "--tolerance", "1e-2", "--variants", "c", "--frames", "::6"]
+
+
+class Rattlers(PackagesFigure):
+    """Rattlers over the frames."""
+
+    columns = ("frame", "variant", "rattlers")
+
+    def draw(self, ax):
+        for variant in sorted(set(self.data["variant"])):
+            rows = self.data.select(variant=variant)
+            ax.plot(rows["frame"], rows["rattlers"], label=variant, gid="rattlers")
+        ax.set_ylabel("rattlers")
+
+
+class Contacts(FrameFigure):
+    """Heights of the contact normals, a count for each frame."""
+
+    def draw(self, ax):
+        for frame in self.chosen(self.data.frames):
+            ax.hist(abs(frame.normals[:, 2]), label=frame.title, gid="heights")
 
 
 @pytest.fixture
@@ -64,8 +85,7 @@ def offered(monkeypatch):
 
 @pytest.fixture
 def made_up(offered):
-    module = "tests.helpers.made_up_figures"
-    offered(made_up=f"{module}:Rattlers", heights=f"{module}:Contacts")
+    offered(made_up=f"{__name__}:Rattlers", heights=f"{__name__}:Contacts")
 
 
 def test_the_figures_of_the_package_stand_first_and_in_their_order(made_up):
