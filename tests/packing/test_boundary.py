@@ -105,7 +105,9 @@ def test_other_columns_enclose_nothing(name, values):
 
 
 def test_a_few_particles_are_not_judged():
-    packing = Packing(sphere_shell(20), 0.01, columns={"type": np.arange(20) % 2})
+    shell = sphere_shell(10)
+    position = np.vstack([0.1 * shell, shell])
+    packing = Packing(position, 0.01, columns={"type": np.repeat([1, 3], 10)})
     assert enclosing_class(packing) is None
 
 

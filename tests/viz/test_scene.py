@@ -108,6 +108,7 @@ def test_grains_of_clumps_have_their_numbers_and_places_and_are_seen_whole():
     # next to a window
     window = Window(np.array([4.7, 5.0, 5.0]), sphere(2.0))
     grains = about_window(scene_of(sample, window)).grains
+    assert len(np.unique(grains.position, axis=0)) == len(grains.position)
     first = grains.position[grains.body == 3]
     assert np.ptp(first[:, 0]) == pytest.approx(1.2)
     assert grains.in_window[grains.body == 8].all()

@@ -132,7 +132,7 @@ def test_a_large_grain_aside_does_not_end_a_gap_before_a_small_one():
 def test_lines_spread_evenly_over_the_face_and_fill_the_cell():
     """Number of lines times their measured length times the area of each: the cell's volume."""
     random = np.random.default_rng(1)
-    for _ in range(20):
+    for _ in range(8):
         medium, normal = random_medium(random), direction(random)
         volumes = []
         for _ in range(20):

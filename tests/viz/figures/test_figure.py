@@ -213,6 +213,8 @@ def test_files_are_what_their_names_say_and_repeat(tmp_path):
             save_rows(path, curve(), "normalised")
         assert one.read_bytes().startswith(begin)
         assert one.read_bytes() == two.read_bytes()
+        # of the same second; no file tells when it was made
+        assert not re.search(b"CreationDate|dc:date", one.read_bytes())
     assert len(list(tmp_path.iterdir())) == 6
 
 
