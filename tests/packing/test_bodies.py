@@ -133,10 +133,10 @@ def test_counts_rattlers_and_places_are_those_of_the_naive_twin(name, seed):
     assert left == held
 
 
-@pytest.mark.parametrize("length", [1e-100, 1e100])
-def test_places_do_not_suffer_from_the_unit(length):
-    bodies = bodies_of(np.array([1, 1]), row_of(0, 1) * length, np.array([1.0, 2.0]) * length, None)
-    assert bodies.place[0, 0] / length == pytest.approx(8 / 9)
+def test_places_do_not_suffer_from_the_unit():
+    for unit in (1e-100, 1e100):
+        bodies = bodies_of(np.array([1, 1]), row_of(0, 1) * unit, np.array([1.0, 2.0]) * unit, None)
+        assert bodies.place[0, 0] / unit == pytest.approx(8 / 9)
 
 
 def test_a_clump_of_many_spheres_that_flew_away_is_one_grain_that_did():
