@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import Cell, ContactList, Packing, Settings, direction_rule, sphere
+from scanfab import Cell, Packing, Settings, direction_rule, sphere
 from scanfab.packing.sample import Sample
-from scanfab.packing.window import Window
 from scanfab.pipeline.calibration import Calibration
 from scanfab.viz.report.report import Report
 from tests.conftest import SAMPLE
@@ -41,11 +40,8 @@ def test_of_a_series_and_its_frames(tmp_path):
 
 PAIRS, ROW = [[0, 1]], [[0, 0, 0], [1, 0, 0], [2.1, 0, 0]]
 LARGE = Packing(ROW, [0.5, 0.5, THIRD], contacts=PAIRS, step=7, cell=Cell([9, 9, 9]))
-TENSOR = scanfab.FabricTensor(np.diag([0.3, 0.3, 0.4]))
-TENSORS = "FabricTensor: alpha 0.1, principal values 0.4, 0.3, 0.3, major axis (0, 0, 1)"
-ONES = np.ones((1, 3))
-VOID = scanfab.void_fabric(np.eye(3)[None], np.ones(3) / 3, ONES * [1.5, 1.5, 2], ONES)
 SOLIDS = scanfab.Solids(np.eye(3)[:2], np.ones(2), np.array([False, True]), window=sphere(2.0))
+# beside what the examples of their docstrings show
 OBJECTS = [
     (Packing(ROW, 0.5), "Packing: 3 particles of radius 0.5, contacts not known"),
     (
@@ -53,12 +49,7 @@ OBJECTS = [
         "Packing: 3 particles of radius 0.3333 to 0.5, 1 contact from file, step 7\n"
         "  Cell: 9 x 9 x 9 from (0, 0, 0), periodic",
     ),
-    (LARGE.contacts, "Contacts: 1 contact from file"),
     (Packing(np.zeros((0, 3)), 1.0), "Packing: 0 particles, contacts not known"),
-    (
-        ContactList(PAIRS, force=[[0, 0, 1.0]]),
-        "ContactList: 1 contact from file, with forces",
-    ),
     (
         Cell([1, 2, 4 * THIRD], (True, False, True), origin=(0, -1, 0)),
         "Cell: 1 x 2 x 1.333 from (0, -1, 0), periodic along x and z",
@@ -67,25 +58,13 @@ OBJECTS = [
         Cell([[1, 0, 0], [0.5, 1, 0], [0, 0, 1]], (False,) * 3),
         "Cell: (1, 0, 0), (0.5, 1, 0), (0, 0, 1) from (0, 0, 0), not periodic",
     ),
-    (sphere(2 * THIRD), "Convex: radius 0.666667 about the origin"),
-    (
-        Window(np.array([THIRD, 0, 0]), sphere(2.0)),
-        "Window: radius 2 about (0.3333, 0, 0) (dump's unit)",
-    ),
     (
         Sample(Packing(np.eye(3), 0.7, contacts=PAIRS), np.array([False, False, True]), 1),
         "Sample: 2 grains, 0 rattlers (fewer than 1 contact); 1 boundary particle",
     ),
-    (direction_rule("lebedev:11"), "DirectionRule lebedev:11: 25 axes, exact to degree 11"),
     (
         direction_rule("equal-angle-full:10"),
         "DirectionRule equal-angle-full:10: 324 axes, of no degree, bias 0.17",
-    ),
-    (SOLIDS, "Solids: 2 spheres, 1 of them void in b and d, window of radius 2"),
-    (TENSOR, TENSORS),
-    (
-        VOID,
-        f"VoidFabric: mean length 1.667 (dump's unit), 1 replicate of 3 axes\n  {TENSORS}",
     ),
     (
         Calibration((), ("A sentence.", "Another."), {"spacing": "0.25rmin"}),

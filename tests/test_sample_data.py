@@ -18,7 +18,7 @@ from tests.helpers.truth import (
     csv_rows,
 )
 
-SCAN = {"directions": 25, "spacing": "3rmin"}
+SCAN = {"directions": 9, "spacing": "3rmin"}
 SHELL = csv_rows(TRIAXIAL / "engine.csv")
 PLATES = csv_rows(BOX / "engine.csv")
 
@@ -27,21 +27,16 @@ GRAINS = ("grains", "contacts", "rattlers", "coordination")
 
 
 @pytest.fixture(scope="module")
-def strain_file(tmp_path_factory):
-    """LIGGGHTS' own strain, from the distance of the plates: the dumps do not hold them."""
-    path = tmp_path_factory.mktemp("box") / "strain.csv"
-    rows = zip(PLATES["step"].tolist(), PLATES["strain"].tolist(), strict=True)
-    path.write_text("step,strain\n" + "".join(f"{step},{strain!r}\n" for step, strain in rows))
-    return path
-
-
-@pytest.fixture(scope="module")
-def series_options(strain_file):
+def series_options(tmp_path_factory):
     """Of each sample: its folder, how it is computed, and the program's own numbers."""
     rv = {"rv_radius": float(SHELL["rv_radius"][0]), "rv_center": (0.0, 0.0, 0.0)}
+    # LIGGGHTS' own strain, from the distance of the plates: the dumps do not hold them
+    strains = tmp_path_factory.mktemp("box") / "strain.csv"
+    rows = zip(PLATES["step"].tolist(), PLATES["strain"].tolist(), strict=True)
+    strains.write_text("step,strain\n" + "".join(f"{step},{strain!r}\n" for step, strain in rows))
     return {
         "yade": (TRIAXIAL, {"boundary": "mask=3", **rv}, SHELL),
-        "liggghts": (BOX, {"strain": strain_file}, PLATES),
+        "liggghts": (BOX, {"strain": strains}, PLATES),
     }
 
 

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
+from unittest.mock import patch
 
 from figures import DOCS, workplace
 
+from scanfab.cli.main import run
+
+# a call of scanfab by itself, whether its errors go the same way, and what reads what it prints
+CALL = re.compile(r"scanfab ((?:'[^']*'|[^'|;&<>$*])*)(2>&1 )?(?:\| (.*))?")
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -20,21 +28,45 @@ def commands(block: str) -> list[str]:
 
 def with_outputs(block: re.Match[str]) -> str:
     """A block of commands, each with what it prints."""
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    parts = []
-    for command in commands(block[1]):
-        done = subprocess.run(
-            ["bash", "-c", command],
-            env={**os.environ, "PATH": path, "COLUMNS": "100"},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            check=False,
-        )
-        # said once on each machine
-        output = re.sub(r"^scanfab: compiling .*\n", "", done.stdout, flags=re.MULTILINE)
-        parts.append(f"$ {command}\n{output}")
+    parts = [f"$ {command}\n{output_of(command)}" for command in commands(block[1])]
     return "```console\n" + "".join(parts) + "```"
+
+
+def output_of(command: str) -> str:
+    """
+    What a command prints.
+
+    A call of scanfab runs in this process, which has loaded the kernels and libraries, and bash
+    pipes what it prints through further programs. Other lines are for bash as they stand.
+    """
+    call = CALL.fullmatch(command.replace("\\\n", ""))
+    if call is None:
+        output = in_bash(command)
+    else:
+        printed, errors = StringIO(), StringIO()
+        words, is_joined, reader = call.groups()
+        is_joined = is_joined or not reader
+        with redirect_stdout(printed), redirect_stderr(printed if is_joined else errors):
+            run(shlex.split(words))
+        output = printed.getvalue()
+        if reader:
+            output = errors.getvalue() + in_bash(reader, output)
+    # said once on each machine
+    return re.sub(r"^scanfab: compiling .*\n", "", output, flags=re.MULTILINE)
+
+
+def in_bash(command: str, given: str = "") -> str:
+    """What a command for bash prints on both streams, if it reads a text."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    return subprocess.run(
+        ["bash", "-c", command],
+        env={**os.environ, "PATH": path},
+        input=given,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    ).stdout
 
 
 def pages() -> list[Path]:
@@ -48,7 +80,7 @@ def pages() -> list[Path]:
 
 def fresh_page(page: Path) -> str:
     """The page as it should be."""
-    with workplace():
+    with workplace(), patch.dict(os.environ, COLUMNS="100"):
         return BLOCK.sub(with_outputs, page.read_text(encoding="utf-8"))
 
 

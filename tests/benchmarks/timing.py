@@ -13,19 +13,19 @@ import numpy as np
 ENOUGH = 10.0
 
 
-def samples(
+def interleaved(
     ways: Mapping[str, Callable[[], Any]],
     repeats: int,
     warm: bool = True,
     clock: Callable[[], Any] | None = time.perf_counter,
-) -> dict[str, np.ndarray]:
+) -> dict[str, float]:
     """
-    Seconds of each way in each turn; ways take turns, so that all share the machine's moods.
+    Median seconds of each way; ways take turns, so that all share the machine's moods.
 
     Each turn has an order of its own, as a run also feels what the one before it left in caches.
     Ways that take milliseconds have more turns, until the median is not a matter of luck. What runs
-    in one thread is measured by ``time.process_time``: other work on the machine matters less. A
-    clock may be several clocks in one array; without a clock each way returns its own seconds.
+    in one thread is measured by ``time.process_time``: other work on the machine matters less.
+    Without a clock each way returns its own seconds.
     """
     if warm:
         for way in ways.values():
@@ -39,12 +39,7 @@ def samples(
             start = clock() if clock else 0.0
             answer = ways[name]()
             seconds[name].append(clock() - start if clock else answer)
-    return {name: np.array(values) for name, values in seconds.items()}
-
-
-def interleaved(*words: Any, **options: Any) -> dict[str, float]:
-    """Median seconds of each way, see :func:`samples`."""
-    return {name: float(np.median(one)) for name, one in samples(*words, **options).items()}
+    return {name: float(np.median(values)) for name, values in seconds.items()}
 
 
 def table(titles: Sequence[str], rows: Sequence[Sequence[object]]) -> str:

@@ -111,12 +111,12 @@ def test_a_turned_cell_turns_the_fabric():
 
 def test_freely_overlapping_spheres_have_their_known_mean_length():
     """ℓ = c + 1/β for every cut-off, over many packings."""
-    vectors = np.array([[5.0, 0, 0], [1.5, 5, 0], [1.0, -1.2, 6]])
+    vectors = np.array([[10.0, 0, 0], [3.0, 10, 0], [2.0, -2.4, 12]])
     volume = abs(np.linalg.det(vectors))
-    cutoffs, expected = np.array([0.0, 0.3, 0.8]), 200
+    cutoffs, expected = np.array([0.0, 0.3, 0.8]), 1600
     beta = expected / volume * np.pi * (0.45**2 + 0.3**2 / 12)
     sums, counts = np.zeros(3), np.zeros(3)
-    for seed in range(60):
+    for seed in range(8):
         random = np.random.default_rng(seed)
         number = random.poisson(expected)
         packing = Packing(

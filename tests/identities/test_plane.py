@@ -254,7 +254,7 @@ def turned_table(across, **options):
     "options",
     [
         {"periodic": True},
-        {"periodic": False, "edge": "ends"},
+        {"periodic": False, "edge": "ends", "variants": "ac"},
         {"periodic": True, "rv_shape": "ellipsoid", "edge": "start", "variants": "c"},
     ],
     ids=str,

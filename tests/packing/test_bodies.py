@@ -85,15 +85,6 @@ def test_a_body_through_a_face_has_its_place_next_to_its_first_sphere():
     assert len(find_contacts(packing).contacts) == 0
 
 
-def test_a_body_that_touches_its_own_image_has_two_neighbours():
-    """As a sphere that does; the inner contact of the body is none."""
-    cell = Cell([4.0, 20.0, 20.0])
-    sample = grains([[0.5, 5, 5], [2.2, 5, 5]], [6, 6], 1.2, cell=cell)
-    assert sample.contacts.pairs.tolist() == [[0, 1]]
-    assert sample.contact_numbers.tolist() == [2, 2]
-    assert not sample.rattlers.any()
-
-
 def small_clumps(random, size):
     """Spheres a few of which, close together, are one body each, shaken all over a cube."""
     position, radius, number = [], [], []
@@ -114,7 +105,7 @@ CELLS = {
 }
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", CELLS)
 def test_counts_rattlers_and_places_are_those_of_the_naive_twin(name, seed):
     random, vectors = np.random.default_rng(seed), CELLS[name]
@@ -142,10 +133,10 @@ def test_counts_rattlers_and_places_are_those_of_the_naive_twin(name, seed):
     assert left == held
 
 
-@pytest.mark.parametrize("length", [1e-100, 1e100])
-def test_places_do_not_suffer_from_the_unit(length):
-    bodies = bodies_of(np.array([1, 1]), row_of(0, 1) * length, np.array([1.0, 2.0]) * length, None)
-    assert bodies.place[0, 0] / length == pytest.approx(8 / 9)
+def test_places_do_not_suffer_from_the_unit():
+    for unit in (1e-100, 1e100):
+        bodies = bodies_of(np.array([1, 1]), row_of(0, 1) * unit, np.array([1.0, 2.0]) * unit, None)
+        assert bodies.place[0, 0] / unit == pytest.approx(8 / 9)
 
 
 def test_a_clump_of_many_spheres_that_flew_away_is_one_grain_that_did():

@@ -85,15 +85,12 @@ def test_contacts_are_those_of_the_slow_twin(check, times):
         check(np.random.default_rng(seed))
 
 
-def test_a_grain_of_many_cells_is_a_mistake_of_units():
+def test_wrong_units_and_tolerances_are_told():
     with pytest.raises(PackingError, match="spans 200 periodic cells: have the cell and the radii"):
         find_contacts(Packing([[0.5, 0.5, 0.5]], 100.0, cell=Cell([1.0, 1.0, 1.0])))
-
-
-@pytest.mark.parametrize("tolerance", [-1e-9, np.inf, np.nan])
-def test_a_tolerance_is_a_number_from_0(tolerance):
-    with pytest.raises(SettingsError, match="contact_tolerance: expected a number >= 0, found"):
-        find_contacts(Packing([[0, 0, 0]], 1.0), tolerance)
+    for tolerance in (-1e-9, np.inf, np.nan):
+        with pytest.raises(SettingsError, match="contact_tolerance: expected a number >= 0, found"):
+            find_contacts(Packing([[0, 0, 0]], 1.0), tolerance)
 
 
 @pytest.mark.parametrize("far", [1e3, 1e9, 1e60])
@@ -154,43 +151,32 @@ def test_cubic_lattices_have_their_coordination_and_the_isotropic_fabric(lattice
 
 # two grains of a cell that is thinner than they are along x and y
 THIN = Cell([0.6, 1.5, 9.0], (True, True, False))
+THROUGH_IMAGES = find_contacts(Packing([[0.1, 0.1, 4], [0.4, 1.3, 4]], 1.0, cell=THIN))
 
 
-@pytest.mark.parametrize(
-    "packing",
-    [
-        find_contacts(Packing(*simple_cubic(2), cell=Cell([2, 2, 2])), TOLERANCE),
-        find_contacts(Packing([[0.1, 0.1, 4], [0.4, 1.3, 4]], 1.0, cell=THIN)),
-    ],
-    ids=["lattice", "through several images"],
-)
-def test_contacts_listed_twice_or_from_both_sides_count_once(packing):
+def test_contacts_listed_twice_or_from_both_sides_count_once():
     """Through a face, and with own images."""
-    listed = packing.contacts
-    both = ContactList(
-        np.concatenate([listed.pairs, listed.pairs[:, ::-1], listed.pairs]),
-        np.concatenate([listed.image, -listed.image, listed.image]),
-    )
-    again = packing.with_contacts(both).contacts
-    assert np.array_equal(again.pairs, listed.pairs)
-    assert np.array_equal(again.image, listed.image)
+    lattice = find_contacts(Packing(*simple_cubic(2), cell=Cell([2, 2, 2])), TOLERANCE)
+    for packing in (lattice, THROUGH_IMAGES):
+        listed = packing.contacts
+        both = ContactList(
+            np.concatenate([listed.pairs, listed.pairs[:, ::-1], listed.pairs]),
+            np.concatenate([listed.image, -listed.image, listed.image]),
+        )
+        again = packing.with_contacts(both).contacts
+        assert np.array_equal(again.pairs, listed.pairs)
+        assert np.array_equal(again.image, listed.image)
 
 
-@pytest.mark.parametrize(
-    ("scale", "tolerance", "contacts"),
-    [
-        (1 - 1e-9, 0.0, 54),
-        (1 + 1e-9, 0.0, 0),
-        ((1 + 0.9e-4) * 1e-6, TOLERANCE, 54),
-        ((1 + 1.1e-4) * 1e-6, TOLERANCE, 0),
-    ],
-)
-def test_a_contact_needs_an_overlap_or_a_gap_below_the_relative_tolerance(
-    scale, tolerance, contacts
-):
-    radius = 0.5 if tolerance == 0.0 else 0.5e-6
-    packing = find_contacts(Packing(simple_cubic(3).position * scale, radius), tolerance)
-    assert len(packing.contacts) == contacts
+def test_a_contact_needs_an_overlap_or_a_gap_below_the_relative_tolerance():
+    for scale, radius, tolerance, contacts in (
+        (1 - 1e-9, 0.5, 0.0, 54),
+        (1 + 1e-9, 0.5, 0.0, 0),
+        ((1 + 0.9e-4) * 1e-6, 0.5e-6, TOLERANCE, 54),
+        ((1 + 1.1e-4) * 1e-6, 0.5e-6, TOLERANCE, 0),
+    ):
+        packing = find_contacts(Packing(simple_cubic(3).position * scale, radius), tolerance)
+        assert len(packing.contacts) == contacts
 
 
 # near pairs
@@ -248,30 +234,15 @@ def test_pairs_of_an_rv_have_their_middles_in_it(sample):
     assert found.volume == pytest.approx(4 / 3 * np.pi * 8)
 
 
-@pytest.mark.parametrize("edges", [(0.5, 0.5, 0.5), (0.7, 2.5, 8.0), (2.9, 2.9, 2.9)])
-def test_cells_thinner_than_a_grain(edges):
-    position = np.random.default_rng(3).random((4, 3)) * edges
-    cell = {"vectors": edges, "periodic": (True, True, True)}
-    assert_those_of_the_slow_twin(position, np.array([0.49, 0.3, 0.1, 0.48]), **cell)
-
-
-@pytest.mark.parametrize("axis", [0, 1, 2])
-def test_all_contacts_along_one_axis(axis):
+def test_all_contacts_along_one_axis():
     """A chain through the cell: n⊗n."""
-    position = np.zeros((5, 3)) + 2.0
-    position[:, axis] = np.arange(5) + 0.5
-    edges = np.where(np.arange(3) == axis, 5.0, 4.0)
-    packing = find_contacts(Packing(position, 0.5, cell=Cell(edges)), TOLERANCE)
-    tensor = contact_fabric(packing.contacts.normal)
-    assert len(packing.contacts) == 5
-    assert tensor.matrix == pytest.approx(np.diag(np.eye(3)[axis]), abs=1e-12)
-    assert tensor.axial(np.eye(3)[axis]) == pytest.approx(1.0)
-
-
-def through_many_images():
-    """Two grains of a cell that is thinner than they are along x and y."""
-    cell = Cell([0.6, 1.5, 9.0], (True, True, False))
-    return find_contacts(Packing([[0.1, 0.1, 4], [0.4, 1.3, 4]], 1.0, cell=cell))
+    for axis in np.eye(3):
+        position = 2.0 + np.outer(np.arange(5) - 1.5, axis)
+        packing = find_contacts(Packing(position, 0.5, cell=Cell(4.0 + axis)), TOLERANCE)
+        tensor = contact_fabric(packing.contacts.normal)
+        assert len(packing.contacts) == 5
+        assert tensor.matrix == pytest.approx(np.diag(axis), abs=1e-12)
+        assert tensor.axial(axis) == pytest.approx(1.0)
 
 
 def test_a_pair_touches_through_each_image_that_is_near_enough():
@@ -280,4 +251,4 @@ def test_a_pair_touches_through_each_image_that_is_near_enough():
     own = [(i, j) for i, j in steps if (i, j) > (0, 0) and np.hypot(0.6 * i, 1.5 * j) < 2.0]
     expected = {(0, 1, (i, j, 0)) for i, j in near}
     expected |= {(row, row, (i, j, 0)) for row in (0, 1) for i, j in own}
-    assert canonical(through_many_images().contacts) == expected
+    assert canonical(THROUGH_IMAGES.contacts) == expected

@@ -179,18 +179,18 @@ def test_by_the_rule_start_each_end_is_in_its_own_block(seed):
     check_start(np.random.default_rng([seed, 4]))
 
 
-@pytest.mark.parametrize("edge", ["clip", "start", "ends"])
-def test_all_blocks_together_are_the_scan_of_the_same_lines(edge):
+@pytest.mark.parametrize(("edge", "variants"), [("clip", "abcd"), ("start", "c"), ("ends", "c")])
+def test_all_blocks_together_are_the_scan_of_the_same_lines(edge, variants):
     random = np.random.default_rng(6)
     spheres = poisson_spheres(random, 0.15, 4.0)
     solids = open_solids(*spheres, random.random(len(spheres.radius)) < 0.2, sphere(2.0), edge)
     blocks = Blocks(np.zeros(3), 14.0 * rotation(random), (5, 6, 3))
     blocks = blocks.moved(blocks.middles.mean(axis=0))
-    words = {"spacing": 0.3, "replicates": range(3), "variants": "abcd"}
+    words = {"spacing": 0.3, "replicates": range(3), "variants": variants}
     found = scan_gaps(solids, RULE, cutoffs=[0.1, 0.5], blocks=(blocks, blocks), **words)
     for place, cutoff in enumerate([0.1, 0.5]):
         sums = scan_lines(solids, RULE, cutoff=cutoff, **words)
-        for variant in "abcd":
+        for variant in variants:
             length, number = (one.sum(axis=2) for one in found.in_blocks(variant, place))
             np.testing.assert_allclose(number, sums.kept(variant)[1], rtol=1e-12)
             np.testing.assert_allclose(length, sums.kept(variant)[0], rtol=1e-9)
@@ -201,7 +201,7 @@ def test_lines_of_a_map_are_kept_in_any_number_of_threads():
     random = np.random.default_rng(7)
     solids = solids_of(poisson_spheres(random, 0.15, 3.0), 2.0)
     blocks = some_blocks(random)[0]
-    words = {"spacing": 0.2, "cutoffs": [0.1], "blocks": (blocks, blocks), "variants": "ac"}
+    words = {"spacing": 0.2, "cutoffs": [0.1], "blocks": (blocks, blocks), "variants": "c"}
     one, three = (scan_gaps(solids, RULE, workers=n, **words) for n in (1, 3))
     assert np.array_equal(one.number, three.number)
     assert np.array_equal(one.square, three.square)

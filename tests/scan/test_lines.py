@@ -40,16 +40,12 @@ def test_void_segments_are_those_of_the_naive_twin(spheres, window):
         assert lengths == pytest.approx(naive.lengths(expected), abs=1e-12)
 
 
-def test_pieces_of_a_line_join_and_alternate(spheres):
-    found = cut_lines(*spheres, np.eye(3), np.array([[0.1, 0.2]]), sphere(1.5))
-    assert found.ends[1:, 0] == pytest.approx(found.ends[:-1, 1])
-    assert np.all(found.void[1:] != found.void[:-1])
-    assert found.length.sum() == pytest.approx(2 * np.sqrt(1.5**2 - 0.05))
-
-
-def test_ends_lie_on_the_line(spheres):
+def test_pieces_of_a_line_join_alternate_and_lie_on_it(spheres):
     triad = line_triads(np.array([[0.0, 0.6, 0.8]]))[0]
     found = cut_lines(*spheres, triad, np.array([[0.25, -0.5]]), sphere(1.5))
+    assert found.ends[1:, 0] == pytest.approx(found.ends[:-1, 1])
+    assert np.all(found.void[1:] != found.void[:-1])
+    assert found.length.sum() == pytest.approx(2 * np.sqrt(1.5**2 - 0.25**2 - 0.5**2))
     assert found.ends @ triad[0] == pytest.approx(np.full(found.ends.shape[:2], 0.25))
     assert found.ends @ triad[1] == pytest.approx(np.full(found.ends.shape[:2], -0.5))
 
@@ -60,10 +56,13 @@ def test_an_empty_window_is_one_segment():
     assert found.void.all()
 
 
-@pytest.mark.parametrize("points", [np.zeros((0, 2)), np.array([[5.0, 0.0]])])
-def test_lines_that_meet_nothing_have_no_pieces(points):
-    assert len(cut_lines(np.zeros((1, 3)), np.ones(1), np.eye(3), points).length) == 0
-    assert len(cut_lines(np.zeros((1, 3)), np.ones(1), np.eye(3), points, sphere(2.0)).length) == 0
+def test_lines_that_meet_nothing_have_no_pieces():
+    for points in (np.zeros((0, 2)), np.array([[5.0, 0.0]])):
+        for window in (None, sphere(2.0)):
+            found = cut_lines(np.zeros((1, 3)), np.ones(1), np.eye(3), points, window)
+            assert len(found.length) == 0
+    assert len(sample_segments(np.zeros((0, 3)), np.zeros(0), np.eye(3)[None], 9).length) == 0
+    assert len(Segments.concatenate([]).length) == 0
 
 
 def test_lines_of_several_directions_are_numbered_on(spheres):
@@ -71,11 +70,6 @@ def test_lines_of_several_directions_are_numbered_on(spheres):
     numbers = np.unique(found.line)
     assert numbers.tolist() == list(range(len(numbers)))
     assert 60 < len(numbers) < 120
-
-
-def test_nothing_to_cut_is_no_segment():
-    assert len(sample_segments(np.zeros((0, 3)), np.zeros(0), np.eye(3)[None], 9).length) == 0
-    assert len(Segments.concatenate([]).length) == 0
 
 
 def test_triads_are_orthonormal_and_right_handed():

@@ -42,21 +42,15 @@ def test_lines_measure_the_volume_along_every_axis_and_the_surface_over_all(name
     assert rule.weights @ sums.lines[0, 2] * 0.02**2 == pytest.approx(surface / 4, rel=2e-3)
 
 
-def test_lines_through_an_empty_box_are_as_long_as_its_edges():
-    sums = scan_along(solids_of(NOTHING, box(2 * HALF)), np.eye(3), 0.05)
-    assert mean_lengths(sums, "c").value == pytest.approx(2 * HALF)
-
-
-def test_lines_along_a_cylinder_are_as_long_as_it_is():
-    for axis in np.concatenate([TURN, direction_rule("lebedev:11").axes]):
-        sums = scan_along(solids_of(NOTHING, cylinder(0.7, 2.6, axis)), [axis], 0.05)
-        assert mean_lengths(sums, "c").value == pytest.approx(2.6)
-        assert sums.lines[:, 2].mean() * 0.05**2 == pytest.approx(np.pi * 0.49, rel=0.02)
-
-
-def test_lines_along_an_axis_of_an_ellipsoid_have_two_thirds_of_it_on_average():
-    sums = scan_along(solids_of(NOTHING, ellipsoid(HALF, TURN)), TURN, 0.01)
-    assert mean_lengths(sums, "c").value == pytest.approx(4 / 3 * HALF, rel=1e-3)
+def test_lines_along_the_axes_of_empty_windows_have_known_lengths():
+    """Those of a box, its edges; of a cylinder, its height; of an ellipsoid, two thirds."""
+    for window, axes, spacing, expected, within in (
+        (box(2 * HALF), np.eye(3), 0.05, 2 * HALF, 1e-9),
+        *((cylinder(0.7, 2.6, axis), [axis], 0.05, 2.6, 1e-9) for axis in (*TURN, *RULE.axes)),
+        (ellipsoid(HALF, TURN), TURN, 0.01, 4 / 3 * HALF, 1e-3),
+    ):
+        sums = scan_along(solids_of(NOTHING, window), axes, spacing)
+        assert mean_lengths(sums, "c").value == pytest.approx(expected, rel=within)
 
 
 @njit

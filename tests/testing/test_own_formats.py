@@ -26,6 +26,13 @@ READERS = {
 SMALL = ("plain", "everything", "no grains")
 
 
+@pytest.fixture(autouse=True)
+def few_damages(monkeypatch):
+    """Each reader gets files of any bytes elsewhere, too."""
+    monkeypatch.setattr("scanfab.testing.readers.CUTS", 15)
+    monkeypatch.setattr("scanfab.testing.readers.DAMAGES", 40)
+
+
 @pytest.mark.parametrize("name", WRITERS)
 def test_what_is_written_is_read_back_to_the_last_bit(tmp_path, name):
     check_writer(writer_named(name), tmp_path)
@@ -65,3 +72,10 @@ def test_readers_of_dumps_pass(tmp_path, name):
 def test_vtk_files_of_any_program_pass(tmp_path):
     files = [FLOOR / f"grains_30000{ending}" for ending in (".vtp", ".vtu")]
     check_reader(reader_named("vtk"), files, tmp_path / "damaged")
+
+
+def test_a_reader_that_reads_a_part_of_a_file_as_fewer_grains_fails(tmp_path):
+    """Tables do not say how many rows they have."""
+    file = write(tmp_path / "a.csv", "x,y,z,radius\n" + 9 * "0,0,0,1\n")
+    with pytest.raises(AssertionError, match="a part of a file must be an error"):
+        check_reader(reader_named("table"), [file], tmp_path / "damaged", counts=True)

@@ -1,12 +1,12 @@
 """The kernels as plain Python: they equal their slow twins, and no index is out of range."""
 
-from tests.helpers.uncompiled import run_uncompiled
+import os
+import subprocess
+import sys
 
+from tests.conftest import ROOT
 
-def test_kernels_equal_their_slow_twins_uncompiled():
-    """All in one process, as loading the package takes longer than most of the checks."""
-    run_uncompiled(
-        """
+CHECKS = """
 import numpy as np
 from scanfab.packing import search
 from scanfab.scan.kernels import axes
@@ -18,17 +18,15 @@ assert not hasattr(axes.scan_axes, "py_func")
 assert not hasattr(search.find_pairs, "py_func")
 np.seterr(invalid="ignore")
 random = np.random.default_rng
-for seed in range(4):
+for seed in range(3):
     for kind in test_axes.KINDS:
         test_axes.check_random_packing(kind, random(seed))
-        if seed < 3:
-            test_bins.check_random_packing(kind, random(seed))
-    test_axes.check_less_that_is_wanted(seed)
+        test_bins.check_random_packing(kind, random(seed))
+test_axes.check_less_that_is_wanted(0)
 test_axes.test_a_chord_that_reaches_back_past_the_last_gap()
 test_bins.check_only_what_is_wanted_is_added()
 for periods in test_periodic.PERIODS:
-    for seed in range(2):
-        test_periodic.check_equals_naive(random([seed, *periods]), periods)
+    test_periodic.check_equals_naive(random([1, *periods]), periods)
 for edge in ("start", "ends"):
     for seed in range(3):
         test_edges.check_open(test_axes.overlapping, random(seed), edge, ("cd", "c", "d"))
@@ -38,4 +36,17 @@ for seed in range(20):
     test_search.check_random_open(random(seed))
     test_search.check_random_periodic(random(seed))
 """
+
+
+def test_kernels_equal_their_slow_twins_uncompiled():
+    """All in one process, as loading the package takes longer than most of the checks."""
+    done = subprocess.run(
+        [sys.executable, "-c", CHECKS],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
     )
+    assert done.returncode == 0, done.stderr

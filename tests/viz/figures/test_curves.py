@@ -16,12 +16,26 @@ from scanfab.table.table import Table
 from scanfab.viz.figures.anisotropy import PAPER_SLOPE, Correlation
 from scanfab.viz.figures.curves import Columns, groups_of
 from scanfab.viz.figures.figure import drawn_page, find_figure, make_figures
-from tests.helpers.figures import fitted, legend_of, titles_of, with_samples
+from tests.helpers.figures import fitted
 from tests.helpers.tables import curve, sheared
 
 VOID_SAMPLE = {"alpha_vs_axial_sample_se": 2e-3}
 CONTACT_SAMPLE = {"alpha_c_axial_sample_se": 1e-2}
 TURNED = "ignore:the loading axis|shear_strain stands"
+
+
+def legend_of(axes):
+    return [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+def titles_of(figure):
+    return [axes.get_title(loc="left") for axes in figure.axes]
+
+
+def with_samples(rows):
+    return [
+        {**row, "alpha_vs_axial_sample_se": 2e-3, "alpha_c_axial_sample_se": 1e-2} for row in rows
+    ]
 
 
 def bars_of(axes):
@@ -61,10 +75,9 @@ def test_bands_are_total_errors_and_bars_the_scan_s_part(drawn):
         assert np.ptp(band[band[:, 0] == 0, 1]) == pytest.approx(2 * error)
 
 
-@pytest.mark.parametrize("sample", [{}, VOID_SAMPLE])
-def test_without_the_scan_s_part_there_is_no_band(drawn, sample):
+def test_without_the_scan_s_part_there_is_no_band(drawn):
     """The sample's part alone is no total: a single replicate may be off by far more."""
-    rows = [{**row, **sample, "alpha_vs_axial_se": None} for row in curve()]
+    rows = [{**row, **VOID_SAMPLE, "alpha_vs_axial_se": None} for row in curve()]
     figure = drawn(rows, "evolution")
     assert not figure.axes[0].collections
     assert "standard error" not in figure.legends[0].get_title().get_text()
@@ -89,13 +102,13 @@ def test_without_strain_the_frame_is_the_abscissa(drawn):
         assert "strain" not in caption
 
 
-@pytest.mark.parametrize("value", [None, 1e308])
 @pytest.mark.parametrize("column", ["alpha_vs_axial", "alpha_vs_axial_se", "alpha_c_axial"])
-def test_what_is_missing_or_too_large_to_draw_is_a_hole(drawn, column, value):
-    rows = curve()
-    rows[2][column] = value
-    holes = np.isnan(drawn(rows, "evolution").axes[0].lines[0].get_ydata())
-    assert holes.tolist() == [k == 2 and column == "alpha_vs_axial" for k in range(5)]
+def test_what_is_missing_or_too_large_to_draw_is_a_hole(drawn, column):
+    for value in (None, 1e308):
+        rows = curve()
+        rows[2][column] = value
+        holes = np.isnan(drawn(rows, "evolution").axes[0].lines[0].get_ydata())
+        assert holes.tolist() == [k == 2 and column == "alpha_vs_axial" for k in range(5)]
 
 
 def test_noise_does_not_fill_the_panel(drawn):
@@ -136,7 +149,8 @@ def test_many_sources_are_a_row_of_panels_for_each_variant(drawn):
     assert [text.get_text() for text in figure.legends[0].get_texts()] == list("pqrstu")
 
 
-def test_a_sheared_cell_has_intensities_and_coaxiality_over_its_shear(drawn):
+@pytest.mark.filterwarnings(TURNED)
+def test_a_sheared_cell_has_intensities_and_coaxiality_over_its_shear_and_no_line(drawn):
     with pytest.warns(ScanfabNote, match="the loading axis is not the axis of the contact fabric"):
         figure = drawn(sheared(), "evolution")
     rows, columns = sheared(), {"alpha_vs": 1e3, "alpha_c": 1e2, "coaxiality_deg": 1.0}
@@ -148,6 +162,9 @@ def test_a_sheared_cell_has_intensities_and_coaxiality_over_its_shear(drawn):
         assert line.get_ydata() == pytest.approx([factor * row[name] for row in rows])
     note = figure.legends[0].get_title().get_text()
     assert note == "without errors: the table has those of the axial values only"
+    correlation = drawn(sheared(), "correlation").axes[0]
+    assert not fitted(correlation)
+    assert correlation.get_ylabel().endswith(", intensity")
 
 
 def captions(rows):
@@ -176,22 +193,17 @@ def test_captions_say_what_is_drawn():
     )
     assert normalised.startswith("Intensity of void and contact anisotropy, over")
     assert correlation == "Void against contact intensity, without a line."
+    # the errors that have bands are named
+    for errors, named in (
+        ({}, "without total errors"),
+        (VOID_SAMPLE, "with total standard errors of voids"),
+        (CONTACT_SAMPLE, "with total standard errors of contacts"),
+    ):
+        assert captions([{**row, **errors} for row in curve()])[0].endswith(f"; {named}.")
     # one frame has no line; nor is the paper's slope drawn where all contacts lie below zero
     assert captions(curve()[:1])[2].endswith(", without a line.")
     below = [{**row, "alpha_c_axial": row["alpha_c_axial"] - 1} for row in curve()]
     assert captions(below)[2].endswith(", with fitted lines.")
-
-
-@pytest.mark.parametrize(
-    ("errors", "named"),
-    [
-        ({}, "without total errors"),
-        (VOID_SAMPLE, "with total standard errors of voids"),
-        (CONTACT_SAMPLE, "with total standard errors of contacts"),
-    ],
-)
-def test_captions_name_the_errors_that_have_bands(errors, named):
-    assert captions([{**row, **errors} for row in curve()])[0].endswith(f"; {named}.")
 
 
 def test_columns_have_a_panel_each_with_the_table_s_numbers(drawn):
@@ -265,27 +277,17 @@ def test_each_line_of_several_groups_is_that_of_its_curve(drawn):
         assert found == pytest.approx(expected)
 
 
-@pytest.mark.filterwarnings(TURNED)
-def test_intensities_have_no_line(drawn):
-    figure = drawn(sheared(), "correlation")
-    assert not fitted(figure.axes[0])
-    assert figure.axes[0].get_ylabel().endswith(", intensity")
-
-
-@pytest.mark.parametrize(
-    ("errors", "shape"),
-    [
+def test_errors_of_the_correlation_look_in_the_legend_as_they_are_drawn(drawn):
+    """A grey line looked like the one through zero."""
+    for errors, shape in (
         ({**VOID_SAMPLE, **CONTACT_SAMPLE}, "+"),
         (VOID_SAMPLE, "|"),
         ({"alpha_c_axial_se": 1e-2}, "_"),
-    ],
-)
-def test_errors_of_the_correlation_look_in_the_legend_as_they_are_drawn(drawn, errors, shape):
-    """A grey line looked like the one through zero."""
-    margin = drawn([{**row, **errors} for row in curve()], "correlation").axes[1]
-    handle = margin.get_legend().legend_handles[-1]
-    assert (handle.get_marker(), handle.get_linestyle()) == (shape, "None")
-    assert legend_of(margin)[-1].startswith("one total standard error")
+    ):
+        margin = drawn([{**row, **errors} for row in curve()], "correlation").axes[1]
+        handle = margin.get_legend().legend_handles[-1]
+        assert (handle.get_marker(), handle.get_linestyle()) == (shape, "None")
+        assert legend_of(margin)[-1].startswith("one total standard error")
 
 
 def test_eight_curves_of_three_rvs_look_different_and_have_room_for_their_legend(drawn):

@@ -24,12 +24,8 @@ def packing():
     return scanfab.find_contacts(Packing(place, radius, cell=Cell([12.0, 12.0, 1.0])))
 
 
-@pytest.fixture(scope="module")
-def frames(packing):
-    return scanfab.scan_frames(packing, variants="c", tolerance=0.05)
-
-
-def test_a_rose_has_one_ring(frames):
+def test_a_rose_has_one_ring_and_a_projection_is_a_curve(packing):
+    frames = scanfab.scan_frames(packing, variants="c", tolerance=0.05)
     ax = Figure().subplots(subplot_kw={"projection": "polar"})
     frames.plot.rose(ax=ax)
     texts = [text.get_text() for text in ax.get_legend().get_texts()]
@@ -37,11 +33,7 @@ def test_a_rose_has_one_ring(frames):
     assert "from x towards y" in ax.get_legend().get_title().get_text()
     with pytest.raises(SettingsError, match="no polar angles, found 30"):
         frames.plot.rose(ax=ax, angles=(30.0,))
-
-
-def test_a_projection_is_a_curve(frames):
-    ax = Figure().subplots()
-    frames.plot.projection(ax=ax)
+    ax = frames.plot.projection(ax=Figure().subplots())
     assert ax.get_xlim() == (0, 180)
     assert "from x to y" in ax.get_xlabel()
     assert frames.plot.histogram(ax=Figure().subplots()).get_ylabel()
@@ -63,11 +55,11 @@ def test_directions_of_a_plane_begin_at_its_first_axis():
     assert angle[90] == 90.0
 
 
-@pytest.mark.parametrize(("across", "right", "up"), [(2, "x", "y"), (0, "y", "z"), (1, "x", "z")])
-def test_the_viewer_sees_the_first_axis_on_the_right(across, right, up):
+def test_the_viewer_sees_the_first_axis_on_the_right():
     unit = dict(zip("xyz", np.eye(3), strict=True))
-    toward = towards_viewer(unit[up], scanfab.base.space.Space(across))
-    np.testing.assert_array_equal(np.cross(unit[up], toward), unit[right])
+    for across, right, up in ((2, "x", "y"), (0, "y", "z"), (1, "x", "z")):
+        toward = towards_viewer(unit[up], scanfab.base.space.Space(across))
+        np.testing.assert_array_equal(np.cross(unit[up], toward), unit[right])
 
 
 def test_the_lines_of_a_section_lie_in_the_plane(packing):

@@ -20,13 +20,14 @@ from scanfab.pipeline.settings import Settings
 from scanfab.table.compare import compare_tables
 from scanfab.table.plots import figures_of, installed_figures
 from scanfab.table.table import Table, load
-from scanfab.viz.figures.figure import drawn_page, make_figures
+from scanfab.viz.figures.figure import Figure as PackagesFigure
+from scanfab.viz.figures.figure import FrameFigure, drawn_page, make_figures
 from scanfab.viz.figures.style import check_plot_file
 from scanfab.viz.report.report import make_report
 from scanfab.viz.scanned_frames import ScannedFrames
-from tests.conftest import ROOT, SAMPLE
+from tests.conftest import SAMPLE
 from tests.helpers.dumps import write
-from tests.helpers.figures import BYTES, save_rows
+from tests.helpers.figures import BYTES, row_of, save_rows
 from tests.helpers.tables import curve, sheared
 
 pytestmark = pytest.mark.filterwarnings("ignore:skipped:scanfab.base.errors.ScanfabNote")
@@ -35,7 +36,33 @@ OWN = (
     "cutoffs", "calibration", "map",
 )  # fmt: skip
 TABLE_FIGURES = ("evolution", "normalised", "correlation")
-FAST = ["--boundary", "mask=3", "--tolerance", "3e-3", "--variants", "c", "--frames", "::6"]
+FAST = ["--boundary", "mask=3", "--tolerance", "1e-2", "--variants", "c", "--frames", "::6"]
+
+
+class Rattlers(PackagesFigure):
+    """Rattlers over the frames."""
+
+    columns = ("frame", "variant", "rattlers")
+
+    def draw(self, ax):
+        for variant in sorted(set(self.data["variant"])):
+            rows = self.data.select(variant=variant)
+            ax.plot(rows["frame"], rows["rattlers"], label=variant, gid="rattlers")
+        ax.set_ylabel("rattlers")
+
+
+class Contacts(FrameFigure):
+    """Heights of the contact normals, a count for each frame."""
+
+    def draw(self, ax):
+        for frame in self.chosen(self.data.frames):
+            ax.hist(abs(frame.normals[:, 2]), label=frame.title, gid="heights")
+
+
+@pytest.fixture
+def table(tmp_path):
+    rows = [{**row, "rattlers": 5 * row["frame"]} for row in curve()]
+    return write(tmp_path / "t.jsonl", "".join(json.dumps(row) + "\n" for row in rows))
 
 
 @pytest.fixture
@@ -58,14 +85,7 @@ def offered(monkeypatch):
 
 @pytest.fixture
 def made_up(offered):
-    module = "tests.helpers.made_up_figures"
-    offered(made_up=f"{module}:Rattlers", heights=f"{module}:Contacts")
-
-
-@pytest.fixture
-def table(tmp_path):
-    rows = [{**row, "rattlers": 5 * row["frame"]} for row in curve()]
-    return write(tmp_path / "t.jsonl", "".join(json.dumps(row) + "\n" for row in rows))
+    offered(made_up=f"{__name__}:Rattlers", heights=f"{__name__}:Contacts")
 
 
 def test_the_figures_of_the_package_stand_first_and_in_their_order(made_up):
@@ -74,49 +94,41 @@ def test_the_figures_of_the_package_stand_first_and_in_their_order(made_up):
     assert [*figures_of("frames")] == [*OWN[4:8], "heights"]
 
 
-@pytest.mark.parametrize(
-    ("command", "kinds"), [("compute", ("table", "frames")), ("compare", ("table",))]
-)
-def test_the_help_names_the_figures_that_there_are(command, kinds):
+def test_the_help_names_the_figures_that_there_are():
     """It is written by hand, as to look for figures takes longer than to print it."""
-    (option,) = (
-        one for one in cli.get_command(Context(cli), command).params if one.name == "figure"
-    )
-    named = [name for name in OWN if re.search(rf"\b{name}\b", option.help)]
-    assert named == [name for kind in kinds for name in figures_of(kind)]
+    for command, kinds in (("compute", ("table", "frames")), ("compare", ("table",))):
+        options = cli.get_command(Context(cli), command).params
+        (option,) = (one for one in options if one.name == "figure")
+        named = [name for name in OWN if re.search(rf"\b{name}\b", option.help)]
+        assert named == [name for kind in kinds for name in figures_of(kind)]
 
 
 @pytest.mark.usefixtures("made_up")
-def test_a_made_up_figure_draws_on_the_axes_that_it_gets(table):
+def test_compute_and_python_draw_a_made_up_figure_of_frames(series, computed, tmp_path):
+    plot = tmp_path / "x.svg"
+    words = ["-o", str(tmp_path / "t.csv"), "--plot", str(plot), "--figure", "heights"]
+    assert run(["compute", SAMPLE, *FAST, *words]) == 0
+    assert 'id="heights"' in plot.read_text()
+    settings = Settings(boundary="mask=3", tolerance=1e-2)
+    ax = Figure().subplots()
+    assert ScannedFrames(series, settings, computed.rows).plot.heights(ax=ax, frame=0) is ax
+    heights = sum(bar.get_height() for bar in ax.patches)
+    assert heights == row_of(computed, 0)["contacts"]
+
+
+@pytest.mark.usefixtures("made_up")
+def test_python_compare_and_report_draw_a_made_up_figure_of_a_table(table, tmp_path):
     ax = Figure().subplots()
     plot = load(table).plot
     assert plot.made_up(ax=ax) is ax
     assert ax.lines[0].get_ydata().tolist() == [0, 5, 10, 15, 20]
     assert repr(plot) == "Plots(evolution, normalised, correlation, columns, made_up)"
-
-
-@pytest.mark.usefixtures("made_up")
-def test_compute_draws_a_made_up_figure_by_its_name(tmp_path, monkeypatch):
-    monkeypatch.chdir(ROOT)
-    plot = tmp_path / "x.svg"
-    words = ["-o", str(tmp_path / "t.csv"), "--plot", str(plot), "--figure", "heights"]
-    assert run(["compute", SAMPLE, *FAST, *words]) == 0
-    assert 'id="heights"' in plot.read_text()
-
-
-@pytest.mark.usefixtures("made_up")
-def test_compare_and_the_page_of_all_figures_draw_it_too(table, tmp_path):
-    for name in (["--figure", "made_up"], []):
-        plot = tmp_path / "x.svg"
-        assert run(["compare", str(table), "--plot", str(plot), *name]) == 0
-        assert 'id="rattlers"' in plot.read_text()
+    file = tmp_path / "x.svg"
+    assert run(["compare", str(table), "--plot", str(file), "--figure", "made_up"]) == 0
+    assert 'id="rattlers"' in file.read_text()
     with drawn_page(make_figures(load(table), "table")) as page:
         letters = [axes.get_title(loc="left") for axes in page.axes if axes.axison]
     assert letters == [f"({letter})" for letter in "abcdef"]
-
-
-@pytest.mark.usefixtures("made_up")
-def test_the_report_has_it_with_its_caption(table):
     page = make_report([table]).page
     assert page.count("data:image/svg") == 4
     assert "<figcaption>Rattlers over the frames.</figcaption>" in page
@@ -124,28 +136,14 @@ def test_the_report_has_it_with_its_caption(table):
 
 @pytest.mark.usefixtures("made_up")
 def test_a_table_without_its_columns_goes_without_it(tmp_path, capsys):
-    rows = Table(curve())
-    assert len(make_figures(rows, "table")) == 3
-    with pytest.raises(SettingsError, match="figure: made_up needs rattlers, which the table does"):
-        make_figures(rows, "table", "made_up")
+    assert len(make_figures(Table(curve()), "table")) == 3
     table = write(tmp_path / "t.jsonl", "".join(json.dumps(row) + "\n" for row in curve()))
-    words = ["--plot", str(tmp_path / "x.png"), "--figure", "made_up"]
-    assert run(["compare", str(table), *words]) == 1
-    assert "--figure: made_up needs rattlers" in capsys.readouterr().err
-    assert run(["compare", str(table), "--plot", "x.png", "--figure", "pie"]) == 2
+    words = ["compare", str(table), "--plot", str(tmp_path / "x.png"), "--figure"]
+    assert run([*words, "made_up"]) == 1
+    assert "--figure: made_up needs rattlers, which the table does" in capsys.readouterr().err
+    assert run([*words, "pie"]) == 2
     known = "evolution, normalised, correlation, columns, made_up"
     assert f"expected {known}, found" in capsys.readouterr().err
-
-
-@pytest.mark.usefixtures("made_up")
-def test_a_made_up_figure_of_frames_is_drawn_from_python(series, computed):
-    settings = Settings(boundary="mask=3", tolerance=3e-3)
-    plot = ScannedFrames(series, settings, computed.rows).plot
-    ax = Figure().subplots()
-    assert plot.heights(ax=ax, frame=0) is ax
-    heights = sum(bar.get_height() for bar in ax.patches)
-    row = next(r for r in computed.rows if (r["frame"], r["variant"]) == (0, "c"))
-    assert heights == row["contacts"]
 
 
 def test_what_is_no_figure_is_told_and_spoils_no_other(offered):
@@ -178,15 +176,14 @@ def test_a_comparison_is_made_and_told_once(tmp_path):
         assert sum(text in str(one.message) for one in told) == 1
 
 
-@pytest.mark.parametrize("name", [None, *TABLE_FIGURES])
-def test_all_panels_are_lettered_and_say_which_alpha(drawn, name):
-    figure = drawn(curve(), name)
-    panels = [axes for axes in figure.axes if axes.axison]
-    letters = [axes.get_title(loc="left") for axes in panels]
-    # a lone panel has no letter
-    several = [f"({letter})" for letter in "abcde"[: len(panels)]]
-    assert letters == (several if len(panels) > 1 else [""])
-    assert all(axes.get_ylabel().count(", axial") == 1 for axes in panels)
+def test_all_panels_are_lettered_and_say_which_alpha(drawn):
+    for name in (None, *TABLE_FIGURES):
+        panels = [axes for axes in drawn(curve(), name).axes if axes.axison]
+        letters = [axes.get_title(loc="left") for axes in panels]
+        # a lone panel has no letter
+        several = [f"({letter})" for letter in "abcde"[: len(panels)]]
+        assert letters == (several if len(panels) > 1 else [""])
+        assert all(axes.get_ylabel().count(", axial") == 1 for axes in panels)
 
 
 def test_the_words_of_a_figure_fit_its_width(drawn):
@@ -202,28 +199,29 @@ def test_the_words_of_a_figure_fit_its_width(drawn):
         assert box.y1 < height + 0.02
 
 
-@pytest.mark.parametrize("rows", [[], [{**row, "alpha_vs_axial": None} for row in curve()]])
-def test_nothing_to_draw_is_an_error(rows, tmp_path):
-    with pytest.raises(SettingsError, match="nothing to draw"):
-        save_rows(tmp_path / "x.png", rows)
+def test_nothing_to_draw_is_an_error(tmp_path):
+    for rows in ([], [{**row, "alpha_vs_axial": None} for row in curve()]):
+        with pytest.raises(SettingsError, match="nothing to draw"):
+            save_rows(tmp_path / "x.png", rows)
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("suffix", BYTES)
-def test_files_are_what_their_names_say_and_repeat(tmp_path, suffix):
-    one, two = tmp_path / f"one{suffix}", tmp_path / f"two{suffix}"
-    for path in (one, two):
-        save_rows(path, curve())
-    assert one.read_bytes().startswith(BYTES[suffix])
-    assert one.read_bytes() == two.read_bytes()
-    assert len(list(tmp_path.iterdir())) == 2
+def test_files_are_what_their_names_say_and_repeat(tmp_path):
+    for suffix, begin in BYTES.items():
+        one, two = tmp_path / f"one{suffix}", tmp_path / f"two{suffix}"
+        for path in (one, two):
+            save_rows(path, curve(), "normalised")
+        assert one.read_bytes().startswith(begin)
+        assert one.read_bytes() == two.read_bytes()
+        # of the same second; no file tells when it was made
+        assert not re.search(b"CreationDate|dc:date", one.read_bytes())
+    assert len(list(tmp_path.iterdir())) == 6
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [("x.docx", "not as .docx"), ("x", "without a suffix"), ("no/x.png", "there is no folder")],
-)
-def test_files_that_cannot_be_written_are_told_before(tmp_path, name, message):
-    with pytest.raises(SettingsError, match=message):
-        check_plot_file(tmp_path / name)
+def test_files_that_cannot_be_written_are_told_before(tmp_path):
+    for name, message in (
+        ("x.docx", "not as .docx"), ("x", "without a suffix"), ("no/x.png", "there is no folder"),
+    ):  # fmt: skip
+        with pytest.raises(SettingsError, match=message):
+            check_plot_file(tmp_path / name)
     check_plot_file(tmp_path / "x.PNG")

@@ -9,14 +9,10 @@ from scanfab.viz.scene import Grains, Scene, look_at
 from tests.helpers.truth import SAMPLE_DATA
 
 
-@pytest.fixture(scope="module")
-def clumps():
-    series = scanfab.read_series(SAMPLE_DATA / "liggghts_clumps", contacts="geometric")
-    return look_at(series, scanfab.Settings(), 2)
-
-
 @pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
-def test_all_spheres_of_a_clump_have_its_shade(clumps):
+def test_all_spheres_of_a_clump_have_its_shade():
+    series = scanfab.read_series(SAMPLE_DATA / "liggghts_clumps", contacts="geometric")
+    clumps = look_at(series, scanfab.Settings(), 2)
     data = view_data(clumps.scene, clumps.axis)
     body = clumps.sample.packing.bodies.number
     away = np.linalg.norm(clumps.scene.grains.places - clumps.scene.center, axis=1)
@@ -28,15 +24,6 @@ def test_all_spheres_of_a_clump_have_its_shade(clumps):
     assert len(data["shades"]) == 3
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
-def test_spheres_have_no_shades():
-    series = scanfab.read_series(SAMPLE_DATA / "yade_triaxial")
-    look = look_at(series, scanfab.Settings(), 0)
-    data = view_data(look.scene, look.axis)
-    assert {len(sphere) for sphere in data["spheres"]} == {5}
-    assert len(data["shades"]) == 1
-
-
 def test_a_large_sample_is_thinned():
     count = 3 * MOST_GRAINS
     position = np.random.default_rng(0).uniform(-1, 1, (count, 3))
@@ -45,3 +32,6 @@ def test_a_large_sample_is_thinned():
     data = view_data(Scene(grains, np.zeros(3)), (0, 0, 1))
     assert (len(data["spheres"]), data["left_out"]) == (MOST_GRAINS, 2 * MOST_GRAINS)
     assert max(abs(number) for sphere in data["spheres"] for number in sphere) <= 1000
+    # spheres alone have no shades
+    assert {len(sphere) for sphere in data["spheres"]} == {5}
+    assert len(data["shades"]) == 1

@@ -45,6 +45,10 @@ def test_a_value_has_the_digits_that_its_error_leaves(value, error, text):
     cells = results_of(value, alpha_vs_axial_sample_se=error)
     assert cells["α_vs, frame 0"] == text
     assert results_of(0.01, alpha_vs_axial_se=7.41e-5)["its error: scan"] == "7.4e-05"
+    # without the scan's part there is no error in all
+    cells = results_of(value, alpha_vs_axial_sample_se=9e-4, alpha_vs_axial_se=None)
+    assert "±" not in cells["α_vs, frame 0"]
+    assert cells["its error: sample"] == "0.00090"
 
 
 def test_what_is_not_known_is_a_dash():
@@ -54,27 +58,22 @@ def test_what_is_not_known_is_a_dash():
     assert [row[place] == "-" for row in part.rows] == [True, False, False, False, False]
 
 
-def test_without_the_scan_s_part_there_is_no_error_in_all():
-    cells = results_of(0.0120584, alpha_vs_axial_sample_se=9e-4, alpha_vs_axial_se=None)
-    assert "±" not in cells["α_vs, frame 0"]
-    assert cells["its error: sample"] == "0.00090"
-
-
-def grains(**of_variants):
+@pytest.mark.parametrize(
+    ("of_variants", "told"),
+    [
+        ({"c": [143, 143]}, "143 grains"),
+        ({"a": [800], "b": [800]}, "800 grains"),
+        ({"c": [140, 143]}, "140 to 143 grains"),
+        ({"a": [800, 800], "c": [235, 286]}, "grains: 800 in a, 235 to 286 in c"),
+    ],
+)
+def test_grains_are_told_by_variant_and_one_number_is_no_range(of_variants, told):
     rows = [
         {**row, "grains": number}
         for variant, numbers in of_variants.items()
         for row, number in zip(curve(variant=variant), numbers, strict=False)
     ]
-    return overview("t.csv", rows).split("; ")[2]
-
-
-def test_grains_are_told_by_variant_and_one_number_is_no_range():
-    assert grains(c=[143, 143]) == "143 grains"
-    assert grains(a=[800], b=[800]) == "800 grains"
-    assert grains(c=[140, 143]) == "140 to 143 grains"
-    found = grains(a=[800, 800], c=[235, 286])
-    assert found == "grains: 800 in a, 235 to 286 in c"
+    assert overview("t.csv", rows).split("; ")[2] == told
     assert overview("t.csv", curve()[1:2]).endswith("; axial strain 1 %.")
 
 
