@@ -35,9 +35,8 @@ sys.path[0] = str(ROOT)
 import pyvista  # noqa: E402
 
 from scanfab.io.writer import installed_writers, writer_named  # noqa: E402
-from tests.campaigns import versions  # noqa: E402
-from tests.campaigns.versions import Reading  # noqa: E402
-from tests.helpers import fuzzing, sound_files  # noqa: E402
+from tests.helpers import fuzzing, sound_files, versions  # noqa: E402
+from tests.helpers.versions import Reading  # noqa: E402
 
 DATA = "sample_data"
 
@@ -274,7 +273,7 @@ def main() -> None:
             answers = [versions.answers(python, sources) for python in pythons]
             for source, *pair in zip(sources, *answers, strict=True):
                 name = f"{source.source} {source.options.get('format', '')}".strip()
-                found += differences(name, *pair)
+                found += differences(name, *(one.found for one in pair))
             print(f"read: {len(sources)} sources", flush=True)
         if "converted" in given.only:
             # files that are there unpacked as well, or are like others, are not converted
@@ -285,7 +284,7 @@ def main() -> None:
                 for k, python in enumerate(pythons)
             ]
             for (source, name), *pair in zip(listed, *answers, strict=True):
-                found += differences(f"converted: {source} {name}", *pair)
+                found += differences(f"converted: {source} {name}", *(one.found for one in pair))
             print(f"converted: {len(listed)} conversions", flush=True)
         if "commands" in given.only:
             found += held_commands(pythons[1], base, folder / "commands")

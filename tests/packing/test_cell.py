@@ -35,10 +35,10 @@ def test_heights_are_distances_of_opposite_faces():
 @pytest.mark.parametrize("vectors", [EDGES, TILTED])
 def test_a_rounding_error_below_a_face_is_not_on_the_opposite_face(vectors, trap):
     cell = Cell(vectors)
-    wrapped = cell.wrap([[trap, trap, trap]])
-    fractions = cell.fractional(wrapped)
-    assert np.all(fractions < 1)
+    wrapped, turns = cell.place([[trap, trap, trap]])
+    assert np.all(cell.fractional(wrapped) < 1)
     np.testing.assert_allclose(wrapped, 0, atol=1e-15)
+    assert np.all(turns == 0)
 
 
 def random_cell(random):

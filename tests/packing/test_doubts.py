@@ -83,7 +83,9 @@ def test_bodies_that_a_periodic_face_cuts_are_told_without_the_cell():
 def test_numbers_that_spheres_all_over_the_sample_share_are_told(loose, cell):
     number = np.arange(len(loose)) % 2
     packing = Packing(loose.position, loose.radius, bodies=number, cell=cell)
-    assert "2 bodies of several spheres, such as number 0" in doubts(packing)["spread_bodies"]
+    text = doubts(packing)["spread_bodies"]
+    assert "2 bodies of several spheres, such as number 0" in text
+    assert f"reach through more than half of the {'sample' if cell is None else 'cell'}" in text
 
 
 def test_bodies_that_span_a_thin_sample_raise_no_doubt():

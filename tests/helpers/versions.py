@@ -34,8 +34,16 @@ class Reading(NamedTuple):
     converted: tuple[str, str] | None = None
 
 
-Answer = list[dict[str, str]] | str
-"""The packings that were read, as digests, or the name of the error."""
+class Answer(NamedTuple):
+    """The packings that were read, as digests, or the name of the error; and whether it warned."""
+
+    found: list[dict[str, str]] | str
+    warned: bool
+
+    @property
+    def is_failure(self) -> bool:
+        """Whether it ended with an error that is not scanfab's, or took too long."""
+        return self.found[:6] == "FAILED"
 
 
 def installed_base(commit: str, kept: Path) -> Path:
@@ -59,9 +67,9 @@ def answers(python: Path, readings: Sequence[Reading]) -> list[Answer]:
             [python, "-P", __file__], input=json.dumps(readings[len(found) :]), cwd=ROOT,
             stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False,
         )  # fmt: skip
-        found += [json.loads(line) for line in done.stdout.splitlines()]
+        found += [Answer(*json.loads(line)) for line in done.stdout.splitlines()]
         if done.returncode:
-            found.append(f"FAILED the process ended with {done.returncode}")
+            found.append(Answer(f"FAILED the process ended with {done.returncode}", False))
     return found
 
 
@@ -92,8 +100,8 @@ def answer(reading: Reading) -> Answer:
     import scanfab
 
     source = reading.source
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
         try:
             if reading.converted:
                 source, name = reading.converted
@@ -101,11 +109,12 @@ def answer(reading: Reading) -> Answer:
                 packing = scanfab.read_series(reading.source)[-1].read()
                 scanfab.convert(packing, source, to=name)
             frames = scanfab.read_series(source, **reading.options)
-            return [packed(frame.read()) for frame in frames]
+            found: Any = [packed(frame.read()) for frame in frames]
         except scanfab.ScanfabError as error:
-            return type(error).__name__
+            found = type(error).__name__
         except BaseException as error:
-            return f"FAILED {type(error).__name__}: {error}"[:200]
+            found = f"FAILED {type(error).__name__}: {error}"[:200]
+    return Answer(found, any(issubclass(one.category, scanfab.ScanfabWarning) for one in caught))
 
 
 def too_long(*_: object) -> None:
