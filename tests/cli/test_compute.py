@@ -25,6 +25,7 @@ def test_the_command_gives_what_the_library_gives_with_any_number_of_workers(com
     )
     runs = [compute(*FILES, *FAST, "--workers", number) for number in (1, 2, 5)]
     assert len({run.out for run in runs}) == 1
+    assert "\x1b" not in runs[0].out + runs[0].err
     printed = runs[0].rows
     assert list(printed[0]) == list(scanfab.COLUMNS)
     assert [row["variant"] for row in printed] == list("abcdabcd")

@@ -12,19 +12,16 @@ FAST = ("--tolerance", "0.05", "--workers", "1", "--spacing", "0.1", "--directio
 GRID = 2.0 * np.stack(np.meshgrid(*[np.arange(4)] * 3, indexing="ij"), -1).reshape(-1, 3) + 1
 
 
-@pytest.mark.parametrize("source", ["liggghts_periodic", "lammps_discs"])
-def test_that_each_sphere_is_a_grain_can_be_said_of_spheres(ask, source):
-    words = ("compute", SAMPLE_DATA / source, "--directions", "9", "--spacing", "1rmin")
-    words += ("--with", "state,invariants", "--contacts", "geometric", "--frames", ":1")
-    assert ask(*words, "--bodies", "id").out == ask(*words).out
-
-
-def test_who_says_that_each_sphere_is_a_grain_is_told_of_no_clumps(ask):
-    words = ("compute", SAMPLE_DATA / "liggghts_clumps", "--format", "liggghts", "--frames", ":1")
-    words += ("--directions", "9", "--spacing", "1rmin", "--contacts", "geometric")
-    single = ask(*words, "--bodies", "id")
-    assert "clump" not in single.err.replace("liggghts_clumps", "")
-    assert single.out != ask(*words).out
+def test_that_each_sphere_is_a_grain_can_be_said(ask):
+    """Of spheres and discs that changes nothing; of clumps it does, and they are not told of."""
+    words = ("--directions", "9", "--spacing", "1rmin", "--variants", "a", "--frames", ":1")
+    words += ("--with", "state,invariants", "--contacts", "geometric")
+    for source in ("liggghts_periodic", "lammps_discs", "liggghts_clumps/dump_*"):
+        given = ask("compute", SAMPLE_DATA / source, *words)
+        single = ask("compute", SAMPLE_DATA / source, *words, "--bodies", "id")
+        has_clumps = "clumps" in source
+        assert (single.out == given.out) != has_clumps
+        assert not has_clumps or "clump" not in single.err.replace("liggghts_clumps", "")
 
 
 @pytest.mark.parametrize(

@@ -13,15 +13,10 @@ import scanfab
 from scanfab.cli.main import run
 from scanfab.io.writer import installed_writers
 from scanfab.testing import made_up_packings
-from tests.helpers.interruptions import PROGRAM, write_series
+from tests.helpers.interruptions import PROGRAM
 
 resource = pytest.importorskip("resource", reason="limits of a process are POSIX")
 FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac"]
-
-
-@pytest.fixture(scope="module")
-def series(tmp_path_factory):
-    return write_series(tmp_path_factory.mktemp("full") / "series", 3)
 
 
 @pytest.fixture

@@ -12,14 +12,9 @@ from pathlib import Path
 import pytest
 
 from scanfab.table.formats import read_rows
-from tests.helpers.interruptions import PROGRAM, write_series
+from tests.helpers.interruptions import PROGRAM
 
 FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac"]
-
-
-@pytest.fixture(scope="module")
-def series(tmp_path_factory):
-    return write_series(tmp_path_factory.mktemp("letters") / "series", 3)
 
 
 def on_terminal(words: list[str], **environment: str) -> tuple[int, str]:

@@ -92,22 +92,19 @@ def test_a_folder_that_cannot_be_filled_is_refused_and_kept(
     ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "mine.txt").write_text("mine")
-    for folder, words in (
-        (tmp_path, "is not empty: name a new or an empty folder"),
-        (tmp_path / "mine.txt", "is a file: name a new or an empty folder"),
-        (tmp_path / "none" / "new", f"there is no folder {tmp_path / 'none'} to write to"),
-    ):
-        told = ask("sample-data", folder, code=2).told
-        assert told.endswith(f"Error: {folder}: {words}")
-    assert "Missing argument 'DIR'" in ask("sample-data", code=2).told
     (tmp_path / "empty").mkdir()
-    monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
     for name, words in (
+        ("", "is not empty: name a new or an empty folder"),
+        ("mine.txt", "is a file: name a new or an empty folder"),
+        ("none/new", f"there is no folder {tmp_path / 'none'} to write to"),
         ("new", f"the folder {tmp_path} cannot be written to"),
         ("empty", "the folder cannot be written to"),
     ):
+        if name == "new":
+            monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
         told = ask("sample-data", tmp_path / name, code=2).told
         assert told.endswith(f"Error: {tmp_path / name}: {words}")
+    assert "Missing argument 'DIR'" in ask("sample-data", code=2).told
     assert {path.name for path in tmp_path.iterdir()} == {"mine.txt", "empty"}
 
 

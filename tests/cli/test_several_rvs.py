@@ -6,16 +6,10 @@ import pytest
 
 import scanfab
 from scanfab.cli.main import run
-from tests.helpers.interruptions import write_series
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")
 OPTIONS = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "ac"}
 RVS = ("--rv", "0.7,0.5")
-
-
-@pytest.fixture(scope="module")
-def series(tmp_path_factory):
-    return write_series(tmp_path_factory.mktemp("several") / "series", 4)
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,7 @@
 """Calibration: ladders, from where on they are steady, and recommended settings that hold."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -69,6 +71,10 @@ def test_steady_is_what_differs_from_later_steps_by_no_more_than_chance():
     assert [row.steady for row in judged(steps)] == [0, 1, 1, 1, 1]
     far = [step(9, 0.0129, 0.001), *steps[:2], steps[4]]
     assert [row.steady for row in judged(far)] == [0, 0, 1, 1]
+    for doubt in ({"alpha_vs_axial_se": None}, {"note": "few"}, {"alpha_vs_axial": None}):
+        found = judged([steps[4], replace(steps[4], **doubt), steps[4]])
+        assert [row.steady for row in found] == [0, 0, 1]
+        assert first_steady(found) is None  # there is nothing that the last one agrees with
 
 
 def test_an_rv_within_another_differs_from_it_by_less_than_two_samples_do():
@@ -86,23 +92,12 @@ def test_an_rv_within_another_differs_from_it_by_less_than_two_samples_do():
     assert 0.005 * 400 < unsteady < 0.08 * 400
 
 
-@pytest.mark.parametrize(
-    "doubt", [{"alpha_vs_axial_se": None}, {"note": "few"}, {"alpha_vs_axial": None}]
-)
-def test_a_doubtful_step_is_not_steady(doubt):
-    steps = [step(0, 0.01, 0.001), step(1, 0.01, 0.001, **doubt), step(2, 0.01, 0.001)]
-    found = judged(steps)
-    assert [row.steady for row in found] == [0, 0, 1]
-    assert first_steady(found) is None  # there is nothing that the last one agrees with
-
-
 LEAVE_OUT = "leave out `cutoffs`, `moment` and all but one `rv`"
 
 
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({"frame": 1}, "frames: the series has no frame in 1:"),
         ({"frame": -2}, "frames: the series has no frame in -2:"),
         ({"moment": 2}, LEAVE_OUT),
         ({"cutoffs": "0.1,0.2"}, LEAVE_OUT),
@@ -117,27 +112,23 @@ def test_what_cannot_be_calibrated_is_refused(packing, options, told):
 
 def test_the_sentences_say_what_the_rows_show(found):
     """Of each ladder the first step that is steady in all variants; of cut-offs the largest."""
-    said = []
-    for name in ("spacing", "directions", "rv"):
+    said = dict(sentence.split(": ", 1) for sentence in found.findings)
+    assert list(said) == ["spacing", "directions", "cut-off", "rv", "recommended"]
+    for name, paper in (("spacing", "0.1"), ("directions", ""), ("rv", "0.67 to 0.7")):
         rows = [row for row in found.rows if row.ladder == name]
-        steps = dict.fromkeys(row.value for row in rows)
-        steady = [v for v in steps if all(row.steady for row in rows if row.value == v)]
+        unsteady = {row.value for row in rows if not row.steady}
+        first = next(row.value for row in rows if row.value not in unsteady)
+        steady = f"from {first:g} on, nothing changes within the errors"
         # the last one has nothing to agree with
-        is_known = steady[0] != [*steps][-1]
-        from_there = f"from {steady[0]:g} on, nothing changes within the errors"
-        said.append(f"{name}: {from_there if is_known else 'no step agrees with all later ones'}")
+        expected = "no step agrees with all later ones" if first == rows[-1].value else steady
+        assert said[name] == expected + (f" (the paper: {paper})" if paper else "")
     alpha = {row.value: row.alpha_vs_axial for row in ladder(found, "cutoff") if row.alpha_vs_axial}
     best = max(alpha, key=lambda value: abs(alpha[value]))
-    said.insert(
-        2,
-        f"cut-off: it decides what is measured; in variant c the anisotropy is largest ("
-        f"{alpha[best]:.2g}) at {best:g} r_min; at the paper's 1 r_min it is "
-        f"{alpha[1.0] / alpha[best]:.0%} of that",
+    assert said["cut-off"] == (
+        f"it decides what is measured; in variant c the anisotropy is largest ({alpha[best]:.2g}) "
+        f"at {best:g} r_min; at the paper's 1 r_min it is {alpha[1.0] / alpha[best]:.0%} of that"
     )
-    papers = [" (the paper: 0.1)", "", "", " (the paper: 0.67 to 0.7)"]
-    expected = [one + paper for one, paper in zip(said, papers, strict=True)]
-    assert list(found.findings[:-1]) == expected
-    assert found.findings[-1].startswith("recommended: error of the scan ")
+    assert said["recommended"].startswith("error of the scan ")
 
 
 def test_steps_beyond_the_budget_are_left_out_with_a_word(packing):
@@ -158,10 +149,9 @@ def test_one_ladder_is_drawn_on_the_axes_that_it_gets(found):
         found.plot.calibration(ax=ax, ladder="lines")
 
 
-@pytest.mark.parametrize("many", [list, iter])
-def test_packings_from_anywhere_are_calibrated(many):
+def test_packings_from_anywhere_are_calibrated():
     packing = Packing(simple_cubic(4).position, 0.5)
     options = {"variants": "c", "tolerance": 0.1, "rv": 0.6, "contact_tolerance": 1e-4}
-    found = calibrate(many([packing, packing]), **options)
+    found = calibrate(iter([packing, packing]), **options)
     assert {row.frame for row in found.rows} == {1}
     assert found.options == calibrate(packing, **options).options

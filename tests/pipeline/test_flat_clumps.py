@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from itertools import product
 
 import numpy as np
 import pytest
 
-from scanfab import Cell, ContactList, Packing, ScanfabWarning, compute, find_contacts
+from scanfab import Cell, ContactList, Packing, compute, find_contacts
 from tests.helpers.naive_bodies import NaiveBodies
 
 # where so few clumps are left, lines stay in channels and densities of contacts fall below 0
@@ -92,13 +91,8 @@ def sample():
 
 @pytest.fixture(scope="module")
 def rows(sample):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ScanfabWarning)
-        table = compute(
-            sample.packing, variants="abcd", rattlers="force", min_force=0.2, edge="start",
-            rv_shape="ellipsoid", rv_size=(3.5, 2.5), with_="state,forces,invariants", **FAST,
-        )  # fmt: skip
-    return {row.variant: row for row in table}
+    words = {"rattlers": "force", "min_force": 0.2, "with_": "state,forces,invariants"}
+    return {row.variant: row for row in compute(sample.packing, variants="ab", **words, **FAST)}
 
 
 def test_counts_are_those_of_the_twin(sample, rows):

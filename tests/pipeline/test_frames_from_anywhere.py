@@ -22,11 +22,10 @@ from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.frame import compute_frame
 from scanfab.pipeline.plan import make_plan
 from scanfab.pipeline.settings import Settings
-from tests.helpers.dumps import dump_text, write
+from tests.helpers.dumps import NAMES, dump_text, write
 from tests.helpers.lattices import shaken_cubic
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "cd"}
-NAMES = "id type x y z radius"
 
 
 def packings(count=4):
@@ -93,17 +92,14 @@ def test_a_stream_is_not_kept_in_memory():
     assert len(scanfab.compute(watched(), workers=1, **SCAN)) == 24
 
 
-def test_what_is_no_packing_is_named():
+def test_what_is_no_packing_and_frames_that_do_not_exist_are_named():
+    with pytest.raises(SettingsError, match=r"no frame in 7:9: .*has 4 frames, 0 to 3"):
+        scanfab.compute(packings(), frames="7:9", **SCAN)
     with pytest.raises(SettingsError, match="expected packings, found 3 among them"):
         scanfab.compute([*packings(1), 3], **SCAN)
     for source in ("dumps/", 7):
         with pytest.raises(SettingsError, match=f"or an iterable of packings, found {source!r}"):
             scanfab.compute(source, **SCAN)
-
-
-def test_frames_that_do_not_exist_are_told_with_how_many_there_are():
-    with pytest.raises(SettingsError, match=r"no frame in 7:9: .*has 4 frames, 0 to 3"):
-        scanfab.compute(packings(), frames="7:9", **SCAN)
 
 
 class FirstIsSlow(ThreadPoolExecutor):
@@ -140,16 +136,15 @@ def processes():
 
 def test_other_processes_give_the_same_rows(tmp_path, processes):
     series = series_in(tmp_path)
-    found = scanfab.compute(series, executor=processes, **SCAN)
-    assert found == scanfab.compute(series, **SCAN)
-    packed = scanfab.compute(packings(), executor=processes, **SCAN)
-    assert packed == scanfab.compute(packings(), **SCAN)
+    for source in (lambda: series, packings):
+        found = scanfab.compute(source(), executor=processes, **SCAN)
+        assert found == scanfab.compute(source(), **SCAN)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
 def test_forked_processes_leave_the_copies_of_packed_files_alone(tmp_path, monkeypatch):
     """Copies are those of one process; a forked one makes its own, and takes them with it."""
-    for number, one in enumerate(packings(30)):
+    for number, one in enumerate(packings(12)):
         (tmp_path / f"packed_{number}.txt.gz").write_bytes(gzip.compress(text_of(one).encode()))
     series = scanfab.read_series(tmp_path / "packed_*.txt.gz")
     before = scanfab.compute(series, workers=2, **SCAN)

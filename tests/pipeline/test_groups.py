@@ -7,7 +7,7 @@ import pytest
 
 import scanfab
 from scanfab import Cell, ContactList, Packing
-from scanfab.base.errors import PackingError, SettingsError
+from scanfab.base.errors import PackingError
 from scanfab.fabric.registry import GROUPS
 from scanfab.pipeline.values import GROUP_NAMES
 from scanfab.table.columns import COLUMNS
@@ -28,18 +28,12 @@ def names(*groups):
     ]
 
 
-@pytest.mark.parametrize("asked", ["forces,state", ["state", "forces"], "state forces"])
+@pytest.mark.parametrize("asked", ["forces,state", ["state", "forces"]])
 def test_several_groups_stand_behind_the_others_in_one_order(yade, asked):
     row = scanfab.compute(yade, variants="a", with_=asked, **{**FAST, "spacing": "1rmin"})[0]
     assert list(row) == [*COLUMNS[:-24], *names("state", "forces"), *COLUMNS[-24:]]
     missing = [name for name in names("state", "forces") if row[name] is None]
     assert missing == []
-
-
-@pytest.mark.parametrize("wrong", ["force", "forces,stress", 3])
-def test_an_unknown_group_is_named(yade, wrong):
-    with pytest.raises(SettingsError, match="with_: expected groups of columns out of invariants"):
-        scanfab.compute(yade, with_=wrong)
 
 
 def test_without_forces_their_columns_are_an_error_and_stress_is_empty_with_one_note():

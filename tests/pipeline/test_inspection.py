@@ -1,9 +1,10 @@
-"""What is told of each frame, computed from nothing but the packing."""
+"""What is told of each frame without a scan, and its sample."""
 
 from __future__ import annotations
 
 import warnings
 
+import numpy as np
 import pytest
 
 import scanfab
@@ -89,12 +90,31 @@ def test_a_part_of_a_series_is_reported_as_its_frames_among_all(tmp_path):
     assert list(inspect_series(series[1:], Settings(frames="-1"))) == every[3:]
 
 
-def test_options_that_do_not_exist_or_fit_are_refused_at_once():
-    series = scanfab.read_series(SAMPLE_DATA / "liggghts_periodic" / "dump_*.txt.gz")
-    with pytest.raises(TypeError, match="min_contacts"):
-        scanfab.inspect(series, min_contact=3)
-    with pytest.raises(scanfab.SettingsError, match="boundary"):
-        scanfab.inspect(series, boundary="mask")
+def test_options_that_do_not_exist_or_fit_are_refused_at_once(tmp_path):
+    series = scanfab.read_series(write(tmp_path / "dump.txt", dump_text()))
+    for function in (scanfab.inspect, scanfab.samples):
+        with pytest.raises(TypeError, match="did you mean 'boundary'"):
+            function(series, boundry="type=2")
+        with pytest.raises(scanfab.SettingsError, match="boundary"):
+            function(series, boundary="mask")
+
+
+def test_samples_are_told_apart_by_the_options_of_compute(tmp_path):
+    for step in range(4):
+        write(tmp_path / f"dump_{step}.txt", dump_text(step=step))
+    series = scanfab.read_series(tmp_path)
+    ((number, sample),) = scanfab.samples(series[2].read(), boundary="type=2", min_contacts=1)
+    assert number == 0
+    np.testing.assert_array_equal(sample.boundary, sample.packing.columns["type"] == 2)
+    assert sample.contacts.source == "geometric"
+    assert not sample.rattlers.any()
+    chosen = scanfab.samples(series[1:], frames="1:")
+    assert [(number, sample.packing.step) for number, sample in chosen] == [(2, 2), (3, 3)]
+    write(tmp_path / "dump_1.txt", dump_text(step=1)[:50])
+    with pytest.raises(scanfab.ReadError, match="dump_1"):
+        list(scanfab.samples(series))
+    with pytest.warns(ScanfabWarning, match="frame 1"):
+        assert [number for number, _ in scanfab.samples(series, on_error="skip")] == [0, 2, 3]
 
 
 def test_the_rv_is_that_of_the_first_frame_whichever_frames_are_chosen(tmp_path):

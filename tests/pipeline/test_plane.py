@@ -14,14 +14,11 @@ XY, YZ, ZX = Space(2), Space(0), Space(1)
 FAST = {"tolerance": 0.05, "workers": 1}
 
 
-def layer(random, count=200, edge=14.0):
-    """Discs at random places of a square."""
-    return random.random((count, 2)) * edge, random.uniform(0.3, 0.6, count)
-
-
 @pytest.fixture
 def discs():
-    return layer(np.random.default_rng(2))
+    """Discs at random places of a square."""
+    random = np.random.default_rng(2)
+    return random.random((200, 2)) * 14.0, random.uniform(0.3, 0.6, 200)
 
 
 def series_of(tmp_path, *heights, **options):
@@ -62,9 +59,9 @@ def test_frames_of_mixed_dimension_are_an_error(discs):
     position, radius = discs
     flat = Packing(position, radius)
     ball = Packing(np.column_stack([position, np.arange(200.0) % 14]), radius)
-    for first, second in ((flat, ball), (ball, flat)):
+    for frames in ([flat, ball], [ball, flat]):
         with pytest.raises(PackingError, match="the first frame that has grains lies in"):
-            compute([first, second], variants="a", **FAST)
+            compute(frames, variants="a", **FAST)
 
 
 def test_positions_with_two_coordinates_are_discs(discs):
@@ -73,23 +70,22 @@ def test_positions_with_two_coordinates_are_discs(discs):
     assert (packing.dimension, packing.space, packing.position[:, 2].any()) == (2, XY, False)
     assert Packing(packing.position, radius).dimension == 3
     assert Packing(packing.position, radius, dim=2).space == XY
-    with pytest.raises(PackingError, match="dim: expected 2"):
-        Packing(position, radius, dim=3)
-    with pytest.raises(PackingError, match="dim: expected 2 or 3, found 4"):
-        Packing(position, radius, dim=4)
-    with pytest.raises(PackingError, match="two of them in the plane"):
-        Packing(*discs, cell=Cell([[14.0, 0, 1.0], [0, 14, 0], [0, 0, 3]]))
+    for words, told in (
+        ({"dim": 3}, "dim: expected 2"),
+        ({"dim": 4}, "dim: expected 2 or 3, found 4"),
+        ({"cell": Cell([[14.0, 0, 1.0], [0, 14, 0], [0, 0, 3]])}, "two of them in the plane"),
+    ):
+        with pytest.raises(PackingError, match=told):
+            Packing(position, radius, **words)
 
 
 def test_the_period_across_the_plane_is_ignored(discs):
     """Also one that is thinner than a disc, or leans."""
-    position, radius = discs
-    tables = [
-        compute(Packing(position, radius, cell=Cell(vectors)), variants="ac", **FAST)
+    one, *others = (
+        compute(Packing(*discs, cell=Cell(vectors)), variants="ac", **FAST)
         for vectors in ([14, 14, 0.1], [14, 14, 50], [[14, 0, 0], [0, 14, 0], [3, 2, 1.0]])
-    ]
-    assert [dict(row) for row in tables[1]] == [dict(row) for row in tables[0]]
-    assert [dict(row) for row in tables[2]] == [dict(row) for row in tables[0]]
+    )
+    assert others == [one, one]
 
 
 @pytest.mark.parametrize(
@@ -111,17 +107,14 @@ def test_what_has_no_meaning_in_a_plane_is_an_error(discs, options, message):
         compute(Packing(*discs), **FAST, **options)
 
 
-def test_rv_sizes_and_solid_fraction(discs):
+def test_rv_sizes_and_solid_fraction():
     """ν of discs without overlap is the sum of their areas over that of the cell."""
     grid = np.stack(np.meshgrid(np.arange(12.0), np.arange(10.0)), axis=-1).reshape(-1, 2)
     packing = Packing(grid + 0.5, 0.4, cell=Cell([12, 10, 1]))
-    one, other = compute(
-        packing, variants="ac", rv_shape="box", rv_size="6,4", cutoff=0.1, workers=1,
-        tolerance=5e-3, contact_tolerance=0.3,
-    )  # fmt: skip
+    words = {"rv_shape": "box", "rv_size": "6,4", "cutoff": 0.1, "contact_tolerance": 0.3}
+    one, other = compute(packing, variants="ac", **{**FAST, **words, "tolerance": 5e-3})
     assert one.solid_fraction == pytest.approx(np.pi * 0.16, rel=2e-3)
-    assert other.grains == 24
-    assert one.coordination == 4.0
+    assert (other.grains, one.coordination) == (24, 4.0)
     assert one.gc_xx == pytest.approx(0.5)
 
 
@@ -141,7 +134,7 @@ def test_the_rv_follows_the_strain(discs, follows):
     assert last.shear_strain == pytest.approx(0.5 * np.log(1.1 / 0.9))
 
 
-@pytest.mark.parametrize(("variants", "tolerance"), [("a", 1e-4), ("a", 5e-5), ("abcd", 1e-4)])
+@pytest.mark.parametrize(("variants", "tolerance"), [("a", 5e-5), ("ac", 1e-4)])
 @pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
 def test_an_auto_scan_meets_its_tolerance_and_goes_little_further(variants, tolerance):
     """The goal is the error in the plane, 2 a·G·a - 1, which is 4/3 of that in space."""
@@ -151,7 +144,7 @@ def test_an_auto_scan_meets_its_tolerance_and_goes_little_further(variants, tole
     assert 0.6 * tolerance < max(row.alpha_vs_axial_se for row in table) <= tolerance
 
 
-@pytest.mark.parametrize(("steps", "known"), [(2, []), (3, [2]), (4, [2, 4])])
+@pytest.mark.parametrize(("steps", "known"), [(2, []), (4, [2, 4])])
 def test_harmonics_need_more_directions_than_the_tensor(discs, steps, known):
     position, radius = discs
     words = {**FAST, "directions": steps, "with_": "harmonics", "variants": "a"}
@@ -160,7 +153,6 @@ def test_harmonics_need_more_directions_than_the_tensor(discs, steps, known):
     assert [order for order in (2, 4) if row[f"vs_a{order}"] is not None] == known
 
 
-@pytest.mark.parametrize("axis", ["1,1,0", "1,7,0"])
-def test_an_axis_in_the_plane_keeps_its_last_digit(axis):
-    settings = Settings(axis=axis)
+def test_an_axis_in_the_plane_keeps_its_last_digit():
+    settings = Settings(axis="1,7,0")
     assert settings.in_space(XY).axis == settings.axis

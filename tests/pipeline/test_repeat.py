@@ -1,9 +1,12 @@
-"""From a manifest back: the command repeats what was asked for, and the source is found."""
+"""The manifest: what a result was made of, and from it back to the command and the source."""
 
 from __future__ import annotations
 
+import hashlib
 import json
+import platform
 import shlex
+from importlib.metadata import version
 
 import pytest
 
@@ -18,7 +21,35 @@ from scanfab.pipeline.record import (
 )
 from scanfab.pipeline.settings import Settings
 from tests.conftest import ROOT, SAMPLE
-from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.dumps import cubic_rows, dump_text, pairs_text, write
+
+FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "a")
+
+
+def test_a_result_file_has_its_manifest_beside_it(tmp_path, capsys):
+    """Or, without a result file, where it is asked for."""
+    series = tmp_path / "series"
+    series.mkdir()
+    for frame in (0, 1):
+        write(series / f"dump_{frame}.txt", dump_text(cubic_rows(), step=frame))
+        write(series / f"pairs_{frame}.txt", pairs_text(step=frame))
+    output, path = tmp_path / "table.csv", tmp_path / "what.json"
+    words = ["compute", str(series), *FAST, "--seed", "5"]
+    assert run([*words, "-o", str(output)]) == run([*words, "--manifest", str(path)]) == 0
+    assert capsys.readouterr().out == output.read_text()
+    found = json.loads(path.read_text())
+    assert read_manifest(output) == found
+    names = ["settings", "seed", "versions", "inputs", "warnings", "notes", "frames"]
+    assert list(found) == names
+    assert found["frames"] == {str(series): 2}
+    assert found["seed"] == found["settings"]["seed"] == 5
+    assert found["versions"]["scanfab"] == version("scanfab")
+    assert found["versions"]["python"] == platform.python_version()
+    for one, file in zip(found["inputs"], sorted(series.iterdir()), strict=True):
+        data = file.read_bytes()
+        digest = hashlib.sha256(data).hexdigest()
+        assert one == {"path": str(file), "size": len(data), "sha256": digest}
+
 
 COMMANDS = [
     "dumps",

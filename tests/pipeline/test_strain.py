@@ -20,7 +20,7 @@ SCAN = {"variants": "a", "directions": 9, "spacing": "1rmin", "cutoff": 0}
 OBLIQUE = (3**-0.5,) * 3
 ALL, TWO, NONE = (True, True, True), (True, True, False), (False, False, False)
 
-WRONG = ["10,high", ",0.1", "10,", "10", "10.7,0.1", "1e999,0.1", "10,0.\0", f"10,{'9' * 140_000}"]
+WRONG = ["10,high", ",0.1", "10", "10.7,0.1", "1e999,0.1", "10,0.\0", f"10,{'9' * 140_000}"]
 
 pytestmark = pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
 
@@ -78,9 +78,8 @@ def test_strain_is_by_the_cell_that_repeats_else_by_the_boundary(periodic, optio
     ],
 )
 def test_what_is_not_there_cannot_be_measured(periodic, options, message):
-    with pytest.raises(
-        SettingsError, match=f"strain: {options['strain']} was asked for.*{message}"
-    ):
+    asked = f"strain: {options['strain']} was asked for.*{message}"
+    with pytest.raises(SettingsError, match=asked):
         strain(periodic, **options)
 
 
