@@ -57,6 +57,8 @@ def folder(tmp_path, monkeypatch):
         ("compute cube -o table.docx", 2, "results can be written as .csv"),
         ("compute cube -o nowhere/table.csv", 2, "there is no folder nowhere to write to"),
         ("compute cube --digits 0 -o out.csv", 2, "--digits: expected"),
+        ("merge out.csv -o merged.doc", 2, "results can be written as .csv"),
+        ("merge out.csv -o no/such/folder.csv", 2, "there is no folder no/such to write to"),
         ("compute cube --fields frame,alpha_v", 2, "no column 'alpha_v': did you mean alpha_vs?"),
         ("compute cube --resume", 2, "--resume needs -o FILE"),
         ("compute cube --vtk v --scheduler tcp://x:1", 2, "--vtk cannot be used with --scheduler"),

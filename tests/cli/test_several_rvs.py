@@ -40,9 +40,6 @@ def test_curves_are_told_apart_by_their_rv(table, series, ask, tmp_path):
     assert "variant c RV 0.5: slope" in repr(found)
     pairs = {row.variants for row in found.differences}
     assert pairs == {"a-c RV 0.5", "a-c RV 0.7", "c RV 0.5-c RV 0.7"}
-    # a table of one has no column for it
-    ask("compute", series, *FAST, "-o", tmp_path / "one.csv")
-    assert "rv" not in ask("compare", tmp_path / "one.csv", "--summary").rows[0]
 
 
 def test_paraview_report_and_view_show_all(table, series, tmp_path, ask):

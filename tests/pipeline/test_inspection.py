@@ -79,17 +79,6 @@ def test_an_empty_frame_has_no_radii(tmp_path):
     assert full.grains == len(ROWS)
 
 
-def test_a_part_of_a_series_is_reported_as_its_frames_among_all(tmp_path):
-    texts = [dump_text(step=step) for step in range(4)]
-    write(tmp_path / "dump.txt", "".join(texts))
-    series = scanfab.read_series(tmp_path)
-    every = list(inspect_series(series, Settings()))
-    assert [report.frame for report in every] == [0, 1, 2, 3]
-    assert list(inspect_series(series, Settings(frames="1:4:2"))) == every[1::2]
-    assert list(inspect_series(series[1:3], Settings())) == every[1:3]
-    assert list(inspect_series(series[1:], Settings(frames="-1"))) == every[3:]
-
-
 def test_options_that_do_not_exist_or_fit_are_refused_at_once(tmp_path):
     series = scanfab.read_series(write(tmp_path / "dump.txt", dump_text()))
     for function in (scanfab.inspect, scanfab.samples):

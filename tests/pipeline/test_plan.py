@@ -12,11 +12,6 @@ from scanfab.pipeline.plan import make_plan
 from tests.helpers.lattices import shaken_cubic
 
 
-def sample_of(packing, boundary=None):
-    none = np.zeros(len(packing), bool)
-    return Sample(packing, none if boundary is None else np.asarray(boundary))
-
-
 @pytest.fixture(scope="module")
 def packing():
     """216 grains of radii about 0.5 in a cube of about 6."""
@@ -24,7 +19,9 @@ def packing():
 
 
 def plan_of(packing, boundary=None, **options):
-    return make_plan(Settings(**options), sample_of(packing, boundary))
+    none = np.zeros(len(packing), bool)
+    sample = Sample(packing, none if boundary is None else np.asarray(boundary))
+    return make_plan(Settings(**options), sample)
 
 
 def test_lengths_relative_to_radii_are_those_of_the_grains_without_the_boundary():

@@ -24,9 +24,8 @@ NAN, INF = float("nan"), float("inf")
 @pytest.mark.parametrize(
     ("text", "length"),
     [
-        ("0.5", 0.5), (0.5, 0.5), (3, 3.0), ("1e-3", 1e-3), ("1rmin", 0.5), ("0.2rmean", 0.2),
-        ("1.5rmax", 3.0), (" 2 rmax ", 4.0), ("1e-1rmin", 0.05), (".5rmin", 0.25), ("0", 0.0),
-        (Length(3.0, "rmax"), 6.0),
+        ("0.5", 0.5), (3, 3.0), ("1e-3", 1e-3), ("1rmin", 0.5), ("0.2rmean", 0.2),
+        (" 2 rmax ", 4.0), (".5rmin", 0.25), ("0", 0.0), (Length(3.0, "rmax"), 6.0),
     ],
 )  # fmt: skip
 def test_lengths_are_numbers_or_relative_to_a_radius(text, length):
@@ -35,11 +34,8 @@ def test_lengths_are_numbers_or_relative_to_a_radius(text, length):
 
 @pytest.mark.parametrize(
     ("text", "axis"),
-    [
-        ("x", (1, 0, 0)), ("z", (0, 0, 1)), ("0,0,2", (0, 0, 1)),
-        ("1, 1, 0", (2**-0.5, 2**-0.5, 0)), ((0, -3.0, 0), (0, -1, 0)),
-    ],
-)  # fmt: skip
+    [("x", (1, 0, 0)), ("1, 1, 0", (2**-0.5, 2**-0.5, 0)), ((0, -3.0, 0), (0, -1, 0))],
+)
 def test_axes_are_unit_vectors(text, axis):
     np.testing.assert_allclose(Settings(axis=text).axis, axis)
 
@@ -47,9 +43,8 @@ def test_axes_are_unit_vectors(text, axis):
 @pytest.mark.parametrize(
     ("text", "frames"),
     [
-        (None, range(10)), ("2:5", [2, 3, 4]), (":3", [0, 1, 2]), ("7:", [7, 8, 9]),
-        ("::4", [0, 4, 8]), ("-2:", [8, 9]), (":-8", [0, 1]), ("3", [3]), ("-1", [9]), ("-3", [7]),
-        (2, [2]), (-1, [9]), ("::-1", range(9, -1, -1)), ("1 : 3", [1, 2]), (slice(1, 3), [1, 2]),
+        (None, range(10)), ("2:5", [2, 3, 4]), ("::4", [0, 4, 8]), ("-2:", [8, 9]), ("3", [3]),
+        ("-1", [9]), ("-3", [7]), (2, [2]), (-1, [9]), ("1 : 3", [1, 2]), (slice(1, 3), [1, 2]),
     ],
 )  # fmt: skip
 def test_frames_are_slices(text, frames):
@@ -60,9 +55,7 @@ def test_frames_are_slices(text, frames):
     ("text", "values", "units"),
     [
         ("0:3rmin:0.1rmin", [round(0.1 * k, 12) for k in range(31)], {"rmin"}),
-        ("0:1rmean:0.5rmean", [0, 0.5, 1], {"rmean"}),
         ("0.5:1:0.2", [0.5, 0.7, 0.9], {""}),
-        ("1rmin", [1], {"rmin"}),
         ("2rmax:2rmax:1rmax", [2], {"rmax"}),
         ("0.001,1rmin, 2rmean", [0.001, 1, 2], {"", "rmin", "rmean"}),
         ([0.5, "1rmin"], [0.5, 1], {"", "rmin"}),
