@@ -31,9 +31,9 @@ def calibrate(ask):
 
 def command_of(text: str) -> list[str]:
     """The recommended command, which is the last line."""
-    words = shlex.split(text.strip().splitlines()[-1])
-    assert words[:3] == ["scanfab", "compute", str(TRIAXIAL)]
-    return words[1:]
+    program, *words = shlex.split(text.splitlines()[-1])
+    assert (program, words[0]) == ("scanfab", "compute")
+    return words
 
 
 def test_rows_on_one_stream_and_words_on_the_other(calibrate, ask, tmp_path):
@@ -49,7 +49,7 @@ def test_rows_on_one_stream_and_words_on_the_other(calibrate, ask, tmp_path):
         assert [row[name] for row in printed] == [row[name] for row in best]
 
 
-@pytest.mark.parametrize("width", [70, 80, 100, 160])
+@pytest.mark.parametrize("width", [70, 100, 160])
 def test_tables_on_a_terminal_are_not_cut(calibrate, monkeypatch, width):
     monkeypatch.setenv("COLUMNS", str(width))
     monkeypatch.setattr("scanfab.cli.calibrate.is_readable", lambda: True)
@@ -72,7 +72,7 @@ def test_with_a_file_the_words_are_the_output(calibrate, cube, tmp_path):
     table = tmp_path / "steps.csv"
     out = calibrate(cube, *COARSE, "--verbose", "-o", table).out
     assert len(out.splitlines()) == 6
-    assert {"--variants", "c", "--spacing"} <= set(shlex.split(out.splitlines()[-1]))
+    assert {"--variants", "c", "--spacing"} <= set(command_of(out))
     assert "--verbose" not in out
     assert len(table.read_text().splitlines()) > 20
 
@@ -113,6 +113,5 @@ def test_an_rv_follows_the_strain_that_is_named(calibrate, ask, cube, tmp_path):
     """Else it could follow the cell or a boundary alone."""
     follows = ("--rv-follows", "strain", "--strain", "grains")
     assert "--strain grains" in calibrate(cube, *COARSE, *follows).err
-    picture = tmp_path / "view.png"
-    ask("view", cube, *follows, "--screenshot", picture)
-    assert picture.exists()
+    ask("view", cube, *follows, "--screenshot", tmp_path / "view.png")
+    assert (tmp_path / "view.png").exists()

@@ -68,10 +68,11 @@ def test_several_tables_stand_side_by_side_under_their_labels(compare, table):
     tables = [table(curve(name), f"{name}.jsonl") for name in ("one", "two")]
     assert [row["source"] for row in compare(*tables, "--summary").rows] == ["one", "two"]
     given = [table(curve(factor=k), f"{k}.jsonl") for k in (1.0, 2.0)]
-    assert "with --label NAME" in compare(*given, code=1).err
-    rows = compare(*given, "--summary", "--label", "coarse", "--label", "fine").rows
+    coarse, fine = ("--label", "coarse"), ("--label", "fine")
+    rows = compare(*given, "--summary", *coarse, *fine).rows
     assert [row["source"] for row in rows] == ["coarse", "fine"]
-    assert "expected one per table: 2, found 1" in compare(*given, "--label", "coarse", code=2).err
+    assert "with --label NAME" in compare(*given, code=1).err
+    assert "expected one per table: 2, found 1" in compare(*given, *fine, code=2).err
 
 
 def test_the_rows_of_one_cutoff_are_chosen(compare, table):
@@ -96,20 +97,20 @@ def test_variants_are_chosen(compare, table):
 
 def test_the_line_of_the_paper_can_be_left_out(compare, table, tmp_path):
     given, plot = table(curve()), tmp_path / "plot.svg"
-    draw = ["--figure", "correlation", "--plot", plot]
     for words, is_drawn in ([], True), (["--no-paper-line"], False):
-        compare(given, *draw, *words)
+        compare(given, "--figure", "correlation", "--plot", plot, *words)
         assert ("2017 paper: 0.096" in plot.read_text(encoding="utf-8")) == is_drawn
     assert "goes with --plot FILE" in compare(given, "--no-paper-line", code=2).err
 
 
-def test_a_dash_is_standard_input(compare, table, monkeypatch):
-    data = table(curve()).read_bytes()
+@pytest.mark.parametrize("is_empty", [False, True])
+def test_a_dash_is_standard_input(compare, table, monkeypatch, is_empty):
+    """An empty one is what a command that failed before it leaves."""
+    data = b"" if is_empty else table(curve()).read_bytes()
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data)))
-    assert len(compare("-").rows) == 5
-    # what a command that failed before it leaves
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO()))
-    assert compare("-", code=1).err == "scanfab: error: -: expected a table, found an empty file\n"
+    answer = compare("-", code=int(is_empty))
+    told = "scanfab: error: -: expected a table, found an empty file\n"
+    assert (len(answer.rows), answer.err) == ((0, told) if is_empty else (5, ""))
 
 
 def test_a_table_of_compare_is_called_so_and_one_without_a_void_fabric_fails(compare, table):

@@ -1,7 +1,5 @@
 """scanfab compute --cutoffs and --moment: rows for each cut-off from one pass, also resumed."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

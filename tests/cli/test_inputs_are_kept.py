@@ -1,7 +1,5 @@
 """No command writes over a file that it reads, by whatever name or link."""
 
-from __future__ import annotations
-
 import shutil
 
 import pytest

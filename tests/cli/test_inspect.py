@@ -1,7 +1,5 @@
 """scanfab inspect: JSON for scripts, lines for people."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

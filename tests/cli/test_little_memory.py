@@ -1,7 +1,5 @@
 """Little memory: one message, exit code 1, no traceback."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from functools import partial

@@ -1,7 +1,5 @@
 """scanfab map: its table, resume, ParaView files and figure."""
 
-from __future__ import annotations
-
 import pytest
 import pyvista
 

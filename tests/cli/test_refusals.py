@@ -1,7 +1,5 @@
 """What cannot be: one message and the exit code, nothing printed, and no file touched."""
 
-from __future__ import annotations
-
 import os
 import shlex
 

@@ -1,7 +1,5 @@
 """scanfab.toml beside the dumps: any option, below the command line."""
 
-from __future__ import annotations
-
 import pytest
 
 from scanfab.pipeline.record import read_manifest, repeat_command

@@ -1,7 +1,5 @@
 """Sources as users name them: globs, and standard input, which messages call by that name."""
 
-from __future__ import annotations
-
 import gzip
 import json
 

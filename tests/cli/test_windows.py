@@ -1,6 +1,4 @@
-"""Windows of every shape by the command line: tables, files for ParaView, pictures, refusals."""
-
-from __future__ import annotations
+"""Windows of every shape, and several: tables, comparison, files for ParaView, pictures."""
 
 import csv
 import json
@@ -10,6 +8,8 @@ import numpy as np
 import pytest
 import pyvista
 
+import scanfab
+from scanfab.cli.main import run
 from tests.helpers.truth import SAMPLE_DATA
 from tests.helpers.windows import OF_A_BOX, corners_of_a_box
 
@@ -102,3 +102,50 @@ def test_broken_surfaces_are_told(compute, tmp_path):
     assert "open.ply: the surface is not closed" in compute("--rv-shape", file, code=1)
     file.write_bytes(b"ply\nnonsense")
     assert "open.ply: cannot be read" in compute("--rv-shape", file, code=1)
+
+
+SMALL = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")
+OPTIONS = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "ac"}
+RVS = ("--rv", "0.7,0.5")
+
+
+@pytest.fixture(scope="module")
+def table(series, tmp_path_factory):
+    output = tmp_path_factory.mktemp("tables") / "table.csv"
+    vtk = output.with_name("vtk")
+    assert run(["compute", str(series), *SMALL, *RVS, "-o", str(output), "--vtk", str(vtk)]) == 0
+    return output
+
+
+def test_the_table_is_that_of_the_library(series, table):
+    computed = scanfab.compute(scanfab.read_series(series), rv=(0.5, 0.7), **OPTIONS)
+    assert scanfab.load(table) == computed
+    assert [(row.frame, row.variant, row.rv) for row in computed[:3]] == [
+        (0, "a", None), (0, "c", 0.5), (0, "c", 0.7),
+    ]  # fmt: skip
+
+
+def test_curves_are_told_apart_by_their_rv(table, series, ask, tmp_path):
+    rows = ask("compare", table, "--summary").rows
+    assert list(rows[0])[-1] == "rv"
+    assert [(row["variant"], row["rv"]) for row in rows] == [("a", ""), ("c", "0.5"), ("c", "0.7")]
+    found = scanfab.load(table).compare()
+    # each as from a table of its own
+    for rv in (0.5, 0.7):
+        (alone,) = scanfab.load(table).select(rv=rv).compare().summary
+        assert alone in list(found.summary)
+    assert "variant c RV 0.5: slope" in repr(found)
+    pairs = {row.variants for row in found.differences}
+    assert pairs == {"a-c RV 0.5", "a-c RV 0.7", "c RV 0.5-c RV 0.7"}
+
+
+def test_paraview_report_and_view_show_all(table, series, tmp_path, ask):
+    names = {path.name.rpartition("_")[0] for path in table.with_name("vtk").glob("*.vtp")}
+    for kind in ("window", "lines-c", "distribution-c", "tensors-c"):
+        assert {f"{kind}-rv0.5", f"{kind}-rv0.7"} <= names
+        assert kind not in names
+    assert "lines-a" in names
+    ask("report", table, "-o", tmp_path / "report.html")
+    assert "c RV 0.5" in (tmp_path / "report.html").read_text()
+    ask("view", series, *RVS, "--screenshot", tmp_path / "view.png")
+    assert (tmp_path / "view.png").stat().st_size > 10_000

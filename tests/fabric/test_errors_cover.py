@@ -1,7 +1,5 @@
 """Errors of all groups of columns against the scatter of drawn samples, in space and of discs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Branch and force fabric: closed forms, errors by drawing samples, and LAMMPS' compute fabric."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Orders 2 and 4: closed forms, and samples that are drawn from known harmonics."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

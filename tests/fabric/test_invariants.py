@@ -1,7 +1,5 @@
 """Invariants: closed forms, what few contacts give an isotropic sample, coverage of the errors."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A fabric of another package: its columns stand behind the own ones, in every kind of file."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

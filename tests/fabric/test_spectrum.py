@@ -1,7 +1,5 @@
 """The void fabric that near contacts predict, against closed forms and against scans."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Clumps from the dump to the table: what is counted, and what changes nothing."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

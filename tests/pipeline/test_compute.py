@@ -1,7 +1,5 @@
 """compute(): empty and changing frames, chosen frames, and refusals."""
 
-from __future__ import annotations
-
 import pytest
 
 import scanfab

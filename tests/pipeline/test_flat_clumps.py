@@ -1,7 +1,5 @@
 """Clumps of discs in a cell that leans, with all rules at once, against naive ways to count."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np
@@ -63,11 +61,10 @@ class Sample:
         return places(two) + image @ self.packing.cell.vectors - places(one)
 
     def stress(self):
-        contacts, total = self.packing.contacts, np.zeros((3, 3))
-        for (one, two), image, force in zip(
-            contacts.pairs, contacts.image, contacts.force, strict=True
-        ):
-            total += np.outer(force, self.branch(one, two, image)) / AREA
+        contacts = self.packing.contacts
+        places = zip(contacts.pairs, contacts.image, strict=True)
+        branch = np.array([self.branch(*pair, image) for pair, image in places])
+        total = contacts.force.T @ branch / AREA
         return 0.5 * (total + total.T)
 
     def solid_area(self, steps=300):

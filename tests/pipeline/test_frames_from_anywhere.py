@@ -1,7 +1,5 @@
 """Packings from lists and generators, frames in other processes, and frames one by one."""
 
-from __future__ import annotations
-
 import gzip
 import os
 import tempfile

@@ -1,7 +1,5 @@
 """Groups of further columns, as users ask for them: what is there, what is said where it is not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

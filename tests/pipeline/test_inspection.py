@@ -1,7 +1,5 @@
 """What is told of each frame without a scan, and its sample."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -90,16 +90,14 @@ def test_blocks_of_a_homogeneous_medium_agree_with_the_whole():
     count = random.poisson(0.15 * 20**3)
     position, radius = random.uniform(0, 20, (count, 3)), random.uniform(0.5, 1.5, count)
     packing = Packing(position, radius, cell=Cell([20.0] * 3))
-    beta = 0.15 * np.pi * 13 / 12
+    beta, solid = 0.15 * np.pi * 13 / 12, 1 - np.exp(-0.15 * 4 / 3 * np.pi * 1.25)
     for kind in ({"grid": (2, 2, 2)}, {"shells": 2}):
         table, told = mapped(packing, spacing=0.3, **kind)
         errors = np.hypot(table["alpha_vs_axial_se"], table["alpha_vs_axial_sample_se"])
         assert np.all(np.abs(table["alpha_vs_axial"]) < 4 * errors)
-        off = table["mean_length"] - (0.5 + 1 / beta)
         # the errors of eight parts are uncertain, and this sample's density is off by chance
-        assert np.all(np.abs(off) < 6 * table["mean_length_se"])
-        solid = 1 - np.exp(-0.15 * 4 / 3 * np.pi * 1.25)
-        assert np.all(np.abs(table["solid_fraction"] - solid) < 6 * table["solid_fraction_se"])
+        for name, expected in (("mean_length", 0.5 + 1 / beta), ("solid_fraction", solid)):
+            assert np.all(np.abs(table[name] - expected) < 6 * table[f"{name}_se"])
         assert not any("the sample is not homogeneous" in one for one in told if "no s" not in one)
 
 
@@ -188,20 +186,18 @@ def test_blocks_of_later_frames_and_of_frames_without_grains():
         ({"slices": 2, "rv": "0.4,0.6"}, "rv: expected one size, .* found 2"),
         ({"slices": 2, "with_": "state"}, "with_: a map has no further columns, found state"),
         ({"slice": 3}, "no option 'slice': did you mean 'slices'"),
+        ({"grid": (20, 1, 1)}, r"grid: makes blocks 0.45 thick.*choose fewer"),
+        ({"slices": 2, "axis": (1, 0, 1)}, "45 degrees off the axis"),
     ],
 )
-def test_what_is_no_map_is_refused(options, message):
-    with pytest.raises(TypeError if "slice" in options else SettingsError, match=message):
-        fabric_map(Packing(np.zeros((1, 3)), 1.0), **options)
+def test_what_is_no_map_is_refused(packing, options, message):
+    with pytest.raises((TypeError, SettingsError), match=message):
+        fabric_map(packing, **options)
 
 
-def test_blocks_smaller_than_a_grain_are_refused_and_thin_ones_doubted(packing):
-    with pytest.raises(SettingsError, match=r"grid: makes blocks 0.45 thick.*choose fewer"):
-        fabric_map(packing, grid=(20, 1, 1))
+def test_thin_blocks_are_doubted(packing):
     _, told = mapped(packing, slices=6)
     assert any("`slices` makes blocks 1.5 thick" in one for one in told)
-    with pytest.raises(SettingsError, match="45 degrees off the axis"):
-        fabric_map(packing, slices=2, axis=(1, 0, 1))
 
 
 def test_blocks_without_segments_are_empty_and_said():

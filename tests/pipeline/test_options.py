@@ -1,7 +1,5 @@
 """What the library says of its options: in the words of the command line, once, by filters."""
 
-from __future__ import annotations
-
 import inspect
 import warnings
 

@@ -24,11 +24,8 @@ def discs():
 def series_of(tmp_path, *heights, **options):
     """Frames whose grains lie at these heights, on a grid in x and y."""
     for step, z in enumerate(heights):
-        side = int(np.ceil(np.sqrt(len(z))))
-        place = [(2.0 * (k % side), 2.1 * (k // side)) for k in range(len(z))]
-        rows = [(k + 1, *xy, one, 1.0) for k, (xy, one) in enumerate(zip(place, z, strict=True))]
-        text = dump_text(rows, "id x y z radius", step=step)
-        (tmp_path / f"dump.{step}").write_text(text)
+        rows = [(k + 1, 2.0 * (k % 4), 2.1 * (k // 4), one, 1.0) for k, one in enumerate(z)]
+        (tmp_path / f"dump.{step}").write_text(dump_text(rows, "id x y z radius", step=step))
     return scanfab.read_series(tmp_path, **options)
 
 
@@ -36,16 +33,14 @@ def series_of(tmp_path, *heights, **options):
 @pytest.mark.parametrize(
     ("heights", "dim", "found"),
     [
-        ([[0.5] * 10], "auto", XY),
-        ([[0.5] * 9], "auto", SPACE),
-        ([[0.5] * 9], 2, XY),
-        ([[0.5] * 10], 3, SPACE),
+        ([[0.5] * 10], "auto", XY), ([[0.5] * 9], "auto", SPACE),
+        ([[0.5] * 9], 2, XY), ([[0.5] * 10], 3, SPACE),
         # the first frame that has grains decides for all, whichever is read first
         ([[], [0.5] * 12, [0.7] * 2], "auto", XY),
         ([[0.5] * 16, [*[0.5] * 15, 0.6]], "auto", r"dump.1: .*z = 0.5 and at z = 0.6: `dim=3`"),
         ([[*[0.5] * 15, 0.6]], 2, "do not lie in one coordinate plane"),
     ],
-)
+)  # fmt: skip
 def test_the_first_frame_decides(tmp_path, heights, dim, found):
     series = series_of(tmp_path, *heights, dim=dim)
     if isinstance(found, str):
@@ -92,13 +87,9 @@ def test_the_period_across_the_plane_is_ignored(discs):
     ("options", "message"),
     [
         ({"axis": "z"}, "axis: the axis z leads out of the plane x-y.*choose x, y"),
-        ({"axis": (1, 0, 1)}, "axis: .* leads out"),
         ({"rv_shape": "cylinder"}, "rv_shape: cylinder is no window for discs"),
         ({"rv_shape": "box", "rv_size": "1,2,3"}, "rv_size: expected two, A,B, full edges"),
-        (
-            {"directions": "lebedev:11"},
-            "directions: lebedev:11 is a rule for three dim.*such as 16",
-        ),
+        ({"directions": "lebedev:11"}, "directions: lebedev:11 is a rule for three dim.*as 16"),
         ({"rv_center": (7, 7, 3)}, "rv_center: lies outside the plane x-y.*z = 0, found 3"),
     ],
 )
@@ -121,13 +112,11 @@ def test_rv_sizes_and_solid_fraction():
 @pytest.mark.parametrize("follows", ["cell", "grains"])
 def test_the_rv_follows_the_strain(discs, follows):
     position, radius = discs
-    squeeze = np.array([1.1, 0.9])
     frames = [
-        Packing(position * f, radius, cell=Cell([*(14 * f), 1.0])) for f in (np.ones(2), squeeze)
+        Packing(position * squeeze, radius, cell=Cell([*(14 * squeeze), 1.0]))
+        for squeeze in (np.ones(2), np.array([1.1, 0.9]))
     ]
-    first, last = compute(
-        frames, variants="c", rv_follows="strain", strain=follows, rv_shape="sphere", **FAST
-    )
+    first, last = compute(frames, variants="c", rv_follows="strain", strain=follows, **FAST)
     assert last.grains == pytest.approx(first.grains, abs=3)
     assert last.strain == pytest.approx(0.1, abs=1e-9)
     # half the difference of the principal strains, as the deviator stress works on it

@@ -1,7 +1,5 @@
 """The rule for rattlers, chosen by name: a made-up one of another package, too."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The manifest: what a result was made of, and from it back to the command and the source."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import platform

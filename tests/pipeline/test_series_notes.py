@@ -1,7 +1,5 @@
 """What is said of a series: each note once, at its first frame, and in the end its frames."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Several RVs in one pass: each as if alone, along the same lines."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Axial strain by each mode or from a file, and shear of periodic cells, which may be flipped."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np
@@ -20,7 +18,6 @@ SCAN = {"variants": "a", "directions": 9, "spacing": "1rmin", "cutoff": 0}
 OBLIQUE = (3**-0.5,) * 3
 ALL, TWO, NONE = (True, True, True), (True, True, False), (False, False, False)
 
-WRONG = ["10,high", ",0.1", "10", "10.7,0.1", "1e999,0.1", "10,0.\0", f"10,{'9' * 140_000}"]
 
 pytestmark = pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
 
@@ -44,17 +41,11 @@ def strain(periodic=None, boundary="type=2", **options):
 @pytest.mark.parametrize(
     ("periodic", "options", "expected"),
     [
-        (ALL, {}, 0.3),
-        (ALL, {"axis": "y"}, 0.4),
-        (TWO, {}, 0.2),
-        (NONE, {"strain": "cell"}, 0.3),
-        (ALL, {"strain": "boundary"}, 0.2),
-        (NONE, {"axis": OBLIQUE}, 0.2),
-        (None, {}, 0.2),
-        (None, {"strain": "grains"}, 0.1),
-        (None, {"boundary": ()}, np.nan),
+        (ALL, {}, 0.3), (ALL, {"axis": "y"}, 0.4), (TWO, {}, 0.2), (NONE, {"strain": "cell"}, 0.3),
+        (ALL, {"strain": "boundary"}, 0.2), (NONE, {"axis": OBLIQUE}, 0.2), (None, {}, 0.2),
+        (None, {"strain": "grains"}, 0.1), (None, {"boundary": ()}, np.nan),
     ],
-)
+)  # fmt: skip
 def test_strain_is_by_the_cell_that_repeats_else_by_the_boundary(periodic, options, expected):
     """A cell by its diagonal entry, particles by the extent of their centres along the axis."""
     assert strain(periodic, **options) == pytest.approx(expected, nan_ok=True)
@@ -91,15 +82,18 @@ def test_a_file_names_strains_by_step_or_frame(tmp_path, text, expected):
     np.testing.assert_array_equal(found, expected)
 
 
+WRONG = ["10,high", ",0.1", "10", "10.7,0.1", "1e999,0.1", "10,0.\0", f"10,{'9' * 140_000}"]
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("", "expected a table"),
-        ("step,epsilon\n1,2\n", "expected the columns step or frame, and strain"),
-        ("time,strain\n1,2\n", "expected the columns step or frame, and strain"),
+        *((f"{names}\n1,2\n", "expected the columns step or frame, and strain")
+          for names in ("step,epsilon", "time,strain")),
         *((f"step,strain\n0,0\n{row}\n", "line 3: expected") for row in WRONG),
     ],
-)
+)  # fmt: skip
 def test_a_file_that_is_no_table_of_strains_is_an_error_by_its_line(tmp_path, text, message):
     file = write(tmp_path / "s.csv", text)
     with pytest.raises(ReadError, match=rf"s\.csv(, |: ){message}.{{,100}}"):

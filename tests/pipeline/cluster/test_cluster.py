@@ -12,6 +12,7 @@ import time
 import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from scanfab.cli.main import run
 from scanfab.pipeline import cluster as module
 from tests.helpers.dask_cluster import DaskCluster
 from tests.helpers.dumps import shaken_cubic
-from tests.helpers.growing import SAMPLE
+from tests.helpers.growing import SAMPLE, meanwhile
 from tests.helpers.interruptions import write_series
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin")
@@ -88,13 +89,9 @@ def after_a_row():
     threads = []
 
     def after_a_row(act: Callable[[], object]) -> None:
-        def wait() -> None:
-            part = Path("t.csv.part")
-            wait_until(lambda: part.exists() and part.stat().st_size > 0)
-            act()
-
-        threads.append(threading.Thread(target=wait))
-        threads[-1].start()
+        part = Path("t.csv.part")
+        there = partial(wait_until, lambda: part.exists() and part.stat().st_size > 0)
+        threads.append(meanwhile([there, act]))
 
     yield after_a_row
     for one in threads:
@@ -117,12 +114,12 @@ def test_every_executor_serves(executor, folder):
     """Frames in files, packings from anywhere, periodic ones; that of Dask itself too."""
     packings = [frame.read() for frame in scanfab.read_series("dumps")]
     expected = scanfab.compute(packings, **QUICK)
-    assert scanfab.compute(iter(packings), executor=executor, **QUICK) == expected
-    dask = executor.client.get_executor()
-    assert scanfab.compute(iter(packings), executor=dask, **QUICK) == expected
+    for one in (executor, executor.client.get_executor()):
+        assert scanfab.compute(iter(packings), executor=one, **QUICK) == expected
     frame = scanfab.read_series(SAMPLE / "liggghts_periodic")[-1:]
-    far = scanfab.compute(frame, executor=executor, tolerance=5e-3)
-    assert far == scanfab.compute(frame, tolerance=5e-3)
+    words = {"tolerance": 5e-3, "variants": "a"}
+    far = scanfab.compute(frame, executor=executor, **words)
+    assert far == scanfab.compute(frame, **words)
 
 
 def test_a_running_simulation(cluster, is_same):
@@ -132,16 +129,15 @@ def test_a_running_simulation(cluster, is_same):
 
 
 def test_a_frame_that_cannot_be_read_goes_by_on_error(cluster, folder, capsys):
-    lines = Path("dumps/dump_300.txt").read_text().splitlines(keepends=True)
-    Path("dumps/dump_300.txt").write_text("".join([*lines[:20], "1 2 x\n", *lines[21:]]))
-    words = ("dumps", *FAST, "--scheduler", cluster.address)
-    assert compute(*words, "--on-error", "skip") == 1
+    broken = Path("dumps/dump_300.txt")
+    broken.write_text(broken.read_text()[:-40])
+    words, skip = ("dumps", *FAST), ("--on-error", "skip")
+    address = ("--scheduler", cluster.address)
+    assert compute(*words, *address, *skip) == compute(*words, *skip, output="one.csv") == 1
     said = capsys.readouterr().err
-    assert "frame 3 skipped: " in said
-    assert "dump_300.txt" in said
-    assert compute("dumps", *FAST, "--on-error", "skip", output="one.csv") == 1
+    assert said.count("frame 3 skipped: ") == 2
     assert Path("t.csv").read_bytes() == Path("one.csv").read_bytes()
-    assert compute(*words, output="stopped.csv") == 1
+    assert compute(*words, *address, output="stopped.csv") == 1
     assert "dump_300.txt" in capsys.readouterr().err
 
 
@@ -161,11 +157,7 @@ def test_packings_do_not_pile_up(executor):
 
 
 def test_a_worker_that_dies_costs_its_frames_again(cluster, is_same, after_a_row):
-    def replace_one() -> None:
-        cluster.add()
-        cluster.kill()
-
-    after_a_row(replace_one)
+    after_a_row(lambda: (cluster.add(), cluster.kill()))
     assert compute("dumps", *FAST, "--scheduler-file", str(cluster.file)) == 0
     assert is_same()
 
@@ -183,10 +175,7 @@ def test_a_frame_that_kills_its_workers_is_named(cluster, folder):
     for _ in range(2):
         cluster.add()
     died = "frame 1 skipped: the workers that computed it died, 2 one after the other"
-    with (
-        scanfab.dask_executor(scheduler_file=cluster.file) as executor,
-        pytest.warns(match=died),
-    ):
+    with scanfab.dask_executor(scheduler_file=cluster.file) as executor, pytest.warns(match=died):
         far = scanfab.compute(packings, executor=executor, on_error="skip", **QUICK)
     assert {row.frame for row in far} == {0, 2}
     cluster.forget_the_dead()
@@ -210,9 +199,8 @@ def test_a_scheduler_that_hangs_is_left(
 
 
 def test_workers_come_late_and_the_scheduler_dies(folder, is_same, after_a_row, capsys):
-    (folder / "first").mkdir()
     with DaskCluster(folder / "first", workers=0) as first:
-        timer = threading.Timer(1.0, first.add)
+        timer = threading.Timer(0.5, first.add)
         timer.start()
         after_a_row(first.kill_scheduler)
         assert compute("dumps", *FAST, "--quiet", "--scheduler", first.address) == 1
@@ -221,7 +209,6 @@ def test_workers_come_late_and_the_scheduler_dies(folder, is_same, after_a_row, 
     assert "has no workers yet: frames wait for them, without a limit" in said
     assert "the scheduler has gone while frames were computed" in said
     assert said.count("error") == 1
-    (folder / "next").mkdir()
     with DaskCluster(folder / "next", workers=1) as other:
         assert compute("dumps", *FAST, "--scheduler-file", str(other.file), "--resume") == 0
     assert is_same()
