@@ -62,7 +62,6 @@ def changed(column: int, value: object) -> list[list[object]]:
         (None, ""),
         ("7 1 0.5", ", line 34: "),
         ("25 1 nan 0.5 0.5 0.5", "grain 25.*nan"),
-        ("25 1 0.5 abc 0.5 0.5", "line 34: expected a number in the column y, "),
         ("25 1 0.5 0.5 0.5 -0.5", "grain 25: the radius"),
         ("24 1 0.5 0.5 0.5 0.5", "the id 24 occurs twice"),
     ],
@@ -89,21 +88,6 @@ def test_a_count_that_is_too_large_is_refused_at_once(tmp_path, refusal, count):
     assert ("expected a whole number" if is_huge else f"counts {count} rows") in message
     assert seconds < 5
     assert most < 50e6
-
-
-@pytest.mark.parametrize(
-    ("names", "words"),
-    [
-        ([], [": the folder holds no files"]),
-        (["one_0.txt", "one_1.txt", "two_0.txt"], ["/one_*.txt", "/two_0.txt"]),
-        (["dump_7.txt", "dump_07.txt"], ["/dump_07.txt", "/dump_7.txt"]),
-    ],
-)
-def test_a_folder_without_a_series_or_with_several(tmp_path, refusal, names, words):
-    for name in names:
-        grains(tmp_path, name=name)
-    message = refusal(tmp_path)
-    assert all(f"{tmp_path}{word}" in message for word in words)
 
 
 @pytest.fixture

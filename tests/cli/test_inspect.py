@@ -60,10 +60,3 @@ def test_it_takes_the_options_of_compute(tmp_path, frames):
     assert frame["radius_max"] == 0.2
     assert frame["periodic"] == [False, False, True]
     assert frame["rv_shape"].startswith("cylinder of radius ")
-
-
-def test_nothing_is_printed_of_a_broken_file(tmp_path, ask):
-    file = write(tmp_path / "dump.txt", dump_text()[:-20])
-    answer = ask("inspect", file, "--json", code=1)
-    assert answer.out == ""
-    assert str(file) in answer.err

@@ -34,22 +34,16 @@ def folder(tmp_path, monkeypatch):
         ("compute cube --tolerence 1", 2, "No such option '--tolerence'"),
         # values of options
         ("compute cube --variants xyz", 2, "--variants: expected letters out of abcd, found 'xyz'"),
-        ("compute cube --directions nonsense:3", 2, "--directions: no rule is called 'nonsense:3'"),
-        ("compute cube --boundary mask", 2, "--boundary: expected COLUMN=VALUE"),
-        ("compute cube --frames a:b", 2, "--frames: expected a slice"),
         ("compute cube --format nonsense", 2, "there is no reader called 'nonsense', only edem"),
         ("compute cube --cell 1 2", 2, "--cell: expected three lengths"),
         ("compute cube --columns radius", 2, "--columns: expected NAME=COLUMN"),
-        ("compute cube --columns x=1,x=2", 2, "--columns: expected one column for x"),
         ("compute cube --follow-for -1", 2, "--follow-for"),
         ("compute cube cube/dump_0.txt --follow", 2, "--follow takes one folder, or one file"),
         ("compute cube --rv -1 -o out.csv", 2, "--rv: expected a fraction above 0"),
         ("compute cube --rv-size 1,2,3", 2, "takes no sizes: choose --rv-radius"),
-        ("compute cube --rv-axis x", 2, "leave out --rv-axis, or choose --rv-shape cylinder"),
         ("map cube --slices 2 --frame 1", 2, "--frame: there is no frame 1: cube has 1, counted"),
         ("map cube", 2, "exactly one of --grid, --slices and --shells, found none"),
         ("map cube --grid 2,2", 2, "three numbers of blocks, such as 4,4,8, found '2,2'"),
-        ("calibrate cube --tolerance 0", 2, "tolerance: expected auto, or a number above 0"),
         ("view cube --rv -1 --screenshot x.png", 2, "rv: expected a fraction above 0"),
         # files to be written
         ("compute cube -o table.docx", 2, "results can be written as .csv"),
@@ -70,19 +64,12 @@ def folder(tmp_path, monkeypatch):
         ("compare nowhere.csv", 2, "nowhere.csv"),
         ("view cube --screenshot x.jpg", 2, "screenshots are PNG files"),
         # what does not fit the sample
-        ("compute cube --max-chords 5", 1, "max-chords: expected at least"),
         ("compute cube --spacing 50 -o out.csv", 1, "spacing: expected a length from"),
-        ("compute cube --spacing 1e-6 --directions 20", 1, "choose a wider spacing"),
         ("compute cube --boundary mask=3", 1, "--boundary: there is no column 'mask'; the columns"),
-        ("map cube --grid 100,100,100", 1, "so that they are at least 4 mean radii thick"),
-        ("calibrate {TRIAXIAL} --frame 7 --boundary mask=3", 1, "the series has no frame in 7:8"),
-        ("calibrate {TRIAXIAL} --rv 3 --boundary mask=3", 1, "has no void fabric at any cut-off"),
-        ("calibrate {TRIAXIAL} --rv 0.5,0.6", 1, "all but one --rv"),
         ("view cube --screenshot x.png --frame 9", 1, "there is no frame 9"),
         # what is of space, of discs
         ("compute {DISCS} --axis 0,1,1", 2, "--axis: the axis (0, 0.7071, 0.7071) leads out of"),
         ("map {DISCS}", 2, "a map needs spheres, but all grains are discs"),
-        ("map {DISCS} --grid 2,2,1", 1, "needs spheres, but all grains are discs"),
     ],
 )
 def test_one_message_and_nothing_else(folder, ask, line, code, message):

@@ -44,21 +44,15 @@ def last_frame(series, dumps):
 @pytest.fixture
 def compute(dumps, monkeypatch, capsys):
     """Runs the command; says its exit code, and how many frames it has computed."""
-    computed = []
-
-    def counted(*words, **more):
-        found = compute_frame(*words, **more)
-        computed.append(1)
-        return found
-
+    counted = Mock(wraps=compute_frame)
     monkeypatch.setattr("scanfab.pipeline.compute.compute_frame", counted)
 
     def compute(output: str, *words: str, sources: tuple[str, ...] = ("dumps",), told: str = ""):
-        computed.clear()
+        counted.reset_mock()
         capsys.readouterr()
         code = run(["compute", *sources, *FAST, "-o", output, *words])
         assert told in capsys.readouterr().err
-        return code, len(computed)
+        return code, counted.call_count
 
     return compute
 
@@ -90,6 +84,18 @@ def is_whole(compute):
     return is_whole
 
 
+@pytest.fixture
+def resumes(compute, is_whole):
+    """Whether --resume computes so many frames, and ends with what one run makes."""
+
+    def resumes(output: str, frames: int, *words: str, code: int = 0, **more: Any) -> bool:
+        found = compute(output, *words, "--resume", **more)
+        more.pop("told", None)
+        return found == (code, frames) and is_whole(output, *words, **more)
+
+    return resumes
+
+
 # FILE.part
 
 
@@ -108,37 +114,33 @@ def test_a_run_that_is_killed(dumps, compute, is_whole):
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".json", ".parquet"])
-def test_an_interrupted_run_is_gone_on_with(compute, stop, last_frame, is_whole, suffix):
+def test_an_interrupted_run_is_gone_on_with(stop, last_frame, resumes, suffix):
     """And frames that come later are added to the complete table."""
     table = f"table{suffix}"
     stop(table, told="interrupted after 2 of 4 frames; the same command with --resume goes on\n")
     assert not Path(table).exists()
     with open(f"{table}.part", "ab") as part:
         part.write(b'{"inputs": [], "rows"')  # killed while it wrote a frame
-    assert compute(table, "--resume", "--workers", "1") == (0, 2)
-    assert is_whole(table)
+    assert resumes(table, 2, "--workers", "1")
     last_frame()
     for computed in (1, 0):
-        assert compute(table, "--resume", "--workers", "1") == (0, computed)
-        assert is_whole(table)
+        assert resumes(table, computed, "--workers", "1")
 
 
-def test_without_a_part_everything_is_computed(compute, is_whole):
-    assert compute("table.csv", "--resume") == (0, 4)
-    assert is_whole("table.csv")
+def test_without_a_part_everything_is_computed(compute, resumes):
+    assert resumes("table.csv", 4)
     told = "table.csv: the table that is there will be replaced"
     assert compute("table.csv", told=told) == (0, 4)
 
 
-def test_without_resume_the_part_is_kept_under_another_name(compute, stop, is_whole):
+def test_without_resume_the_part_is_kept_under_another_name(compute, stop, resumes):
     """And what made it goes on with it there."""
     told = "note: table.csv.part: 2 finished frames of an earlier run are kept as table.1.csv"
     stop("table.csv", "--seed", "1")
     stop("table.csv", "--seed", "2", told=told)
     assert compute("table.csv", told="by -o table.2.csv --resume") == (0, 4)
     for number in ("1", "2"):
-        assert compute(f"table.{number}.csv", "--seed", number, "--resume") == (0, 2)
-        assert is_whole(f"table.{number}.csv", "--seed", number)
+        assert resumes(f"table.{number}.csv", 2, "--seed", number)
 
 
 def test_how_far_an_interrupted_run_is_is_told(dumps, stop, compute, monkeypatch, capsys):
@@ -178,14 +180,13 @@ def test_a_damaged_part_is_refused_and_kept(compute, stop, text):
     assert Path("table.1.csv.part").read_bytes() == before
 
 
-def test_frames_that_a_part_has_and_nobody_chooses_now_are_left_out(dumps, stop, compute, is_whole):
+def test_frames_that_a_part_has_and_nobody_chooses_now_are_left_out(dumps, stop, resumes):
     stop("table.csv", "--frames=-3:")
     shutil.copy(dumps / "dump_300.txt", dumps / "dump_500.txt")
-    assert compute("table.csv", "--frames=-3:", "--resume") == (0, 2)
-    assert is_whole("table.csv", "--frames=-3:")
+    assert resumes("table.csv", 2, "--frames=-3:")
 
 
-def test_dumps_behind_the_rows_of_a_part_may_change(dumps, stop, compute, is_whole):
+def test_dumps_behind_the_rows_of_a_part_may_change(dumps, stop, resumes):
     """Those of an earlier source too, if they are new there."""
     Path("first").mkdir()
     shutil.copy(dumps / "dump_0.txt", "first")
@@ -195,8 +196,7 @@ def test_dumps_behind_the_rows_of_a_part_may_change(dumps, stop, compute, is_who
     last.write_text(last.read_text().replace(" 0.5", " 0.49", 1))
     shutil.copy(last, dumps / "dump_400.txt")
     shutil.copy(dumps / "dump_100.txt", "first")
-    assert compute("table.csv", "--resume", **both) == (0, 5)
-    assert is_whole("table.csv", **both)
+    assert resumes("table.csv", 5, **both)
 
 
 # a complete FILE
@@ -234,25 +234,22 @@ def test_a_table_that_does_not_tell_what_made_it_is_refused(compute):
     assert compute("few.csv", "--resume", told="there is no few.csv.manifest.json") == (2, 0)
 
 
-def test_a_frame_that_was_skipped_is_tried_again(compute, dumps, stop, is_whole):
+def test_a_frame_that_was_skipped_is_tried_again(compute, dumps, stop, resumes):
     """As long as it cannot be read the exit code is 1; once it can, its rows are there."""
     second, skip = dumps / "dump_100.txt", ("--on-error", "skip")
     good = second.read_text()
     second.write_text("ITEM: TIMESTEP\n")
     stop("table.csv", *skip, row=5)
     for computed in (1, 0):
-        told = "frame 1 skipped"
-        assert compute("table.csv", *skip, "--resume", told=told) == (1, computed)
-        assert is_whole("table.csv", *skip)
+        assert resumes("table.csv", computed, *skip, code=1, told="frame 1 skipped")
     # with two frames in place of one, later frames would have other numbers
     second.write_text(good + good.replace("TIMESTEP\n100", "TIMESTEP\n150"))
     assert compute("table.csv", *skip, "--resume") == (2, 0)
     second.write_text(good)
-    assert compute("table.csv", *skip, "--resume") == (0, 1)
-    assert is_whole("table.csv", *skip)
+    assert resumes("table.csv", 1, *skip)
 
 
-def test_part_and_table_are_gone_on_with_together(compute, stop, last_frame, is_whole):
+def test_part_and_table_are_gone_on_with_together(compute, stop, last_frame, resumes):
     assert compute("table.csv", "--frames=2:4") == (0, 2)
     before, more = Path("table.csv").read_bytes(), ("--resume", "--workers", "1")
     last_frame()
@@ -261,20 +258,18 @@ def test_part_and_table_are_gone_on_with_together(compute, stop, last_frame, is_
     told = "interrupted after 3 of 5 frames; the same command goes on"
     stop("table.csv", *more, row=4, told=told)
     assert Path("table.csv").read_bytes() == before
-    assert compute("table.csv", "--resume") == (0, 2)
-    assert is_whole("table.csv")
+    assert resumes("table.csv", 2)
 
 
-def test_columns_digits_and_warnings_are_those_of_the_table(compute, last_frame, is_whole):
+def test_columns_digits_and_warnings_are_those_of_the_table(compute, last_frame, resumes):
     """Columns that were left out are no failure."""
     words = ("--fields", "source,frame,variant,strain", "--digits", "4")
     path = Path("table.csv.manifest.json")
     assert compute("table.csv", *words) == (0, 4)
     path.write_text(json.dumps({**json.loads(path.read_text()), "warnings": ["frame 1: this"]}))
     last_frame()
-    assert compute("table.csv", *words, "--resume") == (0, 1)
+    assert resumes("table.csv", 1, *words)
     assert read_manifest(Path("table.csv"))["warnings"] == ["frame 1: this"]
-    assert is_whole("table.csv", *words)
 
 
 def test_a_figure_needs_its_columns(compute):
@@ -291,7 +286,7 @@ def test_a_figure_needs_its_columns(compute):
 
 @pytest.mark.parametrize("last", ["job.write_rows", "job.write_manifest", "record.PartFile.remove"])
 @pytest.mark.parametrize("is_new", [True, False])
-def test_a_run_killed_before_its_last_step(compute, monkeypatch, is_whole, capsys, last, is_new):
+def test_a_run_killed_before_its_last_step(compute, monkeypatch, resumes, capsys, last, is_new):
     """FILE.part is still there: merge refuses the table, and --resume gives the same bytes."""
     # a table of other settings is not to be taken for one of these
     assert is_new or compute("t.csv", "--seed", "3") == (0, 4)
@@ -300,8 +295,7 @@ def test_a_run_killed_before_its_last_step(compute, monkeypatch, is_whole, capsy
         assert compute("t.csv") == (130, 4)
     assert run(["merge", "t.csv", "-o", "merged.csv"]) == 1
     assert "t.csv: is not finished" in capsys.readouterr().err
-    assert compute("t.csv", "--resume") == (0, 0)
-    assert is_whole("t.csv")
+    assert resumes("t.csv", 0)
 
 
 # what both have in common

@@ -22,9 +22,7 @@ def yade():
 
 
 def names(*groups):
-    return [
-        column.name for group in GROUP_NAMES if group in groups for column in GROUPS[group].columns
-    ]
+    return [one.name for group in GROUP_NAMES if group in groups for one in GROUPS[group].columns]
 
 
 @pytest.mark.parametrize("asked", ["forces,state", ["state", "forces"]])

@@ -26,6 +26,10 @@ def test_grains_contacts_and_rattlers_are_counted(tmp_path):
     assert report.coordination == pytest.approx(4 / 3)
     assert (report.radius_min, report.radius_max) == (0.1, 0.1)
     assert report.contacts_from == "file"
+    (tmp_path / "pairs.txt").unlink()
+    (empty,) = reports(tmp_path, [dump_text([])])
+    assert empty.grains == 0
+    assert empty.radius_min is empty.radius_max is empty.coordination is None
 
 
 def test_a_boundary_that_fits_nothing_in_any_frame_is_an_error_or_the_rule_is_told(tmp_path):
@@ -36,12 +40,8 @@ def test_a_boundary_that_fits_nothing_in_any_frame_is_an_error_or_the_rule_is_to
         (report,) = reports(tmp_path, [dump_text()], boundary=["type=2", "type=9"])
     assert len(told) == 1
     assert (report.grains, report.boundary, report.warnings) == (2, 1, [])
-
-
-def test_a_boundary_that_fits_nothing_in_one_frame_is_a_warning(tmp_path):
-    """Here a plate that is put in later."""
-    plate = [*ROWS, (4, 9, 0.9, 0.5, 0.5, 0.1)]
-    texts = [dump_text(), dump_text(plate, step=1)]
+    # a plate may be put in later
+    texts = [dump_text(), dump_text([*ROWS, (4, 9, 0.9, 0.5, 0.5, 0.1)], step=1)]
     first, second = reports(tmp_path, texts, boundary="type=9")
     assert first.warnings == ["`boundary`: no particle has type=9: type is 1 or 2"]
     assert (first.boundary, second.boundary, second.warnings) == (0, 1, [])
@@ -67,14 +67,6 @@ def test_a_sheet_of_discs_is_no_doubt():
     assert report.warnings == []
     assert (report.periodic, report.low[2], report.high[2]) == ([True, True, False], 0.0, 0.0)
     assert report.rv_center[2] == 0.0
-
-
-def test_an_empty_frame_has_no_radii(tmp_path):
-    empty, full = reports(tmp_path, [dump_text([]), dump_text(step=1)])
-    assert (empty.grains, empty.radius_min, empty.radius_max, empty.coordination) == (
-        0, None, None, None,
-    )  # fmt: skip
-    assert full.grains == len(ROWS)
 
 
 def test_options_that_do_not_exist_or_fit_are_refused_at_once(tmp_path):

@@ -58,14 +58,6 @@ def test_the_whole_is_measured_beside_the_smallest(ball):
             assert own.alpha_vs_axial_se == pytest.approx(row.alpha_vs_axial_se, rel=1e-9)
 
 
-def test_rows_come_by_variant_and_size(ball):
-    table = compute([ball, ball], rv="0.7, 0.4", variants="acd", cutoffs="0,0.5rmin", **FIXED)
-    expected = [("a", None)] * 2
-    expected += [(name, rv) for name in "cd" for rv in (0.4, 0.7) for _ in range(2)]
-    assert [(row.variant, row.rv) for row in table[:10]] == expected
-    assert [row.frame for row in table] == [0] * 10 + [1] * 10
-
-
 def test_frames_without_grains_have_a_row_for_each(ball):
     nothing = Packing(np.zeros((0, 3)), np.zeros(0))
     table = compute([nothing, ball], rv=FRACTIONS, variants="ac", **FIXED)
