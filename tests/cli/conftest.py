@@ -1,15 +1,17 @@
-"""A command of scanfab as tests ask for it."""
+"""A command of scanfab as tests ask for it, and a series that most of them read."""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Callable
+from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
 from scanfab.cli.main import run
+from tests.helpers.interruptions import write_series
 
 
 class Answer(NamedTuple):
@@ -41,3 +43,9 @@ def ask(capsys) -> Callable[..., Answer]:
         return answer
 
     return call
+
+
+@pytest.fixture(scope="session")
+def series(tmp_path_factory) -> Path:
+    """A folder of five small frames, which no test changes."""
+    return write_series(tmp_path_factory.mktemp("cli") / "series", 5)

@@ -14,7 +14,7 @@ from tests.cli.test_windows import surface
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.truth import TRIAXIAL
 
-QUICK = ("--boundary", "mask=3", "--tolerance", "5e-3", "--max-chords", "1e7", "--workers", "1")
+QUICK = ("--boundary", "mask=3", "--tolerance", "1e-2", "--max-chords", "3e6", "--workers", "1")
 STEP = StepRow(
     source="s", frame=0, ladder="spacing", value=0.1, variant="c", rule="icosahedral:9", degree=5,
     rule_bias=1.2e-4, directions=46, replicates=16, spacing=1e-4, cutoff=1e-3, rv_radius=None,
@@ -31,9 +31,9 @@ def calibrate(ask):
 
 def command_of(text: str) -> list[str]:
     """The recommended command, which is the last line."""
-    words = shlex.split(text.strip().splitlines()[-1])
-    assert words[:3] == ["scanfab", "compute", str(TRIAXIAL)]
-    return words[1:]
+    program, *words = shlex.split(text.splitlines()[-1])
+    assert (program, words[0]) == ("scanfab", "compute")
+    return words
 
 
 def test_rows_on_one_stream_and_words_on_the_other(calibrate, ask, tmp_path):
@@ -49,7 +49,7 @@ def test_rows_on_one_stream_and_words_on_the_other(calibrate, ask, tmp_path):
         assert [row[name] for row in printed] == [row[name] for row in best]
 
 
-@pytest.mark.parametrize("width", [70, 80, 100, 160])
+@pytest.mark.parametrize("width", [70, 100, 160])
 def test_tables_on_a_terminal_are_not_cut(calibrate, monkeypatch, width):
     monkeypatch.setenv("COLUMNS", str(width))
     monkeypatch.setattr("scanfab.cli.calibrate.is_readable", lambda: True)
@@ -68,13 +68,12 @@ def test_tables_on_a_terminal_are_not_cut(calibrate, monkeypatch, width):
     assert all(present) == (width == 160)
 
 
-def test_with_a_file_the_words_are_the_output(calibrate, tmp_path):
-    table, word = tmp_path / "steps.csv", "--verbose"
-    words = ("--frame", "3", "--variants", "c", word)
-    out = calibrate(TRIAXIAL, *QUICK, *words, "-o", table).out
+def test_with_a_file_the_words_are_the_output(calibrate, cube, tmp_path):
+    table = tmp_path / "steps.csv"
+    out = calibrate(cube, *COARSE, "--verbose", "-o", table).out
     assert len(out.splitlines()) == 6
     assert {"--variants", "c", "--spacing"} <= set(command_of(out))
-    assert word not in out
+    assert "--verbose" not in out
     assert len(table.read_text().splitlines()) > 20
 
 
@@ -86,8 +85,7 @@ def test_with_a_file_the_words_are_the_output(calibrate, tmp_path):
     ],
 )
 def test_a_dump_of_one_grain_or_none_is_one_message(calibrate, tmp_path, rows, message):
-    write(tmp_path / "dump_0.txt", dump_text(rows, box=((0, 4),) * 3))
-    answer = calibrate(tmp_path, code=1)
+    answer = calibrate(write(tmp_path / "dump", dump_text(rows, box=((0, 4),) * 3)), code=1)
     assert answer.out == ""
     assert message in answer.err
 
@@ -105,16 +103,15 @@ COARSE = ("--variants", "c", "--tolerance", "2e-2", "--max-chords", "1e6", "--cu
 
 def test_the_size_of_an_rv_that_a_file_draws_is_left_out(calibrate, cube, tmp_path):
     words = ("--rv-shape", surface(tmp_path / "box.stl", half=1.2), "--rv-center", "2,2,2")
-    answer = calibrate(cube, *COARSE, *words, "--edge", "ends")
+    answer = calibrate(cube, *COARSE, *words, "--edge", "start")
     assert {row["ladder"] for row in answer.rows} >= {"spacing", "cutoff"}
     assert "rv" not in {row["ladder"] for row in answer.rows}
-    assert "--edge ends" in answer.err.splitlines()[-1]
+    assert "--edge start" in answer.err.splitlines()[-1]
 
 
 def test_an_rv_follows_the_strain_that_is_named(calibrate, ask, cube, tmp_path):
     """Else it could follow the cell or a boundary alone."""
     follows = ("--rv-follows", "strain", "--strain", "grains")
     assert "--strain grains" in calibrate(cube, *COARSE, *follows).err
-    picture = tmp_path / "view.png"
-    ask("view", cube, *follows, "--screenshot", picture)
-    assert picture.exists()
+    ask("view", cube, *follows, "--screenshot", tmp_path / "view.png")
+    assert (tmp_path / "view.png").exists()

@@ -49,9 +49,8 @@ def test_a_shell_completes_by_the_line_of_the_page(shell: str, tmp_path: Path) -
         return
     ours, theirs = os.openpty()
     streams = dict.fromkeys(("stdin", "stdout", "stderr"), theirs)
-    with subprocess.Popen(
-        INTERACTIVE[shell], env=env, start_new_session=True, **streams
-    ) as process:
+    words = INTERACTIVE[shell]
+    with subprocess.Popen(words, env=env, start_new_session=True, **streams) as process:
         try:
             os.write(ours, f"{scripted(shell)}; echo rea''dy\n".encode())
             read_until(ours, "ready")

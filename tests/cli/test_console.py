@@ -51,7 +51,7 @@ def test_what_does_not_fit_is_left_out_least_telling_first(lines):
     # only maps have blocks
     always = [name for name in SHOWN[:STAY] if name in ROWS[0] or name == "total"]
     optional = [name for name in SHOWN[STAY:] if name in ROWS[0]]
-    for width in (40, 60, 80, 100, 119, 120, 121, 140, 160, 200):
+    for width in (40, 60, 80, 119, 120, 121, 200):
         head, *rows = lines(width, print_table, ROWS, Excerpt())
         assert "…" not in head + "".join(rows)
         columns = heads(head)
@@ -61,22 +61,21 @@ def test_what_does_not_fit_is_left_out_least_telling_first(lines):
     assert counts == sorted(counts)
     assert (counts[0], counts[-1]) == (0, len(optional))
     assert columns[6:8] == ["± total", "α_c axial"]
-
-
-def test_error_is_that_of_scan_and_sample_together(lines):
-    head, row, *_ = lines(200, print_table, ROWS, Excerpt())
-    cells = dict(zip(heads(head), row.split(), strict=True))
+    # the error is that of scan and sample together
+    cells = dict(zip(columns, rows[0].split(), strict=True))
     errors = [cells[name] for name in ("± total", "± scan", "± sample")]
     assert errors == ["0.0005", "0.0003", "0.0004"]
 
 
 def test_a_map_says_which_block_a_row_is_of(lines):
     place = {"block": 7, "x": 1.0, "y": 2.0, "z": 3.0, "at_surface": 0}
-    head, row = lines(200, print_table, [Row(**ROWS[0], **place)], Excerpt())
+    (head, row), (narrow, _) = (
+        lines(width, print_table, [Row(**ROWS[0], **place)], Excerpt()) for width in (200, 60)
+    )
     assert dict(zip(heads(head), row.split(), strict=True))["block"] == "7"
     assert {"x", "y", "z", "at surface"} <= set(heads(head))
     assert "r inner" not in heads(head)
-    assert "at surface" not in lines(60, print_table, [Row(**ROWS[0], **place)], Excerpt())[0]
+    assert "at surface" not in narrow
 
 
 def test_columns_and_digits_that_were_asked_for_are_shown(lines):
@@ -90,7 +89,7 @@ def compared(*sources):
     return compare_tables([{**row, **ERRORS} for row in every])
 
 
-@pytest.mark.parametrize("width", [60, 80, 100, 120])
+@pytest.mark.parametrize("width", [60, 80, 120])
 @pytest.mark.parametrize("sources", [["one"], ["x" * 70 + "one", "x" * 70 + "two"]])
 def test_no_part_of_a_comparison_is_cut(lines, width, sources):
     shown = lines(width, print_comparison, compared(*sources))
@@ -106,8 +105,8 @@ def test_a_comparison_shows_total_errors_and_curves_where_there_is_room(lines):
     assert sum("one" in line for line in narrow) == 1
     assert any("α_c axial  ± total" in line for line in narrow)
     assert any("0.00135" in line and "0.00235" in line for line in narrow)
-    assert "± scan" in "".join(wide)
-    assert "█" in "".join(wide)
+    for part in ("± scan", "█"):
+        assert part in "".join(wide)
 
 
 @pytest.mark.filterwarnings("ignore:shear_strain is used in place")

@@ -1,7 +1,5 @@
 """scanfab compute --cutoffs and --moment: rows for each cut-off from one pass, also resumed."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np
@@ -27,11 +25,11 @@ def command(ask):
 
 
 def test_row_at_a_cutoff_is_that_of_a_plain_run_with_the_same_lines(command):
-    rows = command("--cutoffs", "0:3rmin:0.1rmin", "--frames", "1").rows
-    assert [row["variant"] for row in rows] == sorted("abcd" * 31)
-    for place, plain in ((10, "1rmin"), (0, "0"), (25, "2.5rmin")):
+    rows = command("--cutoffs", "0:3rmin:0.5rmin", "--frames", "1").rows
+    assert [row["variant"] for row in rows] == sorted("abcd" * 7)
+    for place, plain in ((2, "1rmin"), (0, "0"), (5, "2.5rmin")):
         expected = command("--cutoff", plain, "--frames", "1").rows
-        for one, other in zip(rows[place::31], expected, strict=True):
+        for one, other in zip(rows[place::7], expected, strict=True):
             assert float(one["cutoff"]) == pytest.approx(float(other["cutoff"]))
             for name in OF_THE_SCAN:
                 assert_same(one[name], other[name], name)
@@ -75,10 +73,3 @@ def test_second_moment_is_that_of_the_slow_twin():
     assert row.gvs_xy == pytest.approx(tensor[0, 1], abs=1e-12)
     assert row.alpha_vs_axial == pytest.approx(naive.axial(tensor, (0, 0, 1)), abs=1e-12)
     assert row.mean_length == pytest.approx((rule.weights @ over) / (rule.weights @ under))
-
-
-def test_second_moment_is_longer_than_the_first(command):
-    words = ("--variants", "c", "--frames", "0")
-    first, second = (command("--moment", moment, *words).rows[0] for moment in (1, 2))
-    assert float(second["mean_length"]) > float(first["mean_length"])
-    assert second["segments"] == first["segments"]

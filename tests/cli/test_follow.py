@@ -18,35 +18,33 @@ from scanfab.base.errors import ReadError, ScanfabWarning, SettingsError
 from scanfab.cli.main import run
 from tests.helpers.dumps import cubic_rows, dump_text, pairs_text
 from tests.helpers.growing import in_halves, meanwhile, sample_frames
-from tests.helpers.interruptions import PROGRAM, write_series
+from tests.helpers.interruptions import PROGRAM
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--workers", "1")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
 
 
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory):
-    return write_series(tmp_path_factory.mktemp("follow") / "series", 4)
-
-
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
+    """An empty folder; files that do not change for a fifth of a second are taken for complete."""
+    monkeypatch.setattr("scanfab.io.follow.QUIET", 0.2)
+    monkeypatch.setattr("scanfab.io.follow.PAUSE", 0.02)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "dumps").mkdir()
     return tmp_path / "dumps"
 
 
-def copied(folder: Path, files: list[Path], pause: float = 0.05) -> list:
+def copied(folder: Path, files: list[Path], pause: float = 0.02) -> list:
     """Steps that write these files one after the other."""
     return [partial(in_halves, path.read_bytes(), folder / path.name, pause) for path in files]
 
 
-def follow(*words: str, seconds: float = 2.0) -> int:
+def follow(*words: str, seconds: float = 0.8) -> int:
     return run(["compute", "dumps", *FAST, "--follow-for", str(seconds), "-o", "t.csv", *words])
 
 
 def finished_run(*words: str) -> bytes:
-    run(["compute", "dumps", *FAST, "-o", "finished.csv", *words])
+    assert run(["compute", "dumps", *FAST, "-o", "finished.csv", *words]) in (0, 1)
     return Path("finished.csv").read_bytes()
 
 
@@ -60,20 +58,20 @@ def is_followed(steps: list, *words: str) -> bool:
 
 
 @pytest.mark.parametrize("suffix", ["txt", "npz"])
-def test_an_empty_folder_waits_for_frames(folder, finished, suffix):
-    files = sorted(finished.iterdir())
+def test_an_empty_folder_waits_for_frames(folder, series, suffix):
+    files = sorted(series.iterdir())
     if suffix == "npz":
         Path("converted").mkdir()
-        assert run(["convert", str(finished), "converted/f_{step}.npz"]) == 0
+        assert run(["convert", str(series), "converted/f_{step}.npz"]) == 0
         files = sorted(Path("converted").iterdir())
-    assert is_followed([partial(time.sleep, 0.5), *copied(folder, files)])
+    assert is_followed([partial(time.sleep, 0.2), *copied(folder, files)])
 
 
 def test_grains_wait_for_their_contacts(folder):
     """As VTK, packed; contact files come long after the grains of their frame."""
     steps = []
-    for grains, contacts in sample_frames()[:3]:
-        steps += [*copied(folder, [grains]), partial(time.sleep, 1.4), *copied(folder, [contacts])]
+    for grains, contacts in sample_frames()[:2]:
+        steps += [*copied(folder, [grains]), partial(time.sleep, 0.5), *copied(folder, [contacts])]
     assert is_followed(steps, "--boundary", "mask=3")
     data = Path("t.csv").read_bytes()
     assert b",file," in data
@@ -82,32 +80,22 @@ def test_grains_wait_for_their_contacts(folder):
 
 def test_a_folder_with_contact_files_only_waits(folder):
     (folder / "pairs_0.txt").write_text(pairs_text(step=0))
-    grains = dump_text(cubic_rows(), step=0).encode()
-    write_it = partial(in_halves, grains, folder / "dump_0.txt", 0.1)
-    assert is_followed([partial(time.sleep, 0.5), write_it])
+    write_it = partial(in_halves, dump_text(cubic_rows()).encode(), folder / "dump_0.txt", 0.1)
+    assert is_followed([partial(time.sleep, 0.3), write_it])
 
 
-def test_one_file_that_grows(folder, finished):
+def test_one_file_that_grows(folder, series):
     growing = folder / "dump.txt"
     growing.write_bytes(b"")
 
     def append(part: bytes) -> None:
         with open(growing, "ab") as stream:
             stream.write(part)
-        time.sleep(0.1)
+        time.sleep(0.05)
 
-    texts = [path.read_bytes() for path in sorted(finished.iterdir())]
+    texts = [path.read_bytes() for path in sorted(series.iterdir())]
     halves = [half for text in texts for half in (text[: len(text) // 2], text[len(text) // 2 :])]
     assert is_followed([partial(append, half) for half in halves])
-
-
-@pytest.fixture
-def process(folder):
-    """Follows the folder in a process of its own."""
-    words = [*PROGRAM, "compute", "dumps", *FAST, "--follow", "-o", "t.csv"]
-    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as process:
-        yield process
-        process.kill()
 
 
 def wait_for_rows(frames: int) -> None:
@@ -118,16 +106,15 @@ def wait_for_rows(frames: int) -> None:
 
 
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
-def test_the_first_signal_ends_it_in_order(process, folder, finished, sent):
-    files = sorted(finished.iterdir())
+def test_the_first_signal_ends_it_in_order(folder, series, capfd, sent):
+    files = sorted(series.iterdir())
     for path in files[:2]:
         shutil.copy(path, folder)
-    wait_for_rows(2)
-    (folder / files[2].name).write_bytes(files[2].read_bytes()[:300])
-    process.send_signal(sent)
-    said = process.stderr.read()
-    assert process.wait(60) == 0, said
-    assert "finishing frames under way" in said
+    cut = partial((folder / files[2].name).write_bytes, files[2].read_bytes()[:300])
+    thread = meanwhile([partial(wait_for_rows, 2), cut, partial(os.kill, os.getpid(), sent)])
+    assert run(["compute", "dumps", *FAST, "--follow", "-o", "t.csv"]) == 0
+    thread.join()
+    assert "finishing frames under way" in capfd.readouterr().err
     assert not Path("t.csv.part").exists()
     (folder / files[2].name).unlink()
     assert Path("t.csv").read_bytes() == finished_run()
@@ -138,49 +125,46 @@ def test_the_first_signal_ends_it_in_order(process, folder, finished, sent):
     assert Path("t.csv").read_bytes() == finished_run()
 
 
-def test_a_second_signal_interrupts(process, folder):
-    text = dump_text(cubic_rows(), step=0, box=((0, 4),) * 3)
-    (folder / "dump_0.txt").write_text(text)
-    process.send_signal(signal.SIGSTOP)
-    process.send_signal(signal.SIGTERM)
-    time.sleep(0.1)
-    process.send_signal(signal.SIGINT)
-    process.send_signal(signal.SIGCONT)
-    assert process.wait(60) in (130, 143, -signal.SIGINT, -signal.SIGTERM)
+def test_a_second_signal_interrupts(folder):
+    (folder / "dump_0.txt").write_text(dump_text(cubic_rows(), box=((0, 4),) * 3))
+    words = [*PROGRAM, "compute", "dumps", *FAST, "--follow", "-o", "t.csv"]
+    with subprocess.Popen(words) as process:
+        for sent in (signal.SIGSTOP, signal.SIGTERM, signal.SIGINT, signal.SIGCONT):
+            process.send_signal(sent)
+            time.sleep(0.05)
+        assert process.wait(60) in (130, 143, -signal.SIGINT, -signal.SIGTERM)
     assert not Path("t.csv").exists()
 
 
 def test_without_any_frame_the_table_has_no_rows(folder, capsys):
     (folder / "log.txt").write_text("nothing yet\n")
-    assert follow(seconds=0.5) == 0
+    assert follow(seconds=0.1) == 0
     assert Path("t.csv").read_text().count("\n") == 1
     assert "scanfab: note: dumps: no reader knows" in capsys.readouterr().err
 
 
-def test_a_broken_file_stops_it_or_is_skipped_and_a_last_one_left_out(folder, finished, capsys):
-    files = sorted(finished.iterdir())
+def test_a_broken_file_stops_it_or_is_skipped_and_a_last_one_left_out(folder, series, capsys):
+    files = sorted(series.iterdir())
     broken, half = folder / files[1].name, files[1].read_bytes()[:300]
     shutil.copy(files[0], folder)
     broken.write_bytes(half)
-    assert follow(seconds=1.5) == 0
-    assert (
-        f"warning: dumps/{broken.name}: left out, because it was incomplete"
-        in capsys.readouterr().err
-    )
+    assert follow(seconds=0.5) == 0
+    told = f"warning: dumps/{broken.name}: left out, because it was incomplete"
+    assert told in capsys.readouterr().err
     broken.unlink()
     assert Path("t.csv").read_bytes() == finished_run()
     for path in files[2:]:
         shutil.copy(path, folder)
     broken.write_bytes(half)
-    assert follow(seconds=0.5) == 1
+    assert follow(seconds=0.3) == 1
     assert f"dumps/{broken.name}" in capsys.readouterr().err
     assert Path("t.csv.part").read_text().count("\n") == 2
-    assert follow("--on-error", "skip", seconds=0.5) == 1
+    assert follow("--on-error", "skip", seconds=0.3) == 1
     assert Path("t.csv").read_bytes() == finished_run("--on-error", "skip")
 
 
-def test_a_folder_that_vanishes_is_named_and_nothing_is_lost(folder, finished, capsys):
-    files = sorted(finished.iterdir())
+def test_a_folder_that_vanishes_is_named_and_nothing_is_lost(folder, series, capsys):
+    files = sorted(series.iterdir())
     for path in files[:2]:
         shutil.copy(path, folder)
     thread = meanwhile([partial(wait_for_rows, 2), partial(shutil.rmtree, folder)])
@@ -189,13 +173,13 @@ def test_a_folder_that_vanishes_is_named_and_nothing_is_lost(folder, finished, c
     (error,) = [one for one in capsys.readouterr().err.splitlines() if "error" in one]
     assert error.startswith("scanfab: error: dumps: has vanished while it was followed, after 2 ")
     assert "--resume" in error
-    shutil.copytree(finished, folder)
-    assert follow("--resume", "--on-error", "skip", seconds=0.5) == 0
+    shutil.copytree(series, folder)
+    assert follow("--resume", "--on-error", "skip", seconds=0.3) == 0
     assert Path("t.csv").read_bytes() == finished_run()
 
 
-def test_files_that_change_before_the_next_frame_are_an_error(folder, finished):
-    files = sorted(finished.iterdir())
+def test_files_that_change_before_the_next_frame_are_an_error(folder, series):
+    files = sorted(series.iterdir())
     for path in files[1:3]:
         shutil.copy(path, folder)
     growing, other = (iter(scanfab.follow_series(folder, seconds=5)) for _ in range(2))
@@ -205,22 +189,21 @@ def test_files_that_change_before_the_next_frame_are_an_error(folder, finished):
         stream.write("\n")
     with pytest.raises(ReadError, match=f"{files[2].name}: was read as frame 1, but since then"):
         next(growing)
-    shutil.copy(files[2], folder)
-    shutil.copy(files[0], folder)
+    for path in (files[2], files[0]):
+        shutil.copy(path, folder)
     with pytest.raises(ReadError, match=f"{files[1].name}: was read as frame 0, but since then"):
         next(other)
 
 
-def test_the_plot_is_drawn_again(folder, finished, monkeypatch):
+def test_the_plot_is_drawn_again(folder, series, monkeypatch):
     from scanfab.viz.figures import figure as page
 
     drawn = []
     monkeypatch.setattr(page, "save_figures", lambda path, figures: drawn.append(path))
-    files = sorted(finished.iterdir())
-    thread = meanwhile(
-        [*copied(folder, files[:2]), partial(time.sleep, 2), *copied(folder, files[2:])]
-    )
-    assert follow("--plot", "p.png", seconds=3) == 0
+    files = sorted(series.iterdir())
+    steps = [*copied(folder, files[:2]), partial(wait_for_rows, 2), partial(time.sleep, 0.5)]
+    thread = meanwhile([*steps, *copied(folder, files[2:])])
+    assert follow("--plot", "p.png", seconds=1.5) == 0
     thread.join()
     assert len(drawn) >= 3
 
@@ -231,25 +214,25 @@ def test_frames_cannot_be_counted_from_the_end(folder, frames):
         scanfab.compute(scanfab.follow_series(folder, seconds=0), frames=frames)
 
 
-def test_it_ends_with_the_last_frame_that_is_asked_for(folder, finished):
-    shutil.copytree(finished, folder, dirs_exist_ok=True)
+def test_it_ends_with_the_last_frame_that_is_asked_for(folder, series):
+    shutil.copytree(series, folder, dirs_exist_ok=True)
     assert run(["compute", "dumps", *FAST, "--follow", "--frames", ":2", "-o", "t.csv"]) == 0
     assert Path("t.csv").read_bytes() == finished_run("--frames", ":2")
 
 
-def test_the_library_follows(folder, finished):
-    thread = meanwhile(copied(folder, sorted(finished.iterdir())))
-    series = scanfab.follow_series(folder, seconds=2)
+def test_the_library_follows(folder, series):
+    thread = meanwhile(copied(folder, sorted(series.iterdir())))
+    followed = scanfab.follow_series(folder, seconds=0.8)
     words = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin"}
-    table = scanfab.compute(series, **words)
+    table = scanfab.compute(followed, **words)
     thread.join()
     assert table == scanfab.compute(scanfab.read_series(folder), **words)
-    assert repr(series) == f"FollowedSeries {folder}: 4 frames so far"
-    assert [frame.number for frame in series] == [0, 1, 2, 3]
+    assert repr(followed) == f"FollowedSeries {folder}: 5 frames so far"
+    assert [frame.number for frame in followed] == [0, 1, 2, 3, 4]
     with pytest.raises(ReadError, match="found nothing"):
         scanfab.follow_series("no such folder")
+    os.truncate(folder / "dump_400.txt", 100)
+    with pytest.warns(ScanfabWarning, match="left out"):
+        assert len(list(scanfab.follow_series(folder, seconds=0))) == 4
     with pytest.raises(SettingsError, match="seconds: expected 0 or more"):
         scanfab.follow_series(folder, seconds=-1)
-    os.truncate(folder / "dump_300.txt", 100)
-    with pytest.warns(ScanfabWarning, match="left out"):
-        assert len(list(scanfab.follow_series(folder, seconds=0))) == 3

@@ -1,9 +1,9 @@
 """Little memory: one message, exit code 1, no traceback."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
+from functools import partial
+from unittest.mock import Mock
 
 import pytest
 
@@ -18,15 +18,9 @@ resource = pytest.importorskip("resource", reason="limits of a process are POSIX
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the size is read from /proc")
 @pytest.mark.parametrize(("command", "megabytes"), [("compute", 1200), ("inspect", 400)])
 def test_a_limit_that_nothing_can_be_done_with_is_told_at_once(tmp_path, command, megabytes):
-    dump = write(tmp_path / "dump", dump_text(cubic_rows()))
-    most = megabytes << 20
-    answer = subprocess.run(
-        [*PROGRAM, command, str(dump)],
-        capture_output=True,
-        text=True,
-        check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (most, most)),
-    )
+    words = [*PROGRAM, command, str(write(tmp_path / "dump", dump_text(cubic_rows())))]
+    limit = partial(resource.setrlimit, resource.RLIMIT_AS, (megabytes << 20, megabytes << 20))
+    answer = subprocess.run(words, capture_output=True, text=True, check=False, preexec_fn=limit)
     assert answer.returncode == 1, answer.stderr
     assert answer.stderr.startswith("scanfab: error: not enough memory: the limit (ulimit -v) ")
     assert len(answer.stderr.splitlines()) == 1
@@ -42,10 +36,7 @@ def test_a_limit_that_nothing_can_be_done_with_is_told_at_once(tmp_path, command
     ],
 )
 def test_what_fails_for_lack_of_memory_is_one_message(monkeypatch, capsys, error, left):
-    def fail(*_, **__):
-        raise error
-
-    monkeypatch.setattr(group.cli, "main", fail)
+    monkeypatch.setattr(group.cli, "main", Mock(side_effect=error))
     if left is not None:
         with pytest.raises(NameError):  # a mistake of ours is not hidden
             main.run(["compute"])

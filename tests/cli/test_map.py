@@ -1,22 +1,15 @@
 """scanfab map: its table, resume, ParaView files and figure."""
 
-from __future__ import annotations
-
 import pytest
 import pyvista
 
 import scanfab
 from scanfab.cli.main import run
-from tests.helpers.interruptions import interrupted_at_row, write_series
+from tests.helpers.interruptions import interrupted_at_row
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--workers", "1")
 OPTIONS = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "workers": 1}
 GRID = ("--grid", "2,1,1")
-
-
-@pytest.fixture(scope="module")
-def series(tmp_path_factory):
-    return write_series(tmp_path_factory.mktemp("map") / "series", 3)
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +25,7 @@ def test_the_table_is_that_of_the_library(series, table, tmp_path):
     computed = scanfab.fabric_map(scanfab.read_series(series), grid=(2, 1, 1), **OPTIONS)
     assert scanfab.load(table) == computed
     assert [(row.frame, row.block) for row in computed] == [
-        (frame, block) for frame in range(3) for block in range(2)
+        (frame, block) for frame in range(5) for block in range(2)
     ]
     output = tmp_path / "map.csv"
     scanfab.compute_file(series, output, grid="2,1,1", **OPTIONS)
@@ -42,7 +35,7 @@ def test_the_table_is_that_of_the_library(series, table, tmp_path):
 def test_it_is_drawn_and_written_for_paraview(table):
     assert table.with_name("map.png").stat().st_size > 10_000
     collection = table.with_name("vtk") / "map-a.pvd"
-    assert collection.read_text().count("map-a_00000") == 3
+    assert collection.read_text().count("map-a_00000") == 5
     mesh = pyvista.read(collection.with_name("map-a_000001.vtu"))
     rows = scanfab.load(table)[2:4]
     fabric = [row.alpha_vs_axial for row in rows]

@@ -25,6 +25,7 @@ def help_of(command, width=80):
 
 
 def test_every_option_of_compute_is_declared_and_stands_in_a_group():
+    """The help has examples, short defaults and 80 columns."""
     names = {one.name for one in compute.params if isinstance(one, click.Option)}
     assert names - {"quiet", "verbose"} == set(OPTIONS)
     text = help_of(compute)
@@ -35,10 +36,6 @@ def test_every_option_of_compute_is_declared_and_stands_in_a_group():
     assert re.findall(r"^  (-[\w-]+)", most, re.M) == [
         "-o", "--variants", "--boundary", "--frames", "--rv", "--tolerance", "--workers",
     ]  # fmt: skip
-
-
-def test_the_help_has_examples_short_defaults_and_80_columns():
-    text = help_of(compute)
     for one in ("A folder:", "Several files:", "A pipe:"):
         assert re.search(rf"^  {one} +.*scanfab compute", text, re.M)
     assert max(map(len, text.splitlines())) <= 80

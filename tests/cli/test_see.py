@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -28,53 +29,37 @@ FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--v
 
 
 @pytest.fixture
-def series(tmp_path):
-    folder = tmp_path / "series"
-    folder.mkdir()
-    for frame in range(4):
-        write(folder / f"dump_{frame}.txt", dump_text(cubic_rows(), step=10 * frame))
-    return folder
-
-
-@pytest.fixture
 def table(tmp_path):
     rows = [*curve(), *curve(variant="d")]
     return write(tmp_path / "t.jsonl", "".join(json.dumps(row) + "\n" for row in rows))
 
 
 def test_compute_draws_its_table_or_a_figure_of_frames(series, tmp_path, ask):
-    table, plot = tmp_path / "t.csv", tmp_path / "t.svg"
+    table, plot, again = (tmp_path / name for name in ("t.csv", "t.svg", "again.svg"))
     ask("compute", series, *FAST, "-o", table, "--plot", plot)
-    again = tmp_path / "again.svg"
     save_rows(again, read_rows(table))
     assert plot.read_bytes() == again.read_bytes()
     plot = tmp_path / "t.png"
     printed = ask("compute", series, *FAST, "--plot", plot, "--figure", "histogram")
     assert plot.read_bytes().startswith(b"\x89PNG")
-    assert len(printed.rows) == 8
+    assert len(printed.rows) == 10
 
 
 def test_a_resumed_run_draws_all_frames_and_keeps_their_files(series, tmp_path, ask):
     whole, part = tmp_path / "whole", tmp_path / "part"
-
-    def compute(folder, *more):
+    for folder, more in ((whole, ()), (part, ("--frames", "0:2")), (part, ("--resume",))):
         folder.mkdir(exist_ok=True)
         files = ["-o", folder / "t.csv", "--plot", folder / "t.svg", "--vtk", folder / "vtk"]
-        ask("compute", series, *FAST, *files, *more)
-
-    compute(whole)
-    compute(part, "--frames", "0:2")
-    compute(part, "--resume")
+        ask("compute", series, *FAST, "--variants", "c", *files, *more)
     for name in ("t.csv", "t.svg", "vtk/distribution-c.pvd"):
         assert (part / name).read_bytes() == (whole / name).read_bytes()
 
 
 def test_compare_draws_the_fit_that_it_prints(table, tmp_path, ask):
-    for name in ("evolution", "normalised", "correlation"):
-        plot = tmp_path / f"{name}.pdf"
-        words = ["--plot", plot, "--figure", name, "--strain-max", "0.03"]
-        row = ask("compare", table, "--summary", *words).rows[0]
-        assert plot.read_bytes().startswith(b"%PDF")
+    plot = tmp_path / "correlation.pdf"
+    words = ["--plot", plot, "--figure", "correlation", "--strain-max", "0.03"]
+    row = ask("compare", table, "--summary", *words).rows[0]
+    assert plot.read_bytes().startswith(b"%PDF")
     fit = compare_tables(read_rows(table), strain_max=0.03).summary[0]
     assert float(row["slope"]) == fit.slope
 
@@ -83,17 +68,15 @@ def test_a_table_without_void_fabric_is_written_and_not_drawn(series, tmp_path, 
     table, plot = tmp_path / "t.csv", tmp_path / "x.png"
     told = ask("compute", series, *FAST, "--cutoff", "100", "--plot", plot, "-o", table, code=1)
     assert f"{plot} is not drawn: no row has a void fabric" in told.err
-    assert table.exists()
-    assert not plot.exists()
+    assert (table.exists(), plot.exists()) == (True, False)
     assert "there is nothing to draw" in ask("compare", table, "--plot", plot, code=1).err
 
 
 def can_draw() -> bool:
-    try:
+    with suppress(ScanfabError):
         check_drawing()
-    except ScanfabError:
-        return False
-    return True
+        return True
+    return False
 
 
 needs_drawing = pytest.mark.skipif(
@@ -144,10 +127,9 @@ def test_the_sample_fills_the_picture_and_its_rv_is_seen(view, words):
 
 
 @needs_drawing
-@pytest.mark.parametrize("letter", "im")
-def test_words_and_scale_are_dark_on_white_and_within_the_picture(view, tmp_path, letter):
+def test_words_and_scale_are_dark_on_white_and_within_the_picture(view, tmp_path):
     """Also the title of a long path."""
-    dumps = tmp_path.joinpath(*[letter * 30] * 5)
+    dumps = tmp_path.joinpath(*["m" * 30] * 5)
     dumps.mkdir(parents=True)
     write(dumps / "dump_0.txt", dump_text(cubic_rows()))
     dark = (drawn(view(dumps)) < 90).all(axis=2)
@@ -155,8 +137,7 @@ def test_words_and_scale_are_dark_on_white_and_within_the_picture(view, tmp_path
     assert title.sum() > 400
     assert legend.sum() > 300
     words = dark[20:100].any(axis=0)
-    assert not words[:20].any()
-    assert not words[-20:].any()
+    assert not (words[:20] | words[-20:]).any()
     bar = scale.any(axis=0).nonzero()[0]
     assert 100 < len(bar) < 260
     assert bar[-1] == pytest.approx(0.98 * 1200 - 700, abs=2)
@@ -175,7 +156,6 @@ def scenes(monkeypatch):
     ("words", "title"),
     [
         ((SAMPLE, "--boundary", "mask=3", "--frame", "-1"), "frame 6, axial strain 15 %"),
-        (("sample_data/lammps_shear",), "frame 0, shear strain 0 %"),
         (("sample_data/lammps_shear", "--frame", "5"), "frame 5, shear strain {shear} %"),
         (("sample_data/liggghts_periodic",), "frame 0, axial strain 0 %"),
     ],
@@ -188,9 +168,8 @@ def test_the_title_names_the_frame_and_its_strain(view, monkeypatch, scenes, wor
     assert [one[2] for one in scenes] == [f"{words[0]}, {title.format(shear=shear)}"]
 
 
-@pytest.mark.parametrize("words", [[], ["--cut"]])
-def test_a_frame_without_grains_is_shown_as_such(tmp_path, words, view, scenes):
-    view(write(tmp_path / "dump_1.txt", dump_text([])), *words)
+def test_a_frame_without_grains_is_shown_as_such(tmp_path, view, scenes):
+    view(write(tmp_path / "dump_1.txt", dump_text([])), "--cut")
     assert scenes[0][2].endswith("frame 0, no grains")
 
 
@@ -208,14 +187,16 @@ def test_a_long_path_leaves_both_ends_of_the_source_and_the_strain(tmp_path, vie
 def test_damaged_frames_before_the_one_asked_for_are_skipped(tmp_path, scenes, ask):
     """A radius of 0 makes no packing, and cut text no frame: the RV is of the third."""
     flat = [(*cubic_rows()[0][:5], 0), *cubic_rows()[1:]]
-    write(tmp_path / "dump_0.txt", dump_text(flat))
-    write(tmp_path / "dump_1.txt", dump_text(cubic_rows(), step=1)[:-40])
-    write(tmp_path / "dump_2.txt", dump_text(cubic_rows(), step=2))
+    for step, text in enumerate((dump_text(flat), dump_text()[:-40], dump_text(cubic_rows()))):
+        write(tmp_path / f"dump_{step}.txt", text.replace("TIMESTEP\n0", f"TIMESTEP\n{step}"))
     words = ["view", tmp_path, "--screenshot", tmp_path / "x.png"]
     told = ask(*words, "--frame", "2").err
     assert scenes[0][0].window is not None
     assert told.count("frame 0 skipped: ") == told.count("frame 1 skipped: ") == 1
     ask(*words, "--frame", "0", code=1)
+
+
+NO_LIBRARY = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkOSOpenGLRenderWindow", "LD_LIBRARY_PATH": ""}
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems always have a screen")
@@ -224,15 +205,13 @@ def test_damaged_frames_before_the_one_asked_for_are_skipped(tmp_path, scenes, a
     [
         ([], {}, "write a picture instead: --screenshot FILE.png"),
         # a kind of window that needs a library which is not there
-        (
-            ["--screenshot", "x.png"],
-            {"VTK_DEFAULT_OPENGL_WINDOW": "vtkOSOpenGLRenderWindow", "LD_LIBRARY_PATH": ""},
-            "apt-get install",
-        ),
+        (["--screenshot", "x.png"], NO_LIBRARY, "apt-get install"),
     ],
 )
 def test_where_nothing_can_be_drawn_view_says_what_to_do(series, tmp_path, words, env, message):
-    env |= {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY", *env)}
+    env = {**os.environ, **env}
+    for screen in ("DISPLAY", "WAYLAND_DISPLAY"):
+        env.pop(screen, None)
     command = [*PROGRAM, "view", str(series), *words]
     answer = subprocess.run(command, capture_output=True, text=True, env=env, cwd=tmp_path)
     if (tmp_path / "x.png").exists():

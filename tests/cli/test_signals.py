@@ -71,11 +71,7 @@ def test_words_of_a_command_that_is_over_are_not_told():
     assert interrupted_words(signal.SIGINT) == "scanfab: interrupted"
 
 
-@pytest.mark.parametrize("rows", [0, 1])
-def test_a_part_without_rows_and_half_a_file_are_removed(tmp_path, rows):
-    answer = ended(
-        tmp_path,
-        f"""
+PARTS = """
 from pathlib import Path
 from scanfab.table.columns import COLUMNS
 from scanfab.table.row import Row
@@ -85,18 +81,21 @@ from scanfab.pipeline.record import PartFile
 def run(args):
     part = PartFile(Path("table.csv"))
     with part.alone():
-        part.begin({{}})
-        for _ in range({rows}):
+        part.begin({})
+        for _ in range(ROWS):
             part.add([], [Row(**dict.fromkeys(COLUMNS))])
         with whole_file(Path("figure.png")) as part:
             part.write_text("half")
             os.kill(os.getpid(), signal.SIGTERM)
             time.sleep(10)
-""",
-    )
+"""
+
+
+@pytest.mark.parametrize(("rows", "left"), [(0, set()), (1, {"table.csv.part"})])
+def test_a_part_without_rows_and_half_a_file_are_removed(tmp_path, rows, left):
+    answer = ended(tmp_path, PARTS.replace("ROWS", str(rows)))
     assert answer.returncode == 143, answer.stderr
-    left = {path.name for path in tmp_path.iterdir()}
-    assert left == ({"table.csv.part"} if rows else set())
+    assert {path.name for path in tmp_path.iterdir()} == left
 
 
 def test_the_process_hears_signals_before_anything_large_is_imported():

@@ -1,13 +1,9 @@
 """Sources as users name them: globs, and standard input, which messages call by that name."""
 
-from __future__ import annotations
-
 import gzip
 import json
 
 import pytest
-
-from tests.helpers.dumps import cubic_rows, dump_text, write
 
 CASES = {
     "x,y,z\n1,2,3\n": "scanfab: error: standard input: no radius",
@@ -52,10 +48,3 @@ def test_so_do_warnings_in_results_and_manifests(by_stdin, tmp_path):
     by_stdin(b"x,y,z,radius\n1,2,3,-4\n", *words, code=1)
     (first, *_) = json.loads((tmp_path / "out.csv.manifest.json").read_text())["warnings"]
     assert first.startswith("frame 0 skipped: standard input: grain 0: the radius")
-
-
-def test_a_glob_is_read_as_its_files(ask, tmp_path):
-    for frame in (0, 1):
-        write(tmp_path / f"dump_{frame}.txt", dump_text(cubic_rows(), step=frame))
-    by_glob, by_folder = ask("inspect", tmp_path / "dump_*.txt"), ask("inspect", tmp_path)
-    assert by_glob.out == by_folder.out

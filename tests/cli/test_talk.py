@@ -13,7 +13,7 @@ from scanfab.cli.console import working
 from tests.helpers.dumps import write
 from tests.helpers.interruptions import write_series
 
-FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin")
+FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def notes(lines: list[str]) -> list[str]:
 
 
 def test_quiet_leaves_out_notes_but_no_warning_and_no_error(said):
-    words = ("--directions", "equal-angle:30", "--spacing", "0.5rmin", "--cutoff", "0.2rmin")
+    words = (*FAST[2:], "--directions", "equal-angle:30")
     # first, as kernels that no earlier run has needed are compiled with a word
     quiet_result, quiet = said("compute", *words, "--quiet")
     result, lines = said("compute", *words)
@@ -56,12 +56,12 @@ def test_verbose_says_what_is_used_and_how_long_each_frame_takes(said, series):
     text = "\n".join(lines)
     assert re.search(r"scanfab: scanfab \S+, numpy [\d.]+, numba [\d.]+, Python .*; 2 work", text)
     assert f"scanfab: {series}: grains from {series}/dump_*.txt by liggghts, 3 files" in lines
-    for frame in range(3):
-        assert re.search(rf"scanfab: {series}: frame {frame}: 64 grains in [\d.e-]+ s", text)
+    found = re.findall(rf"scanfab: {series}: frame (\d): 64 grains in [\d.e-]+ s", text)
+    assert sorted(found) == ["0", "1", "2"]
     assert result == said("compute", *FAST)[0]
 
 
-@pytest.mark.parametrize("command", ["compute", "inspect", "calibrate"])
+@pytest.mark.parametrize("command", ["compute", "inspect"])
 def test_quiet_and_verbose_exclude_one_another(said, command):
     _, lines = said(command, "--quiet", "--verbose", code=2)
     assert "--quiet and --verbose contradict each other" in lines[-1]
@@ -74,7 +74,7 @@ def test_a_log_gets_a_line_of_progress_each_minute(said, monkeypatch, words, eve
     """Here of a few milliseconds; nothing in a run that takes less."""
     assert console.EVERY == 60.0
     monkeypatch.setattr(console, "EVERY", every)
-    _, lines = said("compute", "--tolerance", "1e-3", "--workers", "1", *words)
+    _, lines = said("compute", "--tolerance", "2e-3", "--workers", "1", "--variants", "ac", *words)
     states = [line for line in lines if re.match(r"scanfab: \d of 3 frames", line)]
     assert bool(states) == bool(says)
     if states:

@@ -10,8 +10,12 @@ from scanfab.fabric.contact import axial_error, contact_fabric
 from scanfab.fabric.forces import directional_mean
 from scanfab.fabric.harmonics import harmonic
 from scanfab.fabric.invariants import bias_of, fabric_deviator, intensity
+from scanfab.fabric.state import State
 from scanfab.packing.bodies import lens_volumes
-from tests.helpers.truth import SAMPLE_DATA
+from scanfab.packing.sample import VARIANTS, Sample
+from scanfab.pipeline.state import sample_state
+from tests.helpers.measured import measured_of
+from tests.helpers.truth import OF_SHEAR, SAMPLE_DATA
 
 XY = Space(2)
 BIAXIAL = SAMPLE_DATA / "lammps_biaxial"
@@ -88,46 +92,40 @@ def test_void_ratio_and_stress_of_two_discs():
     """One contact in a cell: σ = f b / area, p half its trace."""
     contacts = scanfab.ContactList([[0, 1]], force=[[0.0, 5.0, 0.0]])
     packing = Packing([[1.0, 1.0], [1.0, 2.9]], 1.0, cell=Cell([4, 3.9, 1]), contacts=contacts)
-    (row,) = compute(packing, variants="a", with_="state", directions=4, spacing=0.01, cutoff=0.1)
+    state = sample_state(Sample(packing, np.zeros(2, bool)), VARIANTS["a"], None)
+    found = State().values(measured_of(packing.contacts.normal, Y, state=state, space=XY))
     area = 4.0 * 3.9
-    assert row["void_ratio"] == pytest.approx((area - 2 * np.pi) / (2 * np.pi))
-    assert row["stress_yy"] == pytest.approx(5.0 * 1.9 / area)
-    assert row["p"] == pytest.approx(0.5 * row["stress_yy"])
-    assert row["q"] == pytest.approx(row["stress_yy"])
-    assert row["stress_zz"] == 0.0
+    assert found["void_ratio"] == pytest.approx((area - 2 * np.pi) / (2 * np.pi))
+    stress = 5.0 * 1.9 / area
+    expected = {"stress_xx": 0.0, "stress_yy": stress, "stress_zz": 0.0, "p": stress / 2}
+    assert {name: found[name] for name in expected} == pytest.approx(expected)
+    assert found["q"] == pytest.approx(stress)
 
 
 @pytest.fixture(scope="module")
 def biaxial():
+    """The rows of the whole in each frame."""
     series = scanfab.read_series(
         [BIAXIAL / f"discs.{step}.lammpstrj.gz" for step in range(0, 120_000, 20_000)],
-        contacts=BIAXIAL / "pairs.*.local.gz",
-        contact_columns=(
-            "id1=c_ids[1],id2=c_ids[2],fx=c_pair[3],fy=c_pair[4],fz=c_pair[5],"
-            "tx=c_pair[6],ty=c_pair[7],tz=c_pair[8]"
-        ),
-        dim=2,
-    )
-    return compute(
-        series, variants="ac", with_="forces,state,invariants", directions=16, spacing="0.1rmin",
-        workers=1,
+        contacts=BIAXIAL / "pairs.*.local.gz", contact_columns=OF_SHEAR, dim=2,
     )  # fmt: skip
+    words = {"directions": 16, "spacing": "2rmin", "workers": 1}
+    return compute(series, variants="a", with_="forces,state,invariants", **words)
 
 
 def test_fabric_and_stress_are_those_of_lammps(biaxial):
     """LAMMPS takes 15/2 (G - I/3) in a plane, too; Σ stress/atom of all pairs is -σ times area."""
     engine = np.loadtxt(BIAXIAL / "engine.txt")
-    rows = [row for row in biaxial if row.variant == "a"]
     for place, name in enumerate(("xx", "yy", "zz", "xy")):
         expected = engine[:, 1 + place] / 7.5 + (1 / 3 if place < 3 else 0.0)
-        np.testing.assert_allclose([row[f"gc_{name}"] for row in rows], expected, atol=1e-9)
+        np.testing.assert_allclose(biaxial[f"gc_{name}"], expected, atol=1e-9)
     for place, name in ((7, "xx"), (8, "yy"), (9, "xy")):
-        found = np.array([row[f"stress_{name}"] for row in rows])
-        np.testing.assert_allclose(found, -engine[:, place] / engine[:, 10], rtol=0, atol=0.05)
+        expected = -engine[:, place] / engine[:, 10]
+        np.testing.assert_allclose(biaxial[f"stress_{name}"], expected, rtol=0, atol=0.05)
 
 
 def test_the_stress_ratio_is_the_sum_of_the_anisotropies(biaxial):
-    rows = [row for row in biaxial if row.variant == "a"]
+    rows = [*biaxial]
     assert rows[5].shear_strain > rows[4].shear_strain
     assert rows[4].alpha_c_axial > 0.08 > 0.02 > rows[0].alpha_c_axial
     for row in rows[1:5]:

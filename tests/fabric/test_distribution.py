@@ -1,7 +1,5 @@
 """The even fit: exact for even harmonics up to its degree, careful where directions are few."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Errors of all groups of columns against the scatter of drawn samples, in space and of discs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -15,23 +13,17 @@ from scanfab.fabric.invariants import Invariants
 from scanfab.fabric.measured import ContactForces, Measured, SampleState
 from scanfab.fabric.state import State
 from scanfab.scan.directions import direction_rule, plane_rule
+from tests.helpers.measured import drawn
 
 SPACES = {"space": SPACE, "discs": Space(2)}
 AXIS = {"space": (0.0, 0.0, 1.0), "discs": (0.0, 1.0, 0.0)}
 COUNT, SAMPLES = 600, 300
 
 
-def drawn(space, axis, rng, a=0.6):
-    """Normals of the density 1 + a (n·axis)², by rejection."""
-    n = rng.normal(size=(4 * COUNT, 3)) * np.diag(space.identity)
-    n /= np.linalg.norm(n, axis=1, keepdims=True)
-    return n[rng.random(len(n)) * (1 + a) < 1 + a * (n @ axis) ** 2][:COUNT]
-
-
 def made(name, rng):
     """One frame: contacts with forces, a scan with noise, a stress along the axis."""
     space, axis = SPACES[name], np.array(AXIS[name])
-    n = drawn(space, axis, rng)
+    n = drawn(rng, COUNT, lambda n: 1 + 0.6 * (n @ axis) ** 2, 1.6, space)
     cosine = (n @ axis) ** 2
     branch = 2 + 0.2 * cosine + rng.normal(0, 0.1, COUNT)
     size = (1 + 0.8 * cosine) * rng.gamma(2.0, 0.5, COUNT)

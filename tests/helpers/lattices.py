@@ -27,6 +27,12 @@ def rotation(random):
     return Rotation.random(rng=random).as_matrix()
 
 
+def unit_vectors(random, *shape):
+    """Random unit vectors, shape (..., 3)."""
+    vectors = random.normal(size=(*shape, 3))
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
 def ball_points(random, count, reach):
     """Points uniform in a ball about the origin."""
     direction = random.normal(size=(count, 3))

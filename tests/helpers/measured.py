@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,8 +10,9 @@ import numpy as np
 
 from scanfab.base.space import SPACE
 from scanfab.fabric.contact import contact_fabric
+from tests.helpers.lattices import unit_vectors
 
-__all__ = ["measured_of"]
+__all__ = ["drawn", "measured_of"]
 
 
 def measured_of(normals: np.ndarray, axis: Any = (0.0, 0.0, 1.0), **more: Any) -> Any:
@@ -19,3 +21,15 @@ def measured_of(normals: np.ndarray, axis: Any = (0.0, 0.0, 1.0), **more: Any) -
     found = {**usual, **more}
     contact = contact_fabric(normals)
     return SimpleNamespace(normals=normals, axis=np.asarray(axis), contact=contact, **found)
+
+
+def drawn(
+    random: np.random.Generator, count: int, density: Callable[[Any], Any], most: float, space=SPACE
+) -> np.ndarray:
+    """Unit vectors whose density is nowhere above ``most``, by rejection."""
+    found = np.zeros((0, 3))
+    while len(found) < count:
+        n = unit_vectors(random, 3 * count) @ space.identity
+        n /= np.linalg.norm(n, axis=1, keepdims=True)
+        found = np.concatenate([found, n[random.random(len(n)) * most < density(n)]])
+    return found[:count]

@@ -97,3 +97,10 @@ def off_by(packing, position) -> np.ndarray:
     if packing.is_periodic:
         branch = branch + packing.cell.nearest_image(branch) @ packing.cell.vectors
     return np.abs(branch)
+
+
+def branches(packing) -> np.ndarray:
+    """From the first grain of each contact to the second, shape (M, 3)."""
+    one, two = packing.contacts.pairs.T
+    across = packing.contacts.image @ packing.cell.vectors
+    return packing.position[two] - packing.position[one] + across

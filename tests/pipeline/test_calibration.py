@@ -1,5 +1,7 @@
 """Calibration: ladders, from where on they are steady, and recommended settings that hold."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -27,11 +29,11 @@ def ladder(found, name, variant="c"):
 
 
 def test_ladders_go_from_coarse_to_fine(found):
-    assert [row.value for row in ladder(found, "spacing")] == [4, 2, 1, 0.5, 0.2, 0.1]
+    values = {name: [row.value for row in ladder(found, name)] for name in ("spacing", "cutoff")}
+    assert values == {"spacing": [4, 2, 1, 0.5, 0.2, 0.1], "cutoff": [k / 4 for k in range(13)]}
     directions = ladder(found, "directions")
     assert [row.value for row in directions] == [row.directions for row in directions]
     assert [row.degree for row in directions] == [5, 9, 11, 17, 23, 31, 41]
-    assert [row.value for row in ladder(found, "cutoff")] == [0.25 * k for k in range(13)]
     assert [row.value for row in ladder(found, "rv", "d")] == [0.4, 0.5, 0.6, 0.67, 0.7, 0.8]
     errors = [row.alpha_vs_axial_se for row in ladder(found, "spacing")[-3:]]
     assert errors[0] > errors[1] > errors[2]
@@ -39,22 +41,21 @@ def test_ladders_go_from_coarse_to_fine(found):
 
 def test_a_step_is_a_computation_with_its_settings(packing, found):
     options = {**QUICK, "spacing": "0.5rmin", "directions": "icosahedral:9"}
-    expected = compute(packing, **options)
-    for one, row in zip(expected, [ladder(found, "spacing", v)[3] for v in "cd"], strict=True):
-        assert row.alpha_vs_axial == one.alpha_vs_axial
-        assert row.alpha_vs_axial_se == one.alpha_vs_axial_se
+    for one in compute(packing, **options):
+        row = ladder(found, "spacing", one.variant)[3]
         assert row.spacing == pytest.approx(0.5 * packing.radius.min())
-        assert (row.segments, row.mean_length) == (one.segments, one.mean_length)
+        for name in ("alpha_vs_axial", "alpha_vs_axial_se", "segments", "mean_length"):
+            assert getattr(row, name) == one[name]
 
 
 def test_recommended_settings_reach_their_error(packing, found):
     best = [row for row in found.rows if row.ladder == "recommended"]
     at_cutoff = [row for row in found.rows if row.ladder == "cutoff" and row.value == 1.0]
     sample = max(row.alpha_vs_axial_sample_se or 0.0 for row in at_cutoff)
-    target = max(QUICK["tolerance"], 0.25 * sample)
-    assert max(row.alpha_vs_axial_se for row in best) <= target
+    errors = [row.alpha_vs_axial_se for row in best]
+    assert max(errors) <= max(QUICK["tolerance"], 0.25 * sample)
     table = compute(packing, **QUICK, **found.options)
-    assert table["alpha_vs_axial_se"].tolist() == [row.alpha_vs_axial_se for row in best]
+    assert table["alpha_vs_axial_se"].tolist() == errors
 
 
 def step(value, alpha, error, **more):
@@ -69,6 +70,10 @@ def test_steady_is_what_differs_from_later_steps_by_no_more_than_chance():
     assert [row.steady for row in judged(steps)] == [0, 1, 1, 1, 1]
     far = [step(9, 0.0129, 0.001), *steps[:2], steps[4]]
     assert [row.steady for row in judged(far)] == [0, 0, 1, 1]
+    for doubt in ({"alpha_vs_axial_se": None}, {"note": "few"}, {"alpha_vs_axial": None}):
+        found = judged([steps[4], replace(steps[4], **doubt), steps[4]])
+        assert [row.steady for row in found] == [0, 0, 1]
+        assert first_steady(found) is None  # there is nothing that the last one agrees with
 
 
 def test_an_rv_within_another_differs_from_it_by_less_than_two_samples_do():
@@ -86,58 +91,41 @@ def test_an_rv_within_another_differs_from_it_by_less_than_two_samples_do():
     assert 0.005 * 400 < unsteady < 0.08 * 400
 
 
-@pytest.mark.parametrize(
-    "doubt", [{"alpha_vs_axial_se": None}, {"note": "few"}, {"alpha_vs_axial": None}]
-)
-def test_a_doubtful_step_is_not_steady(doubt):
-    steps = [step(0, 0.01, 0.001), step(1, 0.01, 0.001, **doubt), step(2, 0.01, 0.001)]
-    found = judged(steps)
-    assert [row.steady for row in found] == [0, 0, 1]
-    assert first_steady(found) is None  # there is nothing that the last one agrees with
-
-
 LEAVE_OUT = "leave out `cutoffs`, `moment` and all but one `rv`"
 
 
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({"frame": 1}, "frames: the series has no frame in 1:"),
-        ({"frame": -2}, "frames: the series has no frame in -2:"),
-        ({"moment": 2}, LEAVE_OUT),
-        ({"cutoffs": "0.1,0.2"}, LEAVE_OUT),
-        ({"rv": (0.5, 0.6)}, LEAVE_OUT),
+        ({"frame": -2}, "frames: the series has no frame in -2:"), ({"moment": 2}, LEAVE_OUT),
+        ({"cutoffs": "0.1,0.2"}, LEAVE_OUT), ({"rv": (0.5, 0.6)}, LEAVE_OUT),
         ({"tolerence": 0.02}, "calibrate has no option 'tolerence': .*'tolerance'"),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_calibrated_is_refused(packing, options, told):
-    with pytest.raises(TypeError if "tolerence" in options else SettingsError, match=told):
+    with pytest.raises((TypeError, SettingsError), match=told):
         calibrate(packing, **{**QUICK, **options})
 
 
 def test_the_sentences_say_what_the_rows_show(found):
     """Of each ladder the first step that is steady in all variants; of cut-offs the largest."""
-    said = []
-    for name in ("spacing", "directions", "rv"):
+    said = dict(sentence.split(": ", 1) for sentence in found.findings)
+    assert list(said) == ["spacing", "directions", "cut-off", "rv", "recommended"]
+    for name, paper in (("spacing", "0.1"), ("directions", ""), ("rv", "0.67 to 0.7")):
         rows = [row for row in found.rows if row.ladder == name]
-        steps = dict.fromkeys(row.value for row in rows)
-        steady = [v for v in steps if all(row.steady for row in rows if row.value == v)]
+        unsteady = {row.value for row in rows if not row.steady}
+        first = next(row.value for row in rows if row.value not in unsteady)
+        steady = f"from {first:g} on, nothing changes within the errors"
         # the last one has nothing to agree with
-        is_known = steady[0] != [*steps][-1]
-        from_there = f"from {steady[0]:g} on, nothing changes within the errors"
-        said.append(f"{name}: {from_there if is_known else 'no step agrees with all later ones'}")
+        expected = "no step agrees with all later ones" if first == rows[-1].value else steady
+        assert said[name] == expected + (f" (the paper: {paper})" if paper else "")
     alpha = {row.value: row.alpha_vs_axial for row in ladder(found, "cutoff") if row.alpha_vs_axial}
     best = max(alpha, key=lambda value: abs(alpha[value]))
-    said.insert(
-        2,
-        f"cut-off: it decides what is measured; in variant c the anisotropy is largest ("
-        f"{alpha[best]:.2g}) at {best:g} r_min; at the paper's 1 r_min it is "
-        f"{alpha[1.0] / alpha[best]:.0%} of that",
+    assert said["cut-off"] == (
+        f"it decides what is measured; in variant c the anisotropy is largest ({alpha[best]:.2g}) "
+        f"at {best:g} r_min; at the paper's 1 r_min it is {alpha[1.0] / alpha[best]:.0%} of that"
     )
-    papers = [" (the paper: 0.1)", "", "", " (the paper: 0.67 to 0.7)"]
-    expected = [one + paper for one, paper in zip(said, papers, strict=True)]
-    assert list(found.findings[:-1]) == expected
-    assert found.findings[-1].startswith("recommended: error of the scan ")
+    assert said["recommended"].startswith("error of the scan ")
 
 
 def test_steps_beyond_the_budget_are_left_out_with_a_word(packing):
@@ -158,10 +146,9 @@ def test_one_ladder_is_drawn_on_the_axes_that_it_gets(found):
         found.plot.calibration(ax=ax, ladder="lines")
 
 
-@pytest.mark.parametrize("many", [list, iter])
-def test_packings_from_anywhere_are_calibrated(many):
+def test_packings_from_anywhere_are_calibrated():
     packing = Packing(simple_cubic(4).position, 0.5)
     options = {"variants": "c", "tolerance": 0.1, "rv": 0.6, "contact_tolerance": 1e-4}
-    found = calibrate(many([packing, packing]), **options)
+    found = calibrate(iter([packing, packing]), **options)
     assert {row.frame for row in found.rows} == {1}
     assert found.options == calibrate(packing, **options).options

@@ -1,14 +1,12 @@
 """Packings from lists and generators, frames in other processes, and frames one by one."""
 
-from __future__ import annotations
-
 import gzip
 import os
-import pickle
 import tempfile
 import threading
 import weakref
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from itertools import chain, repeat
 from multiprocessing import get_context
 
 import numpy as np
@@ -17,16 +15,12 @@ import pytest
 import scanfab
 from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.packing.packing import Packing
-from scanfab.packing.sample import Sample
 from scanfab.pipeline.compute import compute_rows
-from scanfab.pipeline.frame import compute_frame
-from scanfab.pipeline.plan import make_plan
 from scanfab.pipeline.settings import Settings
-from tests.helpers.dumps import dump_text, write
+from tests.helpers.dumps import NAMES, dump_text, write
 from tests.helpers.lattices import shaken_cubic
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "cd"}
-NAMES = "id type x y z radius"
 
 
 def packings(count=4):
@@ -39,31 +33,29 @@ def packings(count=4):
 
 def series_in(folder, count=4):
     """The same as a dump of snapshots."""
-    text = "".join(map(text_of, packings(count)))
-    return scanfab.read_series(write(folder / "dump.txt", text))
+    return scanfab.read_series(write(folder / "dump.txt", "".join(map(text_of, packings(count)))))
 
 
 def text_of(packing):
     """One snapshot of a dump."""
-    rows = zip(packing.id, packing.position.tolist(), packing.radius, strict=True)
-    table = [(int(id) + 1, 1, *place, float(radius)) for id, place, radius in rows]
-    return dump_text(table, NAMES, step=packing.step, box=((0, 10),) * 3)
+    table = np.column_stack([packing.id + 1, packing.id, packing.position, packing.radius])
+    return dump_text(table.tolist(), NAMES, step=packing.step, box=((0, 10),) * 3)
 
 
-def test_an_iterable_of_packings_is_a_series():
+def test_an_iterable_of_packings_is_a_series(tmp_path):
     """Each comes with the plan of the first."""
     table = scanfab.compute(list(packings()), strain="grains", **SCAN)
     assert [(row.frame, row.step, row.source) for row in table[::2]] == [
         (k, k, "") for k in range(4)
     ]
     assert [row.strain for row in table[::2]] == pytest.approx([0.0, 0.01, 0.02, 0.03])
-    window = make_plan(Settings(**SCAN), plan_sample(next(packings()))).window
-    words = {"rv_radius": window.radius, "rv_center": tuple(window.center)}
+    (first,) = scanfab.inspect(series_in(tmp_path, 1))
+    words = {"rv_radius": first.rv_radius, "rv_center": first.rv_center}
     alone = scanfab.compute(list(packings())[-1], **SCAN, **words)
     assert [row.gvs_zz for row in table[-2:]] == [row.gvs_zz for row in alone]
 
 
-@pytest.mark.parametrize("frames", [None, "1:3", "-2:"])
+@pytest.mark.parametrize("frames", [None, "-3:-1"])
 def test_a_generator_gives_what_a_list_gives(frames):
     lists = scanfab.compute(list(packings()), frames=frames, **SCAN)
     assert scanfab.compute(packings(), frames=frames, **SCAN) == lists
@@ -71,12 +63,8 @@ def test_a_generator_gives_what_a_list_gives(frames):
 
 def test_rows_of_a_stream_come_before_its_end():
     """Those of a running simulation, of which nobody knows how long it goes on."""
-
-    def endless():
-        while True:
-            yield from packings()
-
-    rows = compute_rows(endless(), Settings(workers=2, **SCAN))
+    endless = chain.from_iterable(map(packings, repeat(4)))
+    rows = compute_rows(endless, Settings(workers=2, **SCAN))
     assert [next(rows).frame for _ in range(12)] == [k // 2 for k in range(12)]
     rows.close()
 
@@ -93,17 +81,14 @@ def test_a_stream_is_not_kept_in_memory():
     assert len(scanfab.compute(watched(), workers=1, **SCAN)) == 24
 
 
-def test_what_is_no_packing_is_named():
+def test_what_is_no_packing_and_frames_that_do_not_exist_are_named():
+    with pytest.raises(SettingsError, match=r"no frame in 7:9: .*has 4 frames, 0 to 3"):
+        scanfab.compute(packings(), frames="7:9", **SCAN)
     with pytest.raises(SettingsError, match="expected packings, found 3 among them"):
         scanfab.compute([*packings(1), 3], **SCAN)
     for source in ("dumps/", 7):
         with pytest.raises(SettingsError, match=f"or an iterable of packings, found {source!r}"):
             scanfab.compute(source, **SCAN)
-
-
-def test_frames_that_do_not_exist_are_told_with_how_many_there_are():
-    with pytest.raises(SettingsError, match=r"no frame in 7:9: .*has 4 frames, 0 to 3"):
-        scanfab.compute(packings(), frames="7:9", **SCAN)
 
 
 class FirstIsSlow(ThreadPoolExecutor):
@@ -140,16 +125,15 @@ def processes():
 
 def test_other_processes_give_the_same_rows(tmp_path, processes):
     series = series_in(tmp_path)
-    found = scanfab.compute(series, executor=processes, **SCAN)
-    assert found == scanfab.compute(series, **SCAN)
-    packed = scanfab.compute(packings(), executor=processes, **SCAN)
-    assert packed == scanfab.compute(packings(), **SCAN)
+    for source in (lambda: series, packings):
+        found = scanfab.compute(source(), executor=processes, **SCAN)
+        assert found == scanfab.compute(source(), **SCAN)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
 def test_forked_processes_leave_the_copies_of_packed_files_alone(tmp_path, monkeypatch):
     """Copies are those of one process; a forked one makes its own, and takes them with it."""
-    for number, one in enumerate(packings(30)):
+    for number, one in enumerate(packings(12)):
         (tmp_path / f"packed_{number}.txt.gz").write_bytes(gzip.compress(text_of(one).encode()))
     series = scanfab.read_series(tmp_path / "packed_*.txt.gz")
     before = scanfab.compute(series, workers=2, **SCAN)
@@ -173,20 +157,3 @@ def test_what_another_process_is_told_is_heard_here(tmp_path, processes):
         about = f"{frames}, variants c, d: "
         found = [text for text in texts if text.startswith(about)]
         assert sum("no void segment reaches the cut-off 50" in text for text in found) == 1
-
-
-def plan_sample(packing):
-    return Sample(scanfab.find_contacts(packing), np.zeros(len(packing), bool))
-
-
-def test_a_frame_is_computed_alone_from_its_plan(tmp_path):
-    series = series_in(tmp_path)
-    every = scanfab.compute(series, **SCAN)
-    first, *_, last = series
-    plan = make_plan(Settings(**SCAN), plan_sample(first.read()))
-    found = compute_frame(last, pickle.loads(pickle.dumps(plan)), number=3, source=series.name)
-    assert [row.gvs_zz for row in found.rows] == [row.gvs_zz for row in every[-2:]]
-    assert [(row.source, row.frame) for row in found.rows] == [(series.name, 3)] * 2
-    rows = compute_frame(Packing(np.zeros((0, 3)), []), plan, number=5).rows
-    empty = [(row.frame, row.variant, row.grains, row.gvs_zz) for row in rows]
-    assert empty == [(5, "c", 0, None), (5, "d", 0, None)]

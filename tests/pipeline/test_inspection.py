@@ -1,9 +1,8 @@
-"""What is told of each frame, computed from nothing but the packing."""
-
-from __future__ import annotations
+"""What is told of each frame without a scan, and its sample."""
 
 import warnings
 
+import numpy as np
 import pytest
 
 import scanfab
@@ -27,6 +26,10 @@ def test_grains_contacts_and_rattlers_are_counted(tmp_path):
     assert report.coordination == pytest.approx(4 / 3)
     assert (report.radius_min, report.radius_max) == (0.1, 0.1)
     assert report.contacts_from == "file"
+    (tmp_path / "pairs.txt").unlink()
+    (empty,) = reports(tmp_path, [dump_text([])])
+    assert empty.grains == 0
+    assert empty.radius_min is empty.radius_max is empty.coordination is None
 
 
 def test_a_boundary_that_fits_nothing_in_any_frame_is_an_error_or_the_rule_is_told(tmp_path):
@@ -37,12 +40,8 @@ def test_a_boundary_that_fits_nothing_in_any_frame_is_an_error_or_the_rule_is_to
         (report,) = reports(tmp_path, [dump_text()], boundary=["type=2", "type=9"])
     assert len(told) == 1
     assert (report.grains, report.boundary, report.warnings) == (2, 1, [])
-
-
-def test_a_boundary_that_fits_nothing_in_one_frame_is_a_warning(tmp_path):
-    """Here a plate that is put in later."""
-    plate = [*ROWS, (4, 9, 0.9, 0.5, 0.5, 0.1)]
-    texts = [dump_text(), dump_text(plate, step=1)]
+    # a plate may be put in later
+    texts = [dump_text(), dump_text([*ROWS, (4, 9, 0.9, 0.5, 0.5, 0.1)], step=1)]
     first, second = reports(tmp_path, texts, boundary="type=9")
     assert first.warnings == ["`boundary`: no particle has type=9: type is 1 or 2"]
     assert (first.boundary, second.boundary, second.warnings) == (0, 1, [])
@@ -70,31 +69,31 @@ def test_a_sheet_of_discs_is_no_doubt():
     assert report.rv_center[2] == 0.0
 
 
-def test_an_empty_frame_has_no_radii(tmp_path):
-    empty, full = reports(tmp_path, [dump_text([]), dump_text(step=1)])
-    assert (empty.grains, empty.radius_min, empty.radius_max, empty.coordination) == (
-        0, None, None, None,
-    )  # fmt: skip
-    assert full.grains == len(ROWS)
+def test_options_that_do_not_exist_or_fit_are_refused_at_once(tmp_path):
+    series = scanfab.read_series(write(tmp_path / "dump.txt", dump_text()))
+    for function in (scanfab.inspect, scanfab.samples):
+        with pytest.raises(TypeError, match="did you mean 'boundary'"):
+            function(series, boundry="type=2")
+        with pytest.raises(scanfab.SettingsError, match="boundary"):
+            function(series, boundary="mask")
 
 
-def test_a_part_of_a_series_is_reported_as_its_frames_among_all(tmp_path):
-    texts = [dump_text(step=step) for step in range(4)]
-    write(tmp_path / "dump.txt", "".join(texts))
+def test_samples_are_told_apart_by_the_options_of_compute(tmp_path):
+    for step in range(4):
+        write(tmp_path / f"dump_{step}.txt", dump_text(step=step))
     series = scanfab.read_series(tmp_path)
-    every = list(inspect_series(series, Settings()))
-    assert [report.frame for report in every] == [0, 1, 2, 3]
-    assert list(inspect_series(series, Settings(frames="1:4:2"))) == every[1::2]
-    assert list(inspect_series(series[1:3], Settings())) == every[1:3]
-    assert list(inspect_series(series[1:], Settings(frames="-1"))) == every[3:]
-
-
-def test_options_that_do_not_exist_or_fit_are_refused_at_once():
-    series = scanfab.read_series(SAMPLE_DATA / "liggghts_periodic" / "dump_*.txt.gz")
-    with pytest.raises(TypeError, match="min_contacts"):
-        scanfab.inspect(series, min_contact=3)
-    with pytest.raises(scanfab.SettingsError, match="boundary"):
-        scanfab.inspect(series, boundary="mask")
+    ((number, sample),) = scanfab.samples(series[2].read(), boundary="type=2", min_contacts=1)
+    assert number == 0
+    np.testing.assert_array_equal(sample.boundary, sample.packing.columns["type"] == 2)
+    assert sample.contacts.source == "geometric"
+    assert not sample.rattlers.any()
+    chosen = scanfab.samples(series[1:], frames="1:")
+    assert [(number, sample.packing.step) for number, sample in chosen] == [(2, 2), (3, 3)]
+    write(tmp_path / "dump_1.txt", dump_text(step=1)[:50])
+    with pytest.raises(scanfab.ReadError, match="dump_1"):
+        list(scanfab.samples(series))
+    with pytest.warns(ScanfabWarning, match="frame 1"):
+        assert [number for number, _ in scanfab.samples(series, on_error="skip")] == [0, 2, 3]
 
 
 def test_the_rv_is_that_of_the_first_frame_whichever_frames_are_chosen(tmp_path):

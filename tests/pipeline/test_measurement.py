@@ -89,30 +89,26 @@ def test_turned_with_its_axis_the_sample_has_the_same_octants(packing):
 
 def test_cut_offs_whose_errors_are_above_the_tolerance_are_told(packing):
     """Few segments reach the larger one, along lines that suffice for the other."""
-    words = {"variants": "c", "tolerance": 2e-3, "cutoff": 0.2}
-    with pytest.warns(
-        ScanfabWarning, match=r"c: at the cut-off 0.8 .* above the tolerance 0.002, which"
-    ):
-        table = compute(packing, **words, cutoffs="0.2,0.8")
-    low, high = table
+    words = {"variants": "c", "tolerance": 2e-3, "cutoff": 0.2, "cutoffs": "0.2,0.8"}
+    told = r"c: at the cut-off 0.8 .* above the tolerance 0.002, which"
+    with pytest.warns(ScanfabWarning, match=told):
+        low, high = compute(packing, **words)
     assert low.alpha_vs_axial_se <= 2e-3 < high.alpha_vs_axial_se
 
 
 def measured(packing, **words):
-    sample, settings = Sample(packing, np.zeros(len(packing), bool)), Settings(**words)
-    (found,) = measure(sample, make_plan(settings, sample))
+    sample = Sample(packing, np.zeros(len(packing), bool))
+    (found,) = measure(sample, make_plan(Settings(**words), sample))
     return found
 
 
 def test_other_cut_offs_of_the_same_lines_are_those_of_a_scan_with_all_of_them(packing):
     """To the last bit: nothing but the cut-offs is another."""
     words = {"variants": "cd", "tolerance": 5e-3, "cutoff": 0.3}
-    found = measured(packing, **words)
-    again = found.at_cutoffs([0.6, 0.3, 0.0])
+    again = measured(packing, **words).at_cutoffs([0.6, 0.3, 0.0])
     whole = measured(packing, **words, cutoffs="0,0.3,0.6")
     assert again.plan.cutoffs == whole.plan.cutoffs
     assert again.plan.spacing == whole.plan.spacing
-    for name in ("gaps", "blocked"):
-        one, other = getattr(again, name), getattr(whole, name)
+    for one, other in ((again.gaps, whole.gaps), (again.blocked, whole.blocked)):
         for part in ("number", "length", "square"):
             assert np.array_equal(getattr(one, part), getattr(other, part))

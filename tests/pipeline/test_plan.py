@@ -12,11 +12,6 @@ from scanfab.pipeline.plan import make_plan
 from tests.helpers.lattices import shaken_cubic
 
 
-def sample_of(packing, boundary=None):
-    none = np.zeros(len(packing), bool)
-    return Sample(packing, none if boundary is None else np.asarray(boundary))
-
-
 @pytest.fixture(scope="module")
 def packing():
     """216 grains of radii about 0.5 in a cube of about 6."""
@@ -24,7 +19,9 @@ def packing():
 
 
 def plan_of(packing, boundary=None, **options):
-    return make_plan(Settings(**options), sample_of(packing, boundary))
+    none = np.zeros(len(packing), bool)
+    sample = Sample(packing, none if boundary is None else np.asarray(boundary))
+    return make_plan(Settings(**options), sample)
 
 
 def test_lengths_relative_to_radii_are_those_of_the_grains_without_the_boundary():
@@ -39,7 +36,7 @@ def test_lengths_relative_to_radii_are_those_of_the_grains_without_the_boundary(
     assert plan.window.center == pytest.approx([3.1, 1.6, 1.6])
 
 
-@pytest.mark.parametrize("spacing", [0.05, 0.1, 0.3, 0.5, 0.8, 1.5, 4.0])
+@pytest.mark.parametrize("spacing", [0.1, 0.5, 1.5])
 def test_a_fixed_scan_has_sixteen_replicates_or_thirty_lines_in_each(packing, spacing):
     plan = plan_of(packing, spacing=spacing, directions="lebedev:11")
     assert (plan.rule.name, plan.auto) == ("lebedev:11", "")
@@ -76,12 +73,11 @@ def test_bias_of_a_rule_counts_over_a_tenth_of_the_tolerance(packing, tolerance,
     assert any("isotropic" in note.text for note in notes) == warns
 
 
-@pytest.mark.parametrize("variants", ["a", "cd"])
-@pytest.mark.parametrize("more", [{}, {"directions": 20}])
-def test_spacing_wider_than_the_sample_is_refused(packing, variants, more):
+@pytest.mark.parametrize("options", [{"variants": "a"}, {"variants": "cd", "directions": 20}])
+def test_spacing_wider_than_the_sample_is_refused(packing, options):
     match = r"spacing: expected a length from .* found 100: .*1rmin \(0\.4"
     with pytest.raises(SettingsError, match=match):
-        plan_of(packing, spacing=100.0, variants=variants, **more)
+        plan_of(packing, spacing=100.0, **options)
 
 
 @pytest.mark.parametrize(

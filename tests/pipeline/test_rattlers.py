@@ -1,7 +1,5 @@
 """The rule for rattlers, chosen by name: a made-up one of another package, too."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -45,11 +43,8 @@ def made_up(monkeypatch):
     rattlers.installed_rules.cache_clear()
 
 
-EXPECTED = [("count", 2), ("recursive", 3), ("untouched", 1)]
-
-
 @pytest.mark.usefixtures("made_up")
-@pytest.mark.parametrize(("rule", "expected"), EXPECTED)
+@pytest.mark.parametrize(("rule", "expected"), [("count", 2), ("recursive", 3), ("untouched", 1)])
 def test_tables_inspect_and_views_tell_the_rattlers_of_the_rule(series, rule, expected):
     whole, without = scanfab.compute(series, rattlers=rule, **SCAN)
     assert whole.rattlers == without.rattlers == expected

@@ -11,10 +11,10 @@ import pytest
 import scanfab
 from scanfab import Packing, ReadError, Settings, SettingsError
 from scanfab.base.errors import NoReferenceError, ScanfabNote
-from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.inspection import inspect_series
 from tests.helpers.dumps import dump_text, write
 from tests.helpers.lattices import shaken_cubic
+from tests.pipeline.test_compute import numbers
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "variants": "ac"}
 BOX = ((0, 30),) * 3
@@ -39,11 +39,6 @@ def bed(tmp_path):
         text = dump_text(rows_of(frame), step=100 * frame, box=BOX)
         write(folder / f"dump_{100 * frame}.txt", text)
     return folder
-
-
-def numbers(row):
-    """What a row says of the sample, whichever frame it is."""
-    return {name: value for name, value in row.items() if name not in ("source", "frame", "step")}
 
 
 @pytest.mark.parametrize("reference", [3, -1])
@@ -97,23 +92,19 @@ def test_a_frame_that_cannot_be_the_reference_is_an_error(bed, reference, error,
         scanfab.compute(scanfab.read_series(bed), reference=reference, on_error="skip", **SCAN)
 
 
-def test_streams_wait_for_their_reference():
+def test_streams_wait_for_their_reference(bed):
     packings = [Packing(*shaken_cubic(np.random.default_rng(k), 4)) for k in range(3)]
-    empty = Packing(np.zeros((0, 3)), np.zeros(0))
-    table = scanfab.compute(iter([empty, *packings]), reference=1, contact_tolerance=0.1, **SCAN)
-    assert table == scanfab.compute(iter([empty, *packings]), contact_tolerance=0.1, **SCAN)
-    with pytest.raises(NoReferenceError, match="expected 1, found 2"):
-        scanfab.compute(iter([empty, *packings]), reference=2, **SCAN)
-    with pytest.raises(NoReferenceError, match="counts from the end"):
-        scanfab.compute(iter(packings), reference=-1, **SCAN)
-    with pytest.raises(NoReferenceError, match="there is no frame 7"):
-        scanfab.compute(iter([empty]), reference=7, **SCAN)
-
-
-def test_a_followed_series_knows_no_end(bed):
-    followed = scanfab.follow_series(bed, seconds=0.1)
-    with pytest.raises(NoReferenceError, match="counts from the end"):
-        Frames(followed, Settings(reference=-1))
+    stream = [Packing(np.zeros((0, 3)), np.zeros(0)), *packings]
+    table = scanfab.compute(iter(stream), reference=1, contact_tolerance=0.1, **SCAN)
+    assert table == scanfab.compute(iter(stream), contact_tolerance=0.1, **SCAN)
+    for source, reference, told in (
+        (iter(stream), 2, "expected 1, found 2"),
+        (iter(packings), -1, "counts from the end"),
+        (iter(stream[:1]), 7, "there is no frame 7"),
+        (scanfab.follow_series(bed, seconds=0.1), -1, "counts from the end"),
+    ):
+        with pytest.raises(NoReferenceError, match=told):
+            scanfab.compute(source, reference=reference, **SCAN)
 
 
 def test_the_plane_is_that_of_the_reference(tmp_path):

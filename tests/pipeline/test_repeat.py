@@ -1,9 +1,11 @@
-"""From a manifest back: the command repeats what was asked for, and the source is found."""
+"""The manifest: what a result was made of, and from it back to the command and the source."""
 
-from __future__ import annotations
-
+import hashlib
 import json
+import platform
 import shlex
+from importlib.metadata import version
+from unittest.mock import Mock
 
 import pytest
 
@@ -18,7 +20,35 @@ from scanfab.pipeline.record import (
 )
 from scanfab.pipeline.settings import Settings
 from tests.conftest import ROOT, SAMPLE
-from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.dumps import cubic_rows, dump_text, pairs_text, write
+
+FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "a")
+
+
+def test_a_result_file_has_its_manifest_beside_it(tmp_path, capsys):
+    """Or, without a result file, where it is asked for."""
+    series = tmp_path / "series"
+    series.mkdir()
+    for frame in (0, 1):
+        write(series / f"dump_{frame}.txt", dump_text(cubic_rows(), step=frame))
+        write(series / f"pairs_{frame}.txt", pairs_text(step=frame))
+    output, path = tmp_path / "table.csv", tmp_path / "what.json"
+    words = ["compute", str(series), *FAST, "--seed", "5"]
+    assert run([*words, "-o", str(output)]) == run([*words, "--manifest", str(path)]) == 0
+    assert capsys.readouterr().out == output.read_text()
+    found = json.loads(path.read_text())
+    assert read_manifest(output) == found
+    names = ["settings", "seed", "versions", "inputs", "warnings", "notes", "frames"]
+    assert list(found) == names
+    assert found["frames"] == {str(series): 2}
+    assert found["seed"] == found["settings"]["seed"] == 5
+    assert found["versions"]["scanfab"] == version("scanfab")
+    assert found["versions"]["python"] == platform.python_version()
+    for one, file in zip(found["inputs"], sorted(series.iterdir()), strict=True):
+        data = file.read_bytes()
+        digest = hashlib.sha256(data).hexdigest()
+        assert one == {"path": str(file), "size": len(data), "sha256": digest}
+
 
 COMMANDS = [
     "dumps",
@@ -43,15 +73,10 @@ def asked_by(tmp_path, monkeypatch):
         write(tmp_path / folder / "dump_0.txt", dump_text(cubic_rows()))
 
     def asked_by(words):
-        found = {}
-
-        def remember(*given):
-            found.update(asked_for(*given))
-            raise ReadError("enough")
-
+        remember = Mock(side_effect=ReadError("enough"))
         monkeypatch.setattr("scanfab.pipeline.job.asked_for", remember)
         assert run(["compute", *words]) == 1
-        return json.loads(json.dumps(found))
+        return json.loads(json.dumps(asked_for(*remember.call_args.args)))
 
     return asked_by
 
@@ -66,11 +91,6 @@ def test_the_command_asks_for_the_same(command, asked_by):
     axes = [one.pop("axis") for one in (again, asked)]
     assert axes[0] == axes[1] or axes[0] == pytest.approx(axes[1], abs=1e-15)
     assert again == asked
-
-
-def test_what_is_usual_is_not_repeated():
-    asked = asked_for(["dumps"], {"contacts": "auto"}, Settings())
-    assert repeat_command(json.loads(json.dumps(asked))) == "scanfab compute dumps"
 
 
 def test_all_settings_but_the_workers_are_named_and_come_back():
@@ -88,21 +108,19 @@ def test_all_settings_but_the_workers_are_named_and_come_back():
 def test_the_source_is_opened_as_it_was(monkeypatch):
     monkeypatch.chdir(ROOT)
     reading = {"contacts": "geometric", "columns": None, "format": "yade"}
+    asked = json.loads(json.dumps(asked_for([SAMPLE], reading, Settings())))
     with pytest.warns(match="skipped"):
-        series = reopen(json.loads(json.dumps(asked_for([SAMPLE], reading, Settings()))))
-    assert series.name == SAMPLE
-    assert series.contacts_from == "geometric"
+        series = reopen(asked)
+    assert (series.name, series.contacts_from) == (SAMPLE, "geometric")
+    # what is usual is not repeated
+    usual = {**asked, **asked_for(["dumps"], {"contacts": "auto", "format": None}, Settings())}
+    assert repeat_command(json.loads(json.dumps(usual))) == "scanfab compute dumps"
+    for source, told in (("-", "standard input"), ("gone/away", "gone/away: there is no such")):
+        with pytest.raises(ReadError, match=told):
+            reopen(asked_for([source], {}, Settings()))
 
 
-@pytest.mark.parametrize(
-    ("source", "message"), [("-", "standard input"), ("gone/away", "gone/away: there is no such")]
-)
-def test_sources_that_are_gone_are_an_error(source, message):
-    with pytest.raises(ReadError, match=message):
-        reopen(asked_for([source], {}, Settings()))
-
-
-@pytest.mark.parametrize("text", ["{", "[]", "{}", '{"settings": {}}', "\udcff"])
+@pytest.mark.parametrize("text", ["{", "[]", '{"settings": {}}', "\udcff"])
 def test_what_is_no_manifest_is_an_error(tmp_path, text):
     assert read_manifest(tmp_path / "t.csv") is None
     path = tmp_path / "t.csv.manifest.json"

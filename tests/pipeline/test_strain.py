@@ -1,7 +1,5 @@
 """Axial strain by each mode or from a file, and shear of periodic cells, which may be flipped."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np
@@ -20,50 +18,34 @@ SCAN = {"variants": "a", "directions": 9, "spacing": "1rmin", "cutoff": 0}
 OBLIQUE = (3**-0.5,) * 3
 ALL, TWO, NONE = (True, True, True), (True, True, False), (False, False, False)
 
-WRONG = ["10,high", ",0.1", "10,", "10", "10.7,0.1", "1e999,0.1", "10,0.\0", f"10,{'9' * 140_000}"]
 
 pytestmark = pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
 
 
 def frame(stretch, plates, cell=None, periodic=ALL, step=None):
     """Grains stretched by one factor and plates by another, in a cell that leans."""
-    factor = np.where(PLATES, plates, stretch)[:, None]
-    vectors = None if cell is None else np.array([[1.0, 0, 0], [0.2, 1, 0], [0.3, 0.1, 1]])
-    return Packing(
-        POSITION * factor,
-        0.5,
-        columns={"type": 1 + PLATES},
-        cell=None if cell is None else Cell(9.0 * cell * vectors, periodic),
-        step=step,
-    )
+    if cell is not None:
+        vectors = np.array([[1.0, 0, 0], [0.2, 1, 0], [0.3, 0.1, 1]])
+        cell = Cell(9.0 * cell * vectors, periodic)
+    position = POSITION * np.where(PLATES, plates, stretch)[:, None]
+    return Packing(position, 0.5, columns={"type": 1 + PLATES}, cell=cell, step=step)
 
 
 def strain(periodic=None, boundary="type=2", **options):
     """Of grains by 1 - 0.9, of plates by 1 - 0.8, of the cell by 1 - 0.7 along z, 0.6 along y."""
     cells = [None, None] if periodic is None else [1.0, np.array([[0.5], [0.6], [0.7]])]
-    frames = [
-        frame(one, two, cell, periodic)
-        for one, two, cell in zip((1.0, 0.9), (1.0, 0.8), cells, strict=True)
-    ]
+    frames = [frame(1.0, 1.0, cells[0], periodic), frame(0.9, 0.8, cells[1], periodic)]
     return compute(frames, boundary=boundary, **SCAN, **options)["strain"][1]
 
 
 @pytest.mark.parametrize(
     ("periodic", "options", "expected"),
     [
-        (ALL, {}, 0.3),
-        (ALL, {"axis": "y"}, 0.4),
-        (TWO, {"axis": "x"}, 0.5),
-        (TWO, {}, 0.2),
-        (NONE, {"strain": "cell"}, 0.3),
-        (ALL, {"strain": "boundary"}, 0.2),
-        (NONE, {"axis": OBLIQUE}, 0.2),
-        (None, {}, 0.2),
-        (None, {"axis": "x"}, 0.2),
-        (None, {"strain": "grains"}, 0.1),
-        (None, {"boundary": ()}, np.nan),
+        (ALL, {}, 0.3), (ALL, {"axis": "y"}, 0.4), (TWO, {}, 0.2), (NONE, {"strain": "cell"}, 0.3),
+        (ALL, {"strain": "boundary"}, 0.2), (NONE, {"axis": OBLIQUE}, 0.2), (None, {}, 0.2),
+        (None, {"strain": "grains"}, 0.1), (None, {"boundary": ()}, np.nan),
     ],
-)
+)  # fmt: skip
 def test_strain_is_by_the_cell_that_repeats_else_by_the_boundary(periodic, options, expected):
     """A cell by its diagonal entry, particles by the extent of their centres along the axis."""
     assert strain(periodic, **options) == pytest.approx(expected, nan_ok=True)
@@ -78,9 +60,8 @@ def test_strain_is_by_the_cell_that_repeats_else_by_the_boundary(periodic, optio
     ],
 )
 def test_what_is_not_there_cannot_be_measured(periodic, options, message):
-    with pytest.raises(
-        SettingsError, match=f"strain: {options['strain']} was asked for.*{message}"
-    ):
+    asked = f"strain: {options['strain']} was asked for.*{message}"
+    with pytest.raises(SettingsError, match=asked):
         strain(periodic, **options)
 
 
@@ -101,15 +82,18 @@ def test_a_file_names_strains_by_step_or_frame(tmp_path, text, expected):
     np.testing.assert_array_equal(found, expected)
 
 
+WRONG = ["10,high", ",0.1", "10", "10.7,0.1", "1e999,0.1", "10,0.\0", f"10,{'9' * 140_000}"]
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("", "expected a table"),
-        ("step,epsilon\n1,2\n", "expected the columns step or frame, and strain"),
-        ("time,strain\n1,2\n", "expected the columns step or frame, and strain"),
+        *((f"{names}\n1,2\n", "expected the columns step or frame, and strain")
+          for names in ("step,epsilon", "time,strain")),
         *((f"step,strain\n0,0\n{row}\n", "line 3: expected") for row in WRONG),
     ],
-)
+)  # fmt: skip
 def test_a_file_that_is_no_table_of_strains_is_an_error_by_its_line(tmp_path, text, message):
     file = write(tmp_path / "s.csv", text)
     with pytest.raises(ReadError, match=rf"s\.csv(, |: ){message}.{{,100}}"):
@@ -155,11 +139,9 @@ def test_the_sample_has_the_strain_of_its_deck():
 def tilted_series(folder, tilts, edge=4.0):
     """Snapshots as LAMMPS writes them: the bounds are those of the box about the cell."""
     texts = []
-    for step, tilt in enumerate(tilts):
-        lean = edge * tilt
+    for step, lean in enumerate(edge * np.array(tilts)):
         box = ((min(0, lean), edge + max(0, lean), lean), (0, edge, 0), (0, edge, 0))
-        rows = cubic_rows(int(edge))
-        texts.append(dump_text(rows, step=step, box=box, flags=" xy xz yz pp pp pp"))
+        texts.append(dump_text(cubic_rows(), step=step, box=box, flags=" xy xz yz pp pp pp"))
     return scanfab.read_series(write(folder / "dump.txt", "".join(texts)))
 
 

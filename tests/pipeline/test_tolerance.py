@@ -11,20 +11,26 @@ from scanfab.scan.directions import AUTO_RULE, direction_rule
 from tests.helpers.lattices import shaken_cubic
 
 
+def cube(**options):
+    """216 grains, some of which touch."""
+    return find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 6), **options))
+
+
 @pytest.fixture(scope="module")
 def packing():
-    return find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 6)))
+    return cube()
 
 
 @pytest.fixture(scope="module")
 def repeated():
     """The same grains in a cell that repeats."""
-    spheres = shaken_cubic(np.random.default_rng(0), 6)
-    return find_contacts(Packing(*spheres, cell=Cell(6.0 * np.eye(3), (True, True, True))))
+    return cube(cell=Cell([6.0] * 3))
 
 
-@pytest.mark.parametrize("options", [{}, {"directions": 30}, {"spacing": "0.4rmin"}])
-@pytest.mark.parametrize("tolerance", [5e-3, 4e-4])
+@pytest.mark.parametrize(
+    ("options", "tolerance"),
+    [({}, 4e-4), ({"directions": 30}, 4e-4), ({"spacing": "0.4rmin"}, 2e-3)],
+)
 def test_auto_scan_meets_the_tolerance_for_every_variant(packing, options, tolerance):
     table = compute(packing, tolerance=tolerance, **options)
     assert len(table) == 4
@@ -69,7 +75,7 @@ def test_scan_stops_before_it_cuts_more_chords_than_allowed(packing):
     assert cut[0] < cut[1]
 
 
-@pytest.mark.parametrize("variants", ["a", "b", "ab", "ac"])
+@pytest.mark.parametrize("variants", ["b", "ac"])
 def test_periodic_whole_takes_about_as_many_lines_as_the_open_one(packing, repeated, variants):
     """Also without an RV, where no image of a grain is near the origin."""
     lines = {"variants": variants, "tolerance": 4e-4}
@@ -92,18 +98,16 @@ def test_budget_holds_for_periodic_packings_too(repeated, variants):
 
 
 @pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
-def test_following_lines_through_an_empty_cell_counts_in_the_budget(packing):
+def test_following_lines_through_an_empty_cell_counts_in_the_budget():
     """
     Grains in a cell four times as long, wide and high.
 
     Lines are set further apart than the tolerance asks for, and the note says why.
     """
-    cell = Cell(24.0 * np.eye(3), (True, True, True))
-    nearly_empty = find_contacts(Packing(packing.position, packing.radius, cell=cell))
-    options = {"tolerance": 1e-5, "variants": "ab"}
+    nearly_empty, options = cube(cell=Cell([24.0] * 3)), {"tolerance": 1e-5, "variants": "ab"}
     with pytest.warns(ScanfabWarning, match="of the work was to follow long void.*`periodic"):
-        few = compute(nearly_empty, max_chords=1e7, **options)[0]
-    more = compute(nearly_empty, max_chords=1e8, **options)[0]
+        few = compute(nearly_empty, max_chords=3e6, **options)[0]
+    more = compute(nearly_empty, max_chords=2e7, **options)[0]
     assert few.lines < 0.3 * more.lines
     assert few.alpha_vs_axial_se > 1e-5
 
@@ -120,12 +124,12 @@ def loose():
 
 
 def test_a_variant_that_cannot_meet_the_tolerance_does_not_hold_back_its_neighbour(loose):
-    options = {"tolerance": 5e-4, "max_chords": 3e8}
+    options = {"tolerance": 1e-3, "max_chords": 1e8}
     (alone,) = compute(loose, variants="a", **options)
     with pytest.warns(ScanfabWarning) as caught:
         whole, few = compute(loose, variants="ab", **options)
     assert few.grains == 8 < 0.1 * whole.grains
-    assert whole.alpha_vs_axial_se <= 5e-4
+    assert whole.alpha_vs_axial_se <= 1e-3
     assert whole.lines == alone.lines
     (told,) = {str(one.message) for one in caught if "tolerance" in str(one.message)}
     assert f"variant b: alpha_vs_axial_se is {few.alpha_vs_axial_se:.2g}, where" in told
@@ -134,24 +138,19 @@ def test_a_variant_that_cannot_meet_the_tolerance_does_not_hold_back_its_neighbo
 @pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
 @pytest.mark.parametrize("sample", ["packing", "loose"])
 def test_the_whole_and_the_rv_are_scanned_as_if_each_were_alone(sample, request):
-    options = {"tolerance": 2e-3, "max_chords": 1e7, "rv": (0.5, 0.7), "seed": 4}
+    options = {"tolerance": 2e-3, "max_chords": 3e6, "rv": (0.5, 0.7), "seed": 4}
     source = request.getfixturevalue(sample)
-    table = compute(source, **options)
-    whole, inner = (
-        compute(source, variants="ab", **options),
-        compute(source, variants="cd", **options),
-    )
-    apart = [{**dict(row), "rv": row.get("rv")} for row in (*whole, *inner)]
-    assert [dict(row) for row in table] == [{**row, "rv": row.get("rv")} for row in apart]
+    alone = [row for names in ("ab", "cd") for row in compute(source, variants=names, **options)]
+    for row, expected in zip(compute(source, **options), alone, strict=True):
+        assert dict(row) == {**expected, "rv": row["rv"]}
     # a fixed scan has the same lines for all
     fixed = compute(source, spacing=0.5, directions=20, rv=(0.5, 0.7))
     assert len({row.spacing for row in fixed}) == 1
 
 
 def test_the_tolerance_auto_is_a_twentieth_of_the_error_of_the_sample(packing):
-    auto = compute(packing, seed=2)
-    for row in auto:
-        aim = max(1e-4, 0.05 * row.alpha_vs_axial_sample_se)
+    for row in compute(packing, seed=2):
+        aim = 0.05 * row.alpha_vs_axial_sample_se
         assert aim > 1e-4
         assert 0.1 * aim < row.alpha_vs_axial_se <= aim
         (same,) = compute(packing, seed=2, variants=row.variant, tolerance=aim)
@@ -179,6 +178,5 @@ def test_scan_tells_how_far_it_is_and_how_long_the_rest_takes(packing, caplog):
     with caplog.at_level("INFO", logger="scanfab"):
         compute(packing, tolerance=2e-4, variants="a")
     states = [one.getMessage() for one in caplog.records if ": error" in one.getMessage()]
-    assert states
-    for state in states:
-        assert re.fullmatch(r"frame 0: error [\d.e-]+ of 0\.0002, about \d+ (s|min)", state)
+    told = r"frame 0: error [\d.e-]+ of 0\.0002, about \d+ (s|min)"
+    assert [re.fullmatch(told, state) is not None for state in states] == [True] * len(states) != []
