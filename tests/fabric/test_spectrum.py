@@ -50,11 +50,11 @@ def test_touching_pairs_give_their_second_order_and_no_fourth():
 def test_a_pair_that_overlaps(space, cutoff):
     """It closes 2 |n·m| √(2 R* o) of gaps in a plane, 2π R* |n·m| o in space, o = δ + c |n·m|."""
     along = np.array([0.0, 1.0, 0.0])
-    pairs = NearPairs(along[None], np.array([0.02]), np.array([0.25]), 1.0, 1.0, space)
+    pairs = NearPairs(along[None], np.array([0.2]), np.array([0.25]), 1.0, 1.0, space)
     even = (np.arange(1000) + 0.5) / 1000
     cosine = np.sin(even * np.pi / 2) if space.is_plane else even
     upto = np.linspace(0.0, cutoff, 201)[:, None]
-    overlap = 0.02 + upto * cosine
+    overlap = 0.2 + upto * cosine
     closed = cosine * (np.sqrt(2 * overlap) if space.is_plane else 0.5 * np.pi * overlap)
     void = 0.2 - trapezoid(1 - closed, upto, axis=0)
     length = cutoff + void / (1 - closed[-1])
