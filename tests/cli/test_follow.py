@@ -71,7 +71,7 @@ def test_grains_wait_for_their_contacts(folder):
     """As VTK, packed; contact files come long after the grains of their frame."""
     steps = []
     for grains, contacts in sample_frames()[:2]:
-        steps += [*copied(folder, [grains]), partial(time.sleep, 0.5), *copied(folder, [contacts])]
+        steps += [*copied(folder, [grains]), partial(time.sleep, 1.0), *copied(folder, [contacts])]
     assert is_followed(steps, "--boundary", "mask=3")
     data = Path("t.csv").read_bytes()
     assert b",file," in data

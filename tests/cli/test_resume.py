@@ -43,7 +43,7 @@ def last_frame(series, dumps):
 
 @pytest.fixture
 def compute(dumps, monkeypatch, capsys):
-    """Runs the command; says its exit code, and how many frames it has computed."""
+    """Runs the command; says its exit code, and how many frames it has tried to compute."""
     counted = Mock(wraps=compute_frame)
     monkeypatch.setattr("scanfab.pipeline.compute.compute_frame", counted)
 
@@ -240,8 +240,8 @@ def test_a_frame_that_was_skipped_is_tried_again(compute, dumps, stop, resumes):
     good = second.read_text()
     second.write_text("ITEM: TIMESTEP\n")
     stop("table.csv", *skip, row=5)
-    for computed in (1, 0):
-        assert resumes("table.csv", computed, *skip, code=1, told="frame 1 skipped")
+    for tried in (2, 1):
+        assert resumes("table.csv", tried, *skip, code=1, told="frame 1 skipped")
     # with two frames in place of one, later frames would have other numbers
     second.write_text(good + good.replace("TIMESTEP\n100", "TIMESTEP\n150"))
     assert compute("table.csv", *skip, "--resume") == (2, 0)

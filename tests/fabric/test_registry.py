@@ -114,6 +114,7 @@ WRONG = [
     ({}, r"expected a value for each of \['foreign'\], found {}"),
     ({"foreign": 1.0, "other": 2.0}, "expected a value for each .* 'other': 2.0"),
     ({"foreign": "high"}, "'fabric': TypeError"),
+    ({"foreign": 1.5}, "foreign: expected int or None, found 1.5"),
     (ZeroDivisionError("by 0"), "'fabric': ZeroDivisionError: by 0"),
     (3, "'fabric': TypeError"),
 ]
@@ -121,7 +122,7 @@ WRONG = [
 
 @pytest.mark.parametrize(("values", "told"), WRONG)
 def test_a_wrong_value_is_an_error_that_names_the_fabric(offered, values, told):
-    fabric = Foreign({"foreign": 1.0})
+    fabric = Foreign({"foreign": 1}, kind=int)
     fabric.found = values
     offered("fabric", fabric)
     with pytest.raises(ScanfabError, match=told):

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 import scanfab
 from scanfab import Packing
-from scanfab.base.space import Space
+from scanfab.base.space import SPACE, Space
 from scanfab.fabric.predicted import LONGEST_GAP, predicted_alpha
 from scanfab.packing.search import NearPairs
 from scanfab.scan.directions import direction_rule
@@ -44,15 +45,21 @@ def test_touching_pairs_give_their_second_order_and_no_fourth():
         assert found == pytest.approx(expected, rel=0.02, abs=1e-12)
 
 
-def test_discs_in_a_row_that_overlap():
-    """In a plane a pair closes 2 |n·m| √(2 R* δ) of gaps."""
-    plane = Space(2)
-    pairs = NearPairs(np.eye(3)[1:2], np.array([0.02]), np.array([0.25]), 1.0, 1.0, plane)
-    angle = (np.arange(10000) + 0.5) * np.pi / 10000
-    number = 1.0 - 2 * np.abs(np.sin(angle)) * np.sqrt(2 * 0.25 * 0.02)
-    expected = np.sum(-np.cos(2 * angle) / number) / np.sum(1 / number)
-    found = predicted_alpha(pairs, 0.2, 0.0, (0, 1, 0))
-    assert found == pytest.approx(expected, rel=1e-3)
+@pytest.mark.parametrize("cutoff", [0.0, 0.1])
+@pytest.mark.parametrize("space", [SPACE, Space(2)])
+def test_a_pair_that_overlaps(space, cutoff):
+    """It closes 2 |n·m| √(2 R* o) of gaps in a plane, 2π R* |n·m| o in space, o = δ + c |n·m|."""
+    along = np.array([0.0, 1.0, 0.0])
+    pairs = NearPairs(along[None], np.array([0.2]), np.array([0.25]), 1.0, 1.0, space)
+    even = (np.arange(1000) + 0.5) / 1000
+    cosine = np.sin(even * np.pi / 2) if space.is_plane else even
+    upto = np.linspace(0.0, cutoff, 201)[:, None]
+    overlap = 0.2 + upto * cosine
+    closed = cosine * (np.sqrt(2 * overlap) if space.is_plane else 0.5 * np.pi * overlap)
+    void = 0.2 - trapezoid(1 - closed, upto, axis=0)
+    length = cutoff + void / (1 - closed[-1])
+    expected = length @ space.axial(cosine**2) / length.sum()
+    assert predicted_alpha(pairs, 0.2, cutoff, along) == pytest.approx(expected, rel=5e-3)
 
 
 def test_it_stands_beside_the_sheared_sample():
