@@ -39,7 +39,7 @@ def copied(folder: Path, files: list[Path], pause: float = 0.02) -> list:
     return [partial(in_halves, path.read_bytes(), folder / path.name, pause) for path in files]
 
 
-def follow(*words: str, seconds: float = 0.8) -> int:
+def follow(*words: str, seconds: float = 2.5) -> int:
     return run(["compute", "dumps", *FAST, "--follow-for", str(seconds), "-o", "t.csv", *words])
 
 
@@ -222,7 +222,7 @@ def test_it_ends_with_the_last_frame_that_is_asked_for(folder, series):
 
 def test_the_library_follows(folder, series):
     thread = meanwhile(copied(folder, sorted(series.iterdir())))
-    followed = scanfab.follow_series(folder, seconds=0.8)
+    followed = scanfab.follow_series(folder, seconds=2.0)
     words = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin"}
     table = scanfab.compute(followed, **words)
     thread.join()
