@@ -94,14 +94,13 @@ def test_the_command_asks_for_the_same(command, asked_by):
 
 
 def test_all_settings_but_the_workers_are_named_and_come_back():
-    settings = Settings(
-        boundary=["type=2", "id>=9"], cutoff="0.3rmax", frames="1:9:2", axis="x", workers=1
-    )
+    chosen = {"boundary": ["type=2", "id>=9"], "cutoff": "0.3rmax", "frames": "1:9:2", "axis": "x"}
+    settings = Settings(**chosen, workers=1)
     asked = asked_for(["d"], {"radius": 0.1}, settings)
     assert (asked["sources"], asked["radius"], asked["cutoff"]) == (["d"], 0.1, "0.3rmax")
     assert set(Settings.__dataclass_fields__) - set(asked) == {"workers"}
     restored = restored_settings(json.loads(json.dumps(asked)))
-    for name in ("boundary", "cutoff", "frames", "axis"):
+    for name in chosen:
         assert getattr(restored, name) == getattr(settings, name)
 
 
