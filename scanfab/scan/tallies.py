@@ -151,7 +151,9 @@ class _Lines(NamedTuple):
 
     def listed(self, radius: FloatArray, variants: int) -> Flag:
         """Whether to list chords, as most are of spheres that meet few lines; bins do so anyhow."""
-        few = np.sum(radius**2) < FEW_LINES * variants * self.axes.spacing * np.sum(radius)
+        # the operator @ would wake the threads of BLAS, in each job of a scan
+        squares = np.einsum("i,i", radius, radius)
+        few = squares < FEW_LINES * variants * self.axes.spacing * np.sum(radius)
         return True if few and not self.bins.cutoffs.size else None
 
     def scan_cell(self) -> None:
