@@ -28,42 +28,41 @@ def packing():
 
 @pytest.fixture(scope="module")
 def grid(packing):
-    return mapped(packing, grid=(3, 2, 1), variants="ab")[0]
+    return mapped(packing, grid=(3, 2, 1), variants="ac")[0]
 
 
 def test_a_row_for_each_variant_and_block_x_fastest(packing, grid):
-    assert grid["variant"].tolist() == ["a"] * 6 + ["b"] * 6
+    """One worker gives the same, another seed does not."""
+    assert grid["variant"].tolist() == ["a"] * 6 + ["c"] * 6
     assert grid["block"].tolist() == [*range(6), *range(6)]
     assert grid["x"][:6].tolist() == pytest.approx([1.5, 4.5, 7.5] * 2)
     assert grid["y"][:6].tolist() == pytest.approx([2.25] * 3 + [6.75] * 3)
-    assert not grid["at_surface"].any()
-    assert mapped(packing, grid=(3, 2, 1), variants="ab", workers=1)[0] == grid
+    assert grid["at_surface"].tolist() == [0] * 6 + [1] * 6
+    assert mapped(packing, grid=(3, 2, 1), variants="ac", workers=1)[0] == grid
     with pytest.warns(ScanfabNote):
-        other = fabric_map(packing, grid=(3, 2, 1), variants="ab", seed=1, **LINES)
+        other = fabric_map(packing, grid=(3, 2, 1), variants="ac", seed=1, **LINES)
     assert other["alpha_vs_axial"][0] != grid["alpha_vs_axial"][0]
 
 
-def test_blocks_together_are_the_row_of_compute(packing, grid):
-    row = compute(packing, variants="ab", **LINES)
-    for variant in "ab":
-        blocks, whole = grid.select(variant=variant), row.select(variant=variant)[0]
-        for name in ("segments", "grains", "rattlers", "contacts"):
-            assert blocks[name].sum() == whole[name]
-        # blocks are of one volume here
-        assert blocks["solid_fraction"].mean() == pytest.approx(whole.solid_fraction, abs=3e-3)
-        for name, weight, rel in (
-            ("coordination", "grains", 1e-9), ("mean_length", "segments", 1e-3),
-        ):  # fmt: skip
-            mean = np.average(blocks[name], weights=blocks[weight])
-            assert mean == pytest.approx(whole[name], rel=rel)
-        gc = np.average(blocks.tensor("gc"), axis=0, weights=blocks["contacts"])
-        np.testing.assert_allclose(gc, row.select(variant=variant).tensor("gc")[0], atol=1e-12)
+@pytest.mark.parametrize("variants", ["a", "b"])
+def test_blocks_together_are_the_row_of_compute(packing, variants):
+    blocks, _ = mapped(packing, grid=(3, 2, 1), variants=variants)
+    (whole,) = row = compute(packing, variants=variants, **LINES)
+    for name in ("segments", "grains", "rattlers", "contacts"):
+        assert blocks[name].sum() == whole[name]
+    # blocks are of one volume here
+    assert blocks["solid_fraction"].mean() == pytest.approx(whole.solid_fraction, abs=3e-3)
+    for name, weight in (("coordination", "grains"), ("mean_length", "segments")):
+        mean = np.average(blocks[name], weights=blocks[weight])
+        assert mean == pytest.approx(whole[name], rel=1e-9 if weight == "grains" else 1e-3)
+    gc = np.average(blocks.tensor("gc"), axis=0, weights=blocks["contacts"])
+    np.testing.assert_allclose(gc, row.tensor("gc")[0], atol=1e-12)
     # one block is the whole, but for the scan of its parts
-    (block,), _ = mapped(packing, slices=1, variants="a")
+    ((block,), _) = mapped(packing, slices=1, variants=variants)
     for name in ("mean_length", "gvs_zz", "gvs_xy", "alpha_vs", "alpha_vs_axial_se"):
-        assert block[name] == pytest.approx(row[0][name], rel=1e-9), name
+        assert block[name] == pytest.approx(whole[name], rel=1e-9), name
     for name in ("segments", "grains", "contacts", "alpha_c_axial_se", "spacing", "cutoff"):
-        assert block[name] == row[0][name], name
+        assert block[name] == whole[name], name
 
 
 def layers(random, flat):

@@ -29,8 +29,8 @@ from tests.helpers.dumps import shaken_cubic
 from tests.helpers.growing import SAMPLE, meanwhile
 from tests.helpers.interruptions import write_series
 
-FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin")
-QUICK = {"directions": 9, "spacing": "0.5rmin", "contact_tolerance": 0.01}
+FAST = ("--directions", "9", "--variants", "ac", "--spacing", "0.5rmin", "--cutoff", "0.2rmin")
+QUICK = {"directions": 9, "variants": "ac", "spacing": "0.5rmin", "contact_tolerance": 0.01}
 pytestmark = [
     pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX"),
     # those of a cluster that has just been started may come in a moment
@@ -101,7 +101,7 @@ def after_a_row():
 def test_the_bytes_are_those_of_one_core(cluster, folder, is_same):
     """Sources are relative, and the workers stand elsewhere."""
     (folder / "yade").symlink_to(SAMPLE / "yade_triaxial")
-    words = ("yade", *FAST[:2], "--tolerance", "1e-2", "--boundary", "mask=3", "--frames", "::2")
+    words = ("yade", *FAST[:4], "--tolerance", "1e-2", "--boundary", "mask=3", "--frames", "::2")
     assert compute(*words, "--scheduler-file", str(cluster.file)) == 0
     assert is_same(*words)
     one, other = (json.loads(Path(f"{n}.csv.manifest.json").read_text()) for n in ("one", "t"))
@@ -152,7 +152,7 @@ def test_packings_do_not_pile_up(executor):
             most.append(len(alive))
             yield packing
 
-    assert len(scanfab.compute(packings(), executor=executor, variants="a", **QUICK)) == 30
+    assert len(scanfab.compute(packings(), executor=executor, **QUICK)) == 60
     assert max(most) <= executor.room() + 6
 
 
