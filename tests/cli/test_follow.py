@@ -48,10 +48,10 @@ def finished_run(*words: str) -> bytes:
     return Path("finished.csv").read_bytes()
 
 
-def is_followed(steps: list, *words: str, seconds: float = 0.8) -> bool:
+def is_followed(steps: list, *words: str) -> bool:
     """Whether a run beside these steps ends with the bytes of a run behind them."""
     thread = meanwhile(steps)
-    assert follow(*words, seconds=seconds) == 0
+    assert follow(*words) == 0
     thread.join()
     assert not Path("t.csv.part").exists()
     return Path("t.csv").read_bytes() == finished_run(*words)
@@ -72,7 +72,7 @@ def test_grains_wait_for_their_contacts(folder):
     steps = []
     for grains, contacts in sample_frames()[:2]:
         steps += [*copied(folder, [grains]), partial(time.sleep, 1.0), *copied(folder, [contacts])]
-    assert is_followed(steps, "--boundary", "mask=3", seconds=2.0)
+    assert is_followed(steps, "--boundary", "mask=3")
     data = Path("t.csv").read_bytes()
     assert b",file," in data
     assert b",geometric," not in data

@@ -82,7 +82,10 @@ def test_samples_are_told_apart_by_the_options_of_compute(tmp_path):
     for step in range(4):
         write(tmp_path / f"dump_{step}.txt", dump_text(step=step))
     series = scanfab.read_series(tmp_path)
-    ((number, sample),) = scanfab.samples(series[2].read(), boundary="type=2", min_contacts=1)
+    packing = series[2].read()
+    with pytest.raises(scanfab.SettingsError, match=r"inspect: expected a Series, .*found Packing"):
+        scanfab.inspect(packing)
+    ((number, sample),) = scanfab.samples(packing, boundary="type=2", min_contacts=1)
     assert number == 0
     np.testing.assert_array_equal(sample.boundary, sample.packing.columns["type"] == 2)
     assert sample.contacts.source == "geometric"

@@ -133,7 +133,7 @@ def test_a_frame_of_discs_among_spheres_is_refused():
         fabric_map(frames[1], grid=(2, 2, 1))
 
 
-@pytest.mark.parametrize("edge", ["clip", "start"])
+@pytest.mark.parametrize("edge", ["clip", "start", "ends"])
 def test_the_rv_and_its_rules(packing, edge):
     """The window's blocks hold what the window holds, by each rule at its surface."""
     words = {"variants": "c", "edge": edge, "rv": 0.9}
