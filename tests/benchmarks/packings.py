@@ -13,7 +13,9 @@ import numpy as np
 
 import scanfab
 from scanfab.base.convex import Convex
-from scanfab.scan.solids import Solids
+from scanfab.scan.edges import START
+from scanfab.scan.kernels.periodic import CellGrains
+from scanfab.scan.solids import Solids, margin_of
 
 PAPER = 13_723
 CELL = 1_250
@@ -72,8 +74,12 @@ def tenth(count: int) -> np.ndarray:
     return np.random.default_rng(1).random(count) < 0.1
 
 
-def solids_near(window: Convex) -> Solids:
-    """The grains of the paper's sample that lines of a window meet."""
+def solids_near(window: Convex, edge: str = "clip") -> Solids:
+    """The grains of the paper's sample that lines of a window meet, by a rule at its surface."""
     position, radius = dense(PAPER)
-    near = window.may_meet(position, radius)
-    return Solids(position[near], radius[near], tenth(PAPER)[near], window)
+    removed = tenth(PAPER)
+    around = None
+    if edge == START:
+        around = CellGrains(position, radius, removed, np.eye(3), np.zeros(3, bool))
+    near = window.may_meet(position, radius + (margin_of(around) if around else 0.0))
+    return Solids(position[near], radius[near], removed[near], window, edge=edge, around=around)

@@ -47,11 +47,31 @@ def test_a_lattice_has_the_same_contacts_by_any_vectors(count):
         assert_face_centred(find_contacts(Packing(*spheres, cell=cell), TOLERANCE))
 
 
+def named(packing):
+    """Contacts by their grains and normals, which no description of the cell changes."""
+    contacts = packing.contacts
+    sign = np.where(contacts.pairs[:, 0] < contacts.pairs[:, 1], 1.0, -1.0)
+    rows = np.column_stack([np.sort(contacts.pairs, axis=1), sign[:, None] * contacts.normal])
+    return rows[np.lexsort(np.round(rows, 6).T[::-1])]
+
+
 @pytest.fixture(scope="module")
 def sheared():
     """125 unequal grains in a cell that is tilted by more than its length."""
     spheres = shaken_cubic(np.random.default_rng(2), 5)
     return spheres, np.array([[5.0, 0, 0], [6.5, 5, 0], [-2.0, 7.1, 5]])
+
+
+def test_other_places_and_other_vectors_of_the_lattice_leave_the_contacts(sheared):
+    spheres, vectors = sheared
+    before = find_contacts(Packing(*spheres, cell=Cell(vectors)))
+    assert len(before.contacts) > 150
+    random = np.random.default_rng(3)
+    for shift in random.normal(size=(5, 3)) * 20:
+        moved = Packing(*spheres.moved(shift), cell=Cell(vectors, origin=random.normal(size=3)))
+        other = Packing(*spheres, cell=Cell(unimodular(random) @ vectors))
+        for packing in (moved, other):
+            np.testing.assert_allclose(named(find_contacts(packing)), named(before), atol=1e-9)
 
 
 def test_a_list_without_images_has_those_that_geometry_finds(sheared):

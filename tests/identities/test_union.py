@@ -1,11 +1,50 @@
-"""Grains that the window cuts, and cut-offs that leave nothing."""
+"""Solids are a union: what lies inside a solid changes nothing, and a cut-off may leave nothing."""
 
 import numpy as np
 import pytest
 
 from scanfab import Packing, ScanfabWarning, compute
-from tests.helpers.lattices import Spheres, shaken_cubic
-from tests.helpers.scanning import scan_along, solids_of
+from tests.helpers.lattices import Spheres, separate_spheres, shaken_cubic
+from tests.helpers.scanning import Z, scan_along, solids_of
+
+
+def joined(*parts):
+    return Spheres(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def same_sums(one, other):
+    """The same gaps; the order in which they are added up may differ."""
+    assert np.array_equal(one.segments, other.segments)
+    assert np.array_equal(one.lines, other.lines)
+    assert one.length == pytest.approx(other.length, rel=1e-12)
+
+
+def test_grain_inside_another_changes_nothing():
+    grains = separate_spheres(np.random.default_rng(0), 20, 5.0)
+    inside = Spheres(grains.position + 0.1, grains.radius * 0.5)
+    axes = [[0, 0, 1], [0.6, 0, 0.8]]
+    plain = scan_along(solids_of(grains, 4.0), axes, 0.1, 0.3)
+    same_sums(scan_along(solids_of(joined(grains, inside), 4.0), axes, 0.1, 0.3), plain)
+    same_sums(scan_along(solids_of(joined(grains, grains), 4.0), axes, 0.1, 0.3), plain)
+
+
+def test_chain_of_three_that_overlap_leaves_no_gap():
+    """Along their axis, in any order of the middle one, large or small."""
+    for middle in (0.8, 2.0):
+        chain = Spheres(np.array([[0.0, 0, 0], [0, 0, 1.3], [0, 0, 2.6]]), np.array([1, middle, 1]))
+        sums = scan_along(solids_of(chain), Z, 0.02)
+        # beside a small middle grain the outer ones see one another
+        assert (sums.kept("a")[1].sum() > 0) == (middle < 1)
+        assert np.all(sums.kept("a")[0] <= (2.6 - 2 * np.sqrt(1 - 0.8**2)) * sums.kept("a")[1])
+
+
+def test_grain_that_covers_the_window_leaves_no_void():
+    grains = separate_spheres(np.random.default_rng(0), 20, 5.0)
+    cover = Spheres(np.array([[0.3, 0, 0]]), np.array([4.4]))
+    sums = scan_along(solids_of(joined(grains, cover), 4.0), Z, 0.1)
+    assert sums.void[:, 2].sum() == pytest.approx(0, abs=1e-9)
+    assert sums.line_length[:, 2].sum() > 0
+    assert sums.kept("c")[1].sum() == 0
 
 
 def test_grains_cut_by_the_window_are_solid_inside_it():

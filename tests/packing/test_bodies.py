@@ -148,3 +148,12 @@ def test_a_clump_of_many_spheres_that_flew_away_is_one_grain_that_did():
     assert np.flatnonzero(sample.escaped.grains).tolist() == list(range(216, 256))
     (note,) = sample.doubts_of_escaped()
     assert "more" not in note.text.partition(":")[0]
+
+
+def test_a_body_that_touches_its_own_image_has_two_neighbours():
+    """As a sphere that does; the inner contact of the body is none."""
+    cell = Cell([4.0, 20.0, 20.0])
+    sample = grains([[0.5, 5, 5], [2.2, 5, 5]], [6, 6], 1.2, cell=cell)
+    assert sample.contacts.pairs.tolist() == [[0, 1]]
+    assert sample.contact_numbers.tolist() == [2, 2]
+    assert not sample.rattlers.any()

@@ -207,3 +207,11 @@ def test_a_grain_touches_its_own_image_once():
     listed = ContactList([[0, 0], [0, 0]], image=[[1, 0, 0], [-1, 0, 0]])
     packing = Packing([[0, 0, 0]], 1.0, contacts=listed, cell=Cell([1.9, 9, 9]))
     assert len(packing.contacts) == 1
+
+
+def test_through_a_periodic_face_the_normal_is_that_of_the_image():
+    places = [[0.5, 5, 5], [9.0, 5, 5]]
+    listed = ContactList([[0, 1]], force=[[-3.0, 1, 0]])
+    contacts = Packing(places, 1.0, contacts=listed, cell=Cell([10, 10, 10])).contacts
+    np.testing.assert_allclose(contacts.normal, [[-1, 0, 0]], atol=1e-12)
+    np.testing.assert_allclose(contacts.force_n, [3.0])

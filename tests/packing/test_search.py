@@ -252,3 +252,10 @@ def test_a_pair_touches_through_each_image_that_is_near_enough():
     expected = {(0, 1, (i, j, 0)) for i, j in near}
     expected |= {(row, row, (i, j, 0)) for row in (0, 1) for i, j in own}
     assert canonical(THROUGH_IMAGES.contacts) == expected
+
+
+@pytest.mark.parametrize("edges", [(0.5, 0.5, 0.5), (0.7, 2.5, 8.0), (2.9, 2.9, 2.9)])
+def test_cells_thinner_than_a_grain(edges):
+    position = np.random.default_rng(3).random((4, 3)) * edges
+    cell = {"vectors": edges, "periodic": (True, True, True)}
+    assert_those_of_the_slow_twin(position, np.array([0.49, 0.3, 0.1, 0.48]), **cell)

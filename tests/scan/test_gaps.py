@@ -29,6 +29,15 @@ def gaps_of(solids, **options):
     return scan_gaps(solids, RULE, **{**words, **options})
 
 
+def assert_all_octants_are(sums, gaps, place):
+    for variant in "abcd":
+        length, number = gaps.kept(variant, place)
+        expected_length, expected_number = sums.kept(variant)
+        assert np.array_equal(number, expected_number)
+        assert number.min() > 0
+        np.testing.assert_allclose(length, expected_length, rtol=1e-10)
+
+
 @pytest.mark.parametrize("periodic", [(True, True, True), (True, False, True)])
 def test_all_octants_of_a_periodic_packing_are_the_scan_of_the_same_lines(periodic):
     random = np.random.default_rng(1)
@@ -41,12 +50,16 @@ def test_all_octants_of_a_periodic_packing_are_the_scan_of_the_same_lines(period
     gaps = gaps_of(solids, cutoffs=[0.1, 0.4])
     for place, cutoff in enumerate((0.1, 0.4)):
         sums = scan_lines(solids, RULE, spacing=0.3, cutoff=cutoff, replicates=range(3))
-        for variant in "abcd":
-            length, number = gaps.kept(variant, place)
-            expected_length, expected_number = sums.kept(variant)
-            assert np.array_equal(number, expected_number)
-            assert number.min() > 0
-            np.testing.assert_allclose(length, expected_length, rtol=1e-10)
+        assert_all_octants_are(sums, gaps, place)
+
+
+def test_octants_left_out_add_up_to_seven_times_all(solids):
+    gaps = gaps_of(solids)
+    for moment in (1, 2):
+        every = gaps.kept("c", 1, moment)
+        without = [gaps.kept("c", 1, moment, without=block) for block in range(8)]
+        for k in range(2):
+            np.testing.assert_allclose(sum(one[k] for one in without), 7 * every[k], rtol=1e-10)
 
 
 def test_octant_left_out_is_that_of_the_slow_twin(solids):
@@ -84,9 +97,23 @@ def test_octants_about_an_oblique_axis_have_it_as_one_of_their_axes():
     assert np.array_equal(found >= 4, places @ axis >= 0)
 
 
-def test_octants_about_a_coordinate_are_those_of_the_coordinates():
+@pytest.mark.parametrize("axis", [(0, 0, 1), (1, 0, 0), (0, -1, 0)])
+def test_octants_about_a_coordinate_are_those_of_the_coordinates(axis):
     center = np.array([0.1, 0.2, 0.3])
     places = np.random.default_rng(1).uniform(-2, 2, (100, 3))
     expected = [naive.octant(place, center) for place in places]
-    for axis in ((0, 0, 1), (1, 0, 0), (0, -1, 0)):
-        assert Blocks.about(center, 3.0, axis).of(places).tolist() == expected
+    assert Blocks.about(center, 3.0, axis).of(places).tolist() == expected
+
+
+@pytest.mark.parametrize("place", range(len(CUTOFFS)))
+def test_all_octants_together_are_the_scan_of_the_same_lines(solids, place):
+    gaps = gaps_of(solids, seed=3)
+    sums = scan_lines(solids, RULE, spacing=0.3, cutoff=CUTOFFS[place], replicates=range(3), seed=3)
+    assert np.array_equal(gaps.axes, sums.axes)
+    assert_all_octants_are(sums, gaps, place)
+
+
+def test_threads_change_nothing(solids):
+    one, three = gaps_of(solids), gaps_of(solids, workers=3)
+    assert np.array_equal(one.square, three.square)
+    assert np.array_equal(one.number, three.number)
