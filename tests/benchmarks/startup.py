@@ -30,6 +30,9 @@ def startup(repeats: int) -> str:
         cold = interleaved({"": lambda: command(*compute)}, 1, warm=False)[""]
         seconds = interleaved(
             {
+                "python -c 'import numba, polars'": lambda: subprocess.run(
+                    [sys.executable, "-c", "import numba, polars"], check=True
+                ),
                 "scanfab --help": lambda: command("--help"),
                 "compute, 800 grains, four variants, tolerance 0.1": lambda: command(
                     *compute, "--tolerance", "0.1"
