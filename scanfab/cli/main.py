@@ -10,8 +10,8 @@ import gc
 import signal
 import sys
 
-# New objects before Python looks for garbage, 700 by default. What is imported stays, so looking is
-# in vain, and takes a tenth of a short run; large arrays are freed without it.
+# New objects before Python looks for garbage; the default is far lower. What is imported stays, so
+# looking is in vain, and takes a twentieth of a short run; large arrays are freed without it.
 FEW_OBJECTS = 50_000
 # bytes of address space: if fewer are left, any unknown error is put down to lack of memory
 LITTLE = 200_000_000

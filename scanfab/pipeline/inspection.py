@@ -8,16 +8,8 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from scanfab.base.column import LENGTH
-from scanfab.base.errors import (
-    Note,
-    PackingError,
-    ReadError,
-    ScanfabNote,
-    SettingsError,
-    collected,
-    note,
-    tell,
-)
+from scanfab.base.errors import Note, PackingError, ReadError, ScanfabNote, collected, note, tell
+from scanfab.base.option import unusable
 from scanfab.io.frame import Frame
 from scanfab.io.series import Series
 from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
@@ -97,8 +89,7 @@ def inspect(series: Series, **options: Any) -> Iterator[FrameReport]:
     6 800 1000 2167 95
     """
     if not isinstance(series, Series):
-        expected = "a Series, as scanfab.read_series returns it"
-        raise SettingsError(f"inspect: expected {expected}, found {series!r}")
+        raise unusable("inspect", "a Series, as scanfab.read_series returns it", series)
     return inspect_series(series, Settings(**options))
 
 
