@@ -73,3 +73,10 @@ def test_second_moment_is_that_of_the_slow_twin():
     assert row.gvs_xy == pytest.approx(tensor[0, 1], abs=1e-12)
     assert row.alpha_vs_axial == pytest.approx(naive.axial(tensor, (0, 0, 1)), abs=1e-12)
     assert row.mean_length == pytest.approx((rule.weights @ over) / (rule.weights @ under))
+
+
+def test_second_moment_is_longer_than_the_first(command):
+    words = ("--variants", "c", "--frames", "0")
+    first, second = (command("--moment", moment, *words).rows[0] for moment in (1, 2))
+    assert float(second["mean_length"]) > float(first["mean_length"])
+    assert second["segments"] == first["segments"]

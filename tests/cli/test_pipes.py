@@ -7,6 +7,7 @@ import os
 import shlex
 import subprocess
 import sys
+import time
 
 import pytest
 from click.shell_completion import ShellComplete
@@ -53,7 +54,10 @@ def test_a_dump_is_computed_and_compared_in_one_pipe(packed):
         ("compute --on-error ", "plain,stop plain,skip"),
         ("inspect --format l", "plain,lammps plain,liggghts plain,lf-dem"),
         ("calibrate --rv-shape c", "plain,cylinder file,c"),
+        ("compute --contacts g", "plain,geometric file,g"), ("compute --figure ro", "plain,rose"),
+        ("compute --directions le", "plain,lebedev:"),
         ("compute --directions equal-angle:", "plain,equal-angle:"),
+        ("compare --summary --fields slope_o", "plain,slope_origin"),
         ("compute --fields frame,alpha_c_axial_se", "plain,frame,alpha_c_axial_se"),
         ("view --axis ", "plain,x plain,y plain,z"),
     ],
@@ -80,3 +84,14 @@ def test_a_dash_goes_with_columns_and_digits_and_is_compared(packed, ask, tmp_pa
     for row in ask("compare", table, "--fields", names, "--digits", "2", "-o", "-").rows:
         assert list(row) == names.split(",")
         assert float(row["alpha_vs_axial"]) == float(f"{float(row['alpha_vs_axial']):.2g}")
+
+
+@pytest.mark.parametrize("word", ["--help", "--version"])
+def test_help_and_version_are_there_at_once(word):
+    def seconds() -> float:
+        start = time.perf_counter()
+        subprocess.run([*PROGRAM, word], capture_output=True, check=True)
+        return time.perf_counter() - start
+
+    # 150 ms on a machine at rest
+    assert min(seconds() for _ in range(3)) < 0.6
