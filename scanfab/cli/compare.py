@@ -99,6 +99,8 @@ def compare(tables: tuple[str, ...], summary: bool, differences: bool, **chosen:
         write_rows(outputs.output, shown, shown.columns, excerpt)
     elif is_readable() and not differences and excerpt == ALL:
         print_comparison(comparison)
+    elif is_readable():
+        print_rows(shown, excerpt.fields or shown.names, 1, min(excerpt.digits, 5))
     else:
         print_csv(shown, excerpt, shown.columns)
     draw(outputs, rows, "table", comparison=comparison, paper_line=not chosen["no_paper_line"])

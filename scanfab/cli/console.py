@@ -19,7 +19,7 @@ import click
 
 from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.errors import ScanfabNote
-from scanfab.base.spelling import spelt_time
+from scanfab.base.spelling import counted, spelt_time
 from scanfab.io.files import without_temporary
 from scanfab.pipeline.options import as_options, listening
 
@@ -101,7 +101,8 @@ def level() -> str:
 
 def say(text: str) -> None:
     """Print a line on standard error."""
-    click.echo(f"scanfab: {without_temporary(text)}", err=True)
+    # by the stream itself, which a bar on the terminal watches
+    click.echo(f"scanfab: {without_temporary(text)}", file=sys.stderr)
 
 
 def tell_inputs(all_series: Iterable[Series], workers: int) -> None:
@@ -112,11 +113,11 @@ def tell_inputs(all_series: Iterable[Series], workers: int) -> None:
     from importlib.metadata import version
 
     used = ", ".join(f"{name} {version(name)}" for name in ("scanfab", "numpy", "numba"))
-    say(f"{used}, Python {platform.python_version()}; {workers} workers")
+    say(f"{used}, Python {platform.python_version()}; {counted(workers, 'worker')}")
     for series in all_series:
         for family in (series.grains, *series.contacts):
             reader = "no reader" if family.reader is None else family.reader.name
-            files = f"{len(family.files)} files"
+            files = counted(len(family.files), "file")
             say(f"{series.name}: {family.kind} from {family.pattern} by {reader}, {files}")
 
 
@@ -213,7 +214,9 @@ def _bar() -> Progress:
 
     text = TextColumn("{task.description}")
     columns = (SpinnerColumn(), BarColumn(20), TimeElapsedColumn(), text)
-    return Progress(*columns, console=Console(stderr=True), transient=True)
+    # the bar leaves standard output alone, or rows would go to the terminal in place of their file
+    console = Console(stderr=True)
+    return Progress(*columns, console=console, transient=True, redirect_stdout=False)
 
 
 def is_readable() -> bool:
@@ -261,7 +264,7 @@ def print_rows(
         is_text = any(isinstance(row[name], str) for row in rows)
         texts[name] = [cell.ljust(width) if is_text else cell.rjust(width) for cell in cells]
     room = shutil.get_terminal_size().columns
-    for name in columns[: stay - 1 : -1]:
+    for name in reversed(columns[stay:]):
         if len("  ".join(cells[0] for cells in texts.values())) > room:
             texts.pop(name, None)
     for line in zip(*texts.values(), strict=True):

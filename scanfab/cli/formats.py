@@ -27,7 +27,7 @@ def formats() -> None:
     for suffix, description in PLOT_FORMATS.items():
         lines.append(("figure", suffix.lstrip("."), suffix, "scanfab", description))
     lines += [
-        ("folder", "paraview", ".vtp .pvd", "scanfab", "what compute --vtk writes"),
+        ("folder", "paraview", ".vtp .vtu .pvd", "scanfab", "what compute and map --vtk write"),
         ("page", "html", ".html", "scanfab", "what report writes"),
     ]
     titles = ("kind", "name", "extensions", "package", "description")

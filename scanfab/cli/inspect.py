@@ -37,7 +37,7 @@ def inspect(sources: tuple[str, ...], as_json: bool, **chosen: Any) -> int:
     with working(frames, prints=True) as advance:
         for series in all_series:
             reports = []
-            for found in scanfab.inspect(series, **chosen):
+            for found in scanfab.inspect(series, **vars(settings)):
                 report = asdict(found)
                 report["warnings"] = [as_options(text) for text in found.warnings]
                 if as_json:

@@ -28,14 +28,14 @@ def merge(parts: tuple[Path, ...], output: Path | None, frames: str | None) -> i
     Then:        scanfab merge part_*.csv -o fabric.csv
     """
     from scanfab.pipeline.merge import merge_tables
-    from scanfab.table.writing import Excerpt
+    from scanfab.table.writing import ALL
 
     with usage_errors():
         table = merge_tables(parts, output, frames=frames)
     if output is None and is_readable():
-        print_table(table, Excerpt(table.names))
+        print_table(table, ALL)
     elif output is None:
-        print_csv(table, Excerpt(table.names), table.columns)
+        print_csv(table, ALL, table.columns)
     # the user may have chosen columns without the void fabric
     if not len(table) or "alpha_vs" not in table.names:
         return 0

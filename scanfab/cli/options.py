@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from itertools import takewhile
 from pathlib import Path
@@ -173,7 +173,8 @@ def _output(ctx: click.Context, parameter: click.Parameter, path: Path | None) -
     ctx.meta[AS_CSV] = path == Path("-")
     if path is not None and kind_of(path) == "a device":
         # a terminal or /dev/null takes what standard output would
-        sys.stdout, ctx.meta[AS_CSV] = ctx.with_resource(open(path, "w")), True  # noqa: SIM115
+        ctx.with_resource(redirect_stdout(ctx.with_resource(open(path, "w"))))  # noqa: SIM115
+        ctx.meta[AS_CSV] = True
     return None if ctx.meta[AS_CSV] else path
 
 
@@ -243,7 +244,11 @@ def _expanded(
 
 
 def checked(chosen: dict[str, Any], kind: type[S]) -> tuple[dict[str, Any], S]:
-    """Split the options into those of reading and the settings; wrong values are usage errors."""
+    """
+    The options of reading, taken out of ``chosen``, and the settings that the others are.
+
+    Wrong values are usage errors.
+    """
     tell_used(click.get_current_context())
     with usage_errors():
         return take_reading(chosen), kind(**chosen)

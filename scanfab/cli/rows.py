@@ -35,7 +35,7 @@ def write_table(
     """
     from scanfab.io.follow import FollowedSeries
     from scanfab.pipeline.job import Job
-    from scanfab.viz.compute_file import vtk_folders
+    from scanfab.viz.compute_file import paraview_files, vtk_folders
 
     ctx = click.get_current_context()
     figures = ("map",) if kind is MapSettings else ("table", "frames")
@@ -67,7 +67,7 @@ def write_table(
                 executor = stack.enter_context(dask)
             vtk, resume = outputs.vtk, outputs.resume
             drawn = [] if outputs.plot is None else [outputs.plot]
-            drawn += [] if vtk is None else [*vtk.rglob("*.vtp"), *vtk.rglob("*.pvd")]
+            drawn += [] if vtk is None else paraview_files(vtk)
             job = Job(
                 series,
                 settings,
@@ -133,9 +133,7 @@ class _Drawing:
         elif self.kind == "frames":
             draw(self.outputs, scanfab.ScannedFrames(job.series[0], job.settings, rows), self.kind)
         elif plot is not None:
-            comparison = scanfab.compare_tables(rows) if self.kind == "table" else None
-            table = scanfab.Table(rows, job.settings.columns)
-            draw(self.outputs, table, self.kind, comparison=comparison)
+            draw(self.outputs, scanfab.Table(rows, job.settings.columns), self.kind)
 
     def redraw(self, job: Job) -> None:
         """Redraw a followed series if it has new frames; figures that need a scan wait."""
@@ -160,7 +158,8 @@ def _write(job: Job, excerpt: Excerpt) -> None:
 
     try:
         with telling(words):
-            with working(job.frames, job.done) as advance:
+            prints = job.output is None and not as_table
+            with working(job.frames, job.done, prints) as advance:
                 if job.output is not None:
                     job.write(advance)
                 elif as_table:

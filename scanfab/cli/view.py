@@ -32,7 +32,7 @@ def view(
     points up.
     """
     from scanfab.base.files import check_folder
-    from scanfab.table.curves import middle_out, spelt_strain
+    from scanfab.table.curves import middle_out
     from scanfab.viz.scene import look_at, section_lines
     from scanfab.viz.window3d import check_screen, show_scene
 
@@ -50,9 +50,8 @@ def view(
     scene = look.scene
     if cut:
         scene = replace(scene, lines=section_lines(scene, look.axis))
-    strain = spelt_strain(look.strains, look.strain_column)
     none = "" if look.sample.grains.any() else "no grains"
     source = middle_out(series.name, LONGEST_SOURCE)
-    title = ", ".join(filter(None, [source, f"frame {look.number}", strain, none]))
+    title = ", ".join(filter(None, [source, f"frame {look.number}", look.strain, none]))
     show_scene(scene, look.axis, title, screenshot)
     return 0

@@ -151,7 +151,7 @@ class Comparison:
             f"slope {with_error(row.slope, row.slope_se)}, {counted(row.frames, 'frame')}"
             for row in self.summary
         ]
-        return "\n".join([f"Comparison of {len(self.frames)} rows", *lines])
+        return "\n".join([f"Comparison of {counted(len(self.frames), 'row')}", *lines])
 
 
 def compare_tables(
@@ -244,13 +244,13 @@ def _tell_of_strains(rows: Rows, column: str, strain_max: float | None) -> None:
     )
     if _within(largest, strain_max):
         tell = warn if strain_max > 1 else note
-        tell(f"strain_max: {strain_max:g} leaves out no frame: {lie}")
+        tell(f"`strain_max`: {strain_max:g} leaves out no frame: {lie}")
     for source in dict.fromkeys(source for source, _ in strains):
         own = [strain for (name, _), strain in strains.items() if name == source]
         beyond = [strain for strain in own if not _within(strain, strain_max)]
         if beyond and (left := len(own) - len(beyond)) < FEWEST_FRAMES:
             warn(
-                f"strain_max: {strain_max:g} leaves {left} of {len(own)} frames of {source}, but "
+                f"`strain_max`: {strain_max:g} leaves {left} of {len(own)} frames of {source}, but "
                 f"a fit needs {FEWEST_FRAMES}: the next larger strain is {min(beyond):.10g}; "
                 f"{lie}"
             )

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from functools import partial
 from pathlib import Path
+from typing import IO
 
 import pytest
 
@@ -67,12 +68,14 @@ def test_a_terminal_gets_a_readable_table() -> None:
     assert "source,frame" not in shown
 
 
-def on_terminal(words: list[str], **environment: str) -> tuple[int, str]:
-    """Exit code and what a terminal shows of a process."""
+def on_terminal(words: list[str], out: IO[str] | None = None, **more: str) -> tuple[int, str]:
+    """Exit code and what a terminal shows of a process, whose results may go to a file."""
     pty = pytest.importorskip("pty", reason="terminals are POSIX")
     ours, theirs = pty.openpty()
-    env = {**os.environ, "COLUMNS": "180", "LINES": "40", "TERM": "dumb", **environment}
-    with subprocess.Popen([*PROGRAM, *words], stdout=theirs, stderr=theirs, env=env) as process:
+    env = {**os.environ, "COLUMNS": "180", "LINES": "40", "TERM": "dumb", **more}
+    with subprocess.Popen(
+        [*PROGRAM, *words], stdout=out or theirs, stderr=theirs, env=env
+    ) as process:
         os.close(theirs)
         shown = b""
         try:
@@ -82,6 +85,17 @@ def on_terminal(words: list[str], **environment: str) -> tuple[int, str]:
             pass
     os.close(ours)
     return process.returncode, shown.decode()
+
+
+def test_rows_go_to_their_file_while_a_terminal_shows_a_bar(series, tmp_path):
+    """And words that come meanwhile begin a line of their own."""
+    with open(tmp_path / "rows.csv", "w") as file:
+        code, shown = on_terminal(["compute", str(series), *SMALL], file, TERM="xterm")
+    assert code == 0, shown
+    assert "5 of 5 frames" in shown
+    assert (tmp_path / "rows.csv").read_text().count("\n") == 11
+    before = [text for text in shown.split("scanfab: ")[:-1] if text]
+    assert all(text.endswith(("\n", "\r", "\x1b[2K")) for text in before)
 
 
 def test_a_terminal_of_ascii_has_greek_spelt(series, tmp_path, ask):

@@ -123,3 +123,16 @@ def test_formats_lists_every_reader_with_its_package_and_the_tables(ask):
         assert installed.package in line
         assert set(installed.plugin.extensions[:1]) <= set(line)
     assert ["writer", "csv"] in [line[:2] for line in printed]
+
+
+def test_merged_tables_and_differences_are_shown_as_tables(ask, series, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "100")
+    for module in ("merge", "compare"):
+        monkeypatch.setattr(f"scanfab.cli.{module}.is_readable", lambda: True)
+    words = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin")
+    ask("compute", series, *words, "-o", tmp_path / "t.csv")
+    for command in (("merge",), ("compare", "--differences"), ("compare", "--digits", "2")):
+        lines = ask(command[0], tmp_path / "t.csv", *command[1:]).out.splitlines()
+        assert len(lines) > 5
+        assert not any("," in line for line in lines)
+        assert command[0] != "merge" or max(map(len, lines)) <= 100

@@ -1,6 +1,7 @@
 """No command writes over a file that it reads, by whatever name or link."""
 
 import shutil
+import sys
 
 import pytest
 
@@ -43,7 +44,11 @@ def test_an_output_that_is_an_input_is_refused(files, tmp_path, ask, command):
 def test_a_whole_series_may_be_rewritten_and_a_device_takes_a_table(files, tmp_path, ask):
     ask("convert", "g.csv", "g.csv", "--quiet")
     assert (tmp_path / "g.csv").read_bytes() == files["g.csv"]
+    before = sys.stdout
     ask("compute", "g.csv", *FAST, "-o", "/dev/null")
+    ask("compute", "g.csv", *FAST, "-o", "/dev/null", "--plot", "x.doc", code=2)
+    assert sys.stdout is before
+    assert not sys.stdout.closed
     # an old table beside the dumps is no input
     (tmp_path / "dumps").mkdir()
     shutil.copy("dump.1", "dumps")

@@ -195,11 +195,3 @@ def test_the_library_merges(parts, whole, tmp_path, capsys):
     assert capsys.readouterr().out == whole.read_text()
     with pytest.raises(scanfab.SettingsError, match="found none"):
         scanfab.merge_tables([])
-
-
-def test_a_part_is_not_replaced(parts):
-    before = Path(parts[0]).read_bytes()
-    assert run(["merge", *parts, "-o", parts[0]]) == 2
-    assert Path(parts[0]).read_bytes() == before
-    assert run(["merge", *parts, "-o", "merged.doc"]) == 2
-    assert run(["merge", *parts, "-o", "no/such/folder.csv"]) == 2

@@ -94,6 +94,14 @@ def test_time_that_is_left_follows_from_the_frames_of_this_run(monkeypatch):
         assert work.state() == "9 of 20 frames, about 6 min; frame 9: done"
 
 
+@pytest.mark.parametrize(("level", "has_bar"), [("", True), ("verbose", False)])
+def test_a_terminal_has_a_bar_unless_each_step_is_a_line(monkeypatch, level, has_bar):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    monkeypatch.setattr(console, "level", lambda: level)
+    with working(lambda: 3) as advance:
+        assert (advance.__self__.bar is not None) == has_bar
+
+
 def test_the_library_is_listened_to_no_longer_than_it_works():
     logger = logging.getLogger("scanfab")
     before = (list(logger.handlers), logger.level)
