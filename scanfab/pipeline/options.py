@@ -148,7 +148,7 @@ def _as_words(match: re.Match[str]) -> str:
     return " ".join([flag, re.sub(r'^"([\w.:/+-]*)"$', r"\1", value)]).strip()
 
 
-MEANINGS = {name: as_options(option.help) for name, option in OPTIONS.items() if option.decides}
+MEANINGS = {name: as_options(option.help) for name, option in DECLARED.items() if option.decides}
 """For the report: the help of each option that decides a result, by name."""
 
 

@@ -126,6 +126,7 @@ def compute_file(
             Excerpt.make(settings.columns, fields, digits),
             resume=resume,
             manifest_path=None if manifest is None else Path(manifest),
+            drawn=() if vtk is None else paraview_files(Path(vtk)),
             observers=folders,
             told=told,
             executor=executor,
@@ -150,6 +151,11 @@ def _opened(source: Source | Sequence[Source], options: dict[str, Any]) -> Seque
         )
     paths = [os.fspath(path) for one in given for path in expanded(one)]
     return open_sources(paths, **take_reading(options))
+
+
+def paraview_files(folder: Path) -> list[Path]:
+    """The files of a folder that files for ParaView may replace."""
+    return [path for path in folder.rglob("*") if path.suffix in (".vtp", ".vtu", ".pvd")]
 
 
 def vtk_folders(folder: Path, count: int, settings: Settings, go_on: bool) -> list[VtkFolder]:

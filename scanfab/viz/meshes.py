@@ -33,7 +33,6 @@ SOLID, DROPPED, KEPT = 0, 1, 2
 AZIMUTHS, POLAR = 36, 18
 # Scan lines of each variant.
 LINES = 120
-TEXT_FIELDS = ("source", "variant", "contacts_from", "edge")
 
 Fields = Mapping[str, Any]
 Meshes = Iterator[tuple[str, Any, Fields]]
@@ -92,7 +91,8 @@ def map_meshes(result: FrameResult) -> Meshes:
     for variant in dict.fromkeys(row.variant for row in result.rows):
         values = _fields([row for row in result.rows if row.variant == variant])
         # texts are the same in all blocks, so they are fields of the mesh
-        fields = {name: values.pop(name)[:1] for name in TEXT_FIELDS if name in values}
+        texts = [name for name, own in values.items() if isinstance(own, list)]
+        fields = {name: values.pop(name)[:1] for name in texts}
         yield f"map-{variant}", block_mesh(result.blocks[variant in "cd"], values), fields
 
 
@@ -202,7 +202,8 @@ def block_mesh(blocks: Blocks, values: Mapping[str, npt.ArrayLike]) -> Any:
         at = blocks.corner + np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1) @ blocks.edges
         block = np.arange(len(blocks))
     else:
-        turns = np.linspace(0.0, 2.0 * np.pi, AZIMUTHS + 1), np.linspace(0.0, np.pi, POLAR + 1)
+        # upwards, so that the corners of a hexahedron are in VTK's order
+        turns = np.linspace(0.0, 2.0 * np.pi, AZIMUTHS + 1), np.linspace(np.pi, 0.0, POLAR + 1)
         azimuth, polar, radius = np.meshgrid(*turns, blocks.bounds, indexing="ij")
         unit = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
         at = blocks.middles[0] + radius[..., None] * np.stack(unit, axis=-1)
@@ -247,14 +248,14 @@ def _name(kind: str, rv: float | None) -> str:
 
 
 def _fields(rows: list[Row]) -> dict[str, Any]:
-    """The values of rows by column; NaN if a row has none."""
+    """The values of rows by column: numbers, NaN if a row has none, or texts; no tensors."""
     columns: dict[str, Any] = {}
     for name in rows[0]:
         values = [getattr(row, name) for row in rows]
-        if name in TEXT_FIELDS:
+        if any(isinstance(value, str) for value in values):
             # VTK's texts are ASCII
             columns[name] = [str(v).encode("ascii", "backslashreplace").decode() for v in values]
-        else:
+        elif not any(isinstance(value, list) for value in values):
             columns[name] = np.array([np.nan if v is None else v for v in values], np.float64)
     return columns
 

@@ -23,7 +23,7 @@ from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import Strains
 from scanfab.pipeline.values import Vector
 from scanfab.scan.lines import Segments, cut_lines
-from scanfab.table.curves import SAME, frame_strain_column
+from scanfab.table.curves import SAME, frame_strain_column, spelt_strain
 
 # Angle between the lines of a section and the plane across the axis, degrees.
 LINE_ANGLE = 30.0
@@ -109,15 +109,12 @@ class Look:
     number: int
     """Number of the frame, counted from 0."""
     sample: Sample
-    strains: Strained
-    """Axial and shear strain since the first frame that has grains, by the names of their columns
-    in the fabric table; None where that is not known."""
+    strain: str
+    """Its strain since the first frame that has grains, in words; empty if it is not known."""
     first: Sample | None
     """The first frame that has grains, which fixes all lengths of the series."""
     plan: Plan | None
     """None if the settings do not fit the series."""
-    strain_column: str | None
-    """Which of the strains tells the frames of the series apart."""
     axis: Vector
     """Loading axis, a unit vector."""
 
@@ -146,7 +143,8 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     sample = frames.read(frame)
     tell(doubts_of_frame(frame, sample, settings))
     found = frames.reference()
-    first, plan = None if found is None else found[2], None
+    first = None if found is None else found[2]
+    plan = None
     if first is not None:
         with suppress(SettingsError):  # _plan warns if the settings do not fit
             settings = settings.in_space(first.packing.space)
@@ -159,13 +157,14 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     strains = _strains(frame.number, sample, first, settings)
     column = frame_strain_column(strains)
     if all(value is not None and abs(value) < SAME for value in strains.values()):
-        # at zero strain, the last frame tells which of the strains changes
+        # at zero strain, the last frame tells which of the strains tells the frames apart
         for last_number, last in reversed(list(frames)):
             with suppress(PackingError, ReadError):
                 later = _strains(last_number, frames.read(last), first, settings)
                 column = frame_strain_column(later)
                 break
-    return Look(scene, frame.number, sample, strains, first, plan, column, settings.axis)
+    strain = spelt_strain(strains, column)
+    return Look(scene, frame.number, sample, strain, first, plan, settings.axis)
 
 
 def _plan(first: Sample, settings: Settings) -> Plan | None:

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scanfab.base.errors import ScanfabError
+import scanfab
+from scanfab.base.errors import ScanfabError, SettingsError
 from scanfab.io.sources import read_series
 from scanfab.pipeline.strain import shear_strain
 from scanfab.table.compare import compare_tables
@@ -219,3 +220,17 @@ def test_where_nothing_can_be_drawn_view_says_what_to_do(series, tmp_path, words
     assert answer.returncode == 1
     assert message in " ".join(answer.stderr.split())
     assert "Traceback" not in answer.stderr
+
+
+def test_a_folder_of_paraview_files_is_a_series_of_its_grains(series, tmp_path, ask):
+    """Scan lines, surfaces and tensors beside them are none of its contacts."""
+    files = ("--vtk", tmp_path / "vtk", "-o", tmp_path / "t.csv")
+    ask("compute", series, *FAST, "--frames", "0", *files)
+    out = ask("inspect", tmp_path / "vtk").out
+    contacts = read_rows(tmp_path / "t.csv")[0]["contacts"]
+    assert f"contacts      {contacts}" in out
+    # and no computation replaces them
+    before = {path: path.read_bytes() for path in (tmp_path / "vtk").iterdir()}
+    with pytest.raises(SettingsError, match="would replace the input"):
+        scanfab.compute_file(tmp_path / "vtk", tmp_path / "u.csv", vtk=tmp_path / "vtk")
+    assert {path: path.read_bytes() for path in (tmp_path / "vtk").iterdir()} == before

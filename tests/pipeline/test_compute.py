@@ -87,7 +87,7 @@ def test_a_part_looks_for_its_first_frame_with_grains_in_the_whole(shrinking):
     look = look_at(shrinking[1:3], Settings(**SCAN), -1)
     whole = look_at(shrinking, Settings(**SCAN), 2)
     assert look.number == whole.number == 2
-    assert look.strains == whole.strains
+    assert look.strain == whole.strain
     assert look.plan.window.radius == whole.plan.window.radius
 
 

@@ -36,7 +36,7 @@ def test_arguments_become_options(said, told):
 def test_no_name_is_declared_twice_and_reading_takes_the_declared_defaults():
     flags = [one.flag for one in DECLARED.values()]
     assert len(set(flags)) == len(flags)
-    assert set(MEANINGS) < set(OPTIONS) < set(DECLARED)
+    assert set(OPTIONS) < set(DECLARED) > set(MEANINGS)
     signature = inspect.signature(scanfab.read_series).parameters
     options = {name: one.default for name, one in signature.items() if name != "source"}
     assert options == {name: OPTIONS[name].default for name in options}

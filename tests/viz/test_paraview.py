@@ -8,6 +8,7 @@ import pyvista
 
 import scanfab
 from scanfab.pipeline.compute import compute_rows
+from scanfab.pipeline.map_settings import MapSettings
 from scanfab.pipeline.settings import Settings
 from scanfab.table.columns import COLUMNS
 from scanfab.viz.compute_file import VtkFolder
@@ -186,3 +187,47 @@ def test_a_frame_without_grains_and_a_name_beyond_ascii(tmp_path):
     assert empty.field_data["source"][0].endswith(r'gr\xfc\xdfe<&">')
     assert pyvista.get_reader(vtk / "grains.pvd").time_values == [0.0, 1.0, 2.0]
     assert pyvista.get_reader(vtk / "distribution-c.pvd").time_values == [0.0, 2.0]
+
+
+@pytest.fixture(scope="module")
+def periodic():
+    spheres = shaken_cubic(np.random.default_rng(0), 6, overlap=1.0)
+    return scanfab.find_contacts(scanfab.Packing(*spheres, cell=scanfab.Cell([6.0] * 3)))
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
+def test_shells_of_a_map_have_their_volumes_and_values(periodic, tmp_path):
+    settings = MapSettings(shells=3, directions=9, spacing=0.5)
+    rows = list(compute_rows(periodic, settings, observe=VtkFolder(tmp_path)))
+    mesh = pyvista.read(tmp_path / "map-a_000000.vtu")
+    volumes = mesh.compute_cell_sizes()["Volume"]
+    for row in rows:
+        shell = np.flatnonzero(mesh["block"] == row.block)
+        expected = 4 / 3 * np.pi * (row.r_outer**3 - row.r_inner**3)
+        assert volumes[shell].sum() == pytest.approx(expected, rel=0.02)
+        value = np.array(row.alpha_vs_axial, float)
+        np.testing.assert_array_equal(mesh["alpha_vs_axial"][shell], value)
+
+
+def test_lines_of_a_periodic_whole_pass_through_its_images(periodic, tmp_path):
+    """The middle of each piece lies in void or in a grain, as the file says."""
+    settings = Settings(variants="a", directions=9, spacing=0.4)
+    list(compute_rows(periodic, settings, observe=VtkFolder(tmp_path)))
+    mesh = pyvista.read(tmp_path / "lines-a_000000.vtp")
+    branch = mesh.cell_centers().points[:, None] - periodic.position
+    branch -= 6.0 * np.rint(branch / 6.0)
+    is_void = (np.linalg.norm(branch, axis=2) > periodic.radius).all(axis=1)
+    assert is_void.tolist() == (np.asarray(mesh["void"]) == 1).tolist()
+    # lines are cut at a ball, which reaches out of the cell
+    assert np.abs(mesh.points - 3.0).max() > 3.0
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
+def test_tensors_that_one_variant_alone_has_are_in_tables_only(periodic, tmp_path):
+    settings = Settings(variants="ac", rv=0.06, with_="harmonics", directions=9, spacing=0.1)
+    whole, inner = compute_rows(periodic, settings, observe=VtkFolder(tmp_path))
+    assert whole.c_tensor4 is not None
+    assert inner.c_tensor4 is None
+    fields = pyvista.read(tmp_path / "grains_000000.vtp").field_data
+    assert list(fields["variant"]) == ["a", "c"]
+    assert not {"c_tensor2", "c_tensor4"} & set(fields)

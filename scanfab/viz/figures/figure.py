@@ -285,21 +285,27 @@ def make_figures(data: Any, kind: str, text: str | None = None, **offered: Any) 
     """
     if kind == "table" and not isinstance(data, Table):
         data = Table(data)
-    every: list[Any] = [(one, {}) for one in figures_of(kind).values()]
-    found = []
-    for figure, options in every if text is None else [find_figure(text, kind)]:
-        names = data.names if isinstance(data, Table) else figure.columns
-        lacking = [name for name in figure.columns if name not in names]
-        if lacking and text is not None:
-            named = ", ".join(lacking)
-            raise SettingsError(f"figure: {text} needs {named}, which the table does not have")
-        if text is not None or (not lacking and figure.suits(data)):
-            known = {k: v for k, v in offered.items() if k in signature(figure).parameters}
-            found.append(figure(data, **{**known, **options}))
-    return found
+
+    def lacking(figure: Any) -> list[str]:
+        known = data.names if isinstance(data, Table) else figure.columns
+        return [name for name in figure.columns if name not in known]
+
+    chosen: list[Any]
+    if text is None:
+        every = figures_of(kind).values()
+        chosen = [(one, {}) for one in every if not lacking(one) and one.suits(data)]
+    else:
+        chosen = [find_figure(text, kind)]
+        if names := ", ".join(lacking(chosen[0][0])):
+            raise SettingsError(f"figure: {text} needs {names}, which the table does not have")
+    made = []
+    for figure, options in chosen:
+        known = {k: v for k, v in offered.items() if k in signature(figure).parameters}
+        made.append(figure(data, **{**known, **options}))
+    return made
 
 
-def save_figures(path: Path, figures: Sequence[Figure], dpi: int = style.DPI) -> None:
+def save_figures(path: Path, figures: Sequence[Figure]) -> None:
     """
     Draw figures to a file, all on one page.
 
@@ -309,8 +315,6 @@ def save_figures(path: Path, figures: Sequence[Figure], dpi: int = style.DPI) ->
         ``.png``, ``.svg`` or ``.pdf``.
     figures : sequence of Figure
         See :func:`make_figures`.
-    dpi : int, optional
-        Pixels an inch.
 
     Raises
     ------
@@ -320,7 +324,7 @@ def save_figures(path: Path, figures: Sequence[Figure], dpi: int = style.DPI) ->
     style.check_plot_file(path)
     # drawn in memory first, as the PDF writer fails with an unclear error on a full disk
     with drawn_page(figures) as page:
-        drawn = style.figure_bytes(page, path.suffix.lower().lstrip("."), dpi)
+        drawn = style.figure_bytes(page, path.suffix.lower().lstrip("."))
     with whole_file(path) as part:
         part.write_bytes(drawn)
 

@@ -11,7 +11,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import FigureBase
-from matplotlib.transforms import nonsingular
+from matplotlib.ticker import AutoLocator
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray, IntArray
@@ -139,10 +139,11 @@ class Map(Figure):
             panel.set_axis_off()
         for panel in used[:-2]:
             panel.set_xlabel("")
+        for panel in used[-2:]:
+            # no panel stands below, so it needs the labels of the shared axis
+            panel.xaxis.set_tick_params(labelbottom=True)
         handles, labels = used[0].get_legend_handles_labels()
         if len(axes) > len(used):
-            # no panel stands below this one, so it needs the labels of the shared axis
-            used[-2].xaxis.set_tick_params(labelbottom=True)
             axes[-1].legend(handles, labels, loc="center", title=f"variant {self.variant}")
         else:
             part.legend(handles, labels, loc="outside upper left", title=f"variant {self.variant}")
@@ -191,7 +192,9 @@ class Map(Figure):
         known = values[np.isfinite(values)] if np.isfinite(values).any() else np.zeros(1)
         signed = one.errors == "total"
         largest = float(np.abs(known).max()) or 1.0
-        ends = (-largest, largest) if signed else nonsingular(known.min(), known.max(), 0.05)
+        ends = (
+            (-largest, largest) if signed else AutoLocator().nonsingular(known.min(), known.max())
+        )
         colours = colormaps["RdBu_r" if signed else "viridis"].with_extremes(bad=MISSING)
         values = np.ma.masked_invalid(picture)
         drawn = axes.pcolormesh(x, y, values, cmap=colours, norm=Normalize(*ends))
@@ -221,7 +224,7 @@ def _places(rows: Sequence[Any]) -> tuple[FloatArray, str]:
     """Where the blocks of a profile lie, and what that is."""
     if rows[0].get("r_outer") is not None:
         middle = 0.5 * (column_of(rows, "r_inner") + column_of(rows, "r_outer"))
-        return middle, "distance from the centre (dump's unit)"
+        return middle, "distance from the centre\n(dump's unit)"
     middles = _middles(rows)
     spread = np.ptp(middles, axis=0)
     along = int(np.argmax(spread))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
@@ -35,6 +35,10 @@ from scanfab.viz.scene import Look, look_at
 MOST_SEGMENTS = 3e8
 
 
+# columns without which nothing can be said of a map
+OF_MAPS = ("frame", "variant", "alpha_vs_axial")
+
+
 class Input(NamedTuple):
     """One table, its rows, and the manifest beside it."""
 
@@ -44,9 +48,6 @@ class Input(NamedTuple):
     cutoff: float | None
     """The cut-off whose rows were chosen from several."""
     is_map: bool
-
-
-Inputs = list[Input]
 
 
 @dataclass(frozen=True)
@@ -187,7 +188,9 @@ def make_report(
 report = make_report
 
 
-def read_inputs(tables: list[Path], cutoff: float | None, labels: Sequence[str] | None) -> Inputs:
+def read_inputs(
+    tables: list[Path], cutoff: float | None, labels: Sequence[str] | None
+) -> list[Input]:
     """
     Read tables and manifests.
 
@@ -202,8 +205,13 @@ def read_inputs(tables: list[Path], cutoff: float | None, labels: Sequence[str] 
         rows = [{"source": path.stem, "strain": None, **row} for row in read_rows(path)]
         is_map = bool(rows) and MAP in rows[0]
         read.append(Input(path, rows, read_manifest(path), cutoff, is_map))
-        of_frames += [(path, rows)] * (not is_map)
-    chosen = iter(choose_rows(of_frames, cutoff, labels))
+        if not is_map:
+            of_frames.append((path, rows))
+        elif lacking := [name for name in OF_MAPS if name not in rows[0]]:
+            raise SettingsError(f"{path}: the map lacks the columns {', '.join(lacking)}")
+    # a map is shown under the name of its file
+    own = [label for label, one in zip(labels or (), read, strict=False) if not one.is_map]
+    chosen = iter(choose_rows(of_frames, cutoff, own))
     inputs = [one if one.is_map else one._replace(rows=next(chosen)) for one in read]
     if not any(one.rows for one in inputs):
         names = ", ".join(map(str, tables))
@@ -225,7 +233,7 @@ def _section(one: Input, told: Told) -> dict[str, Any]:
     told.notes += map(str, one.manifest.get("notes") or [])
     if one.rows:
         try:
-            section["shown"] = show_frames(one)
+            section["shown"] = show_frames(one, one.manifest)
         except (ScanfabError, OSError) as error:
             section["no_view"] = f"The view is left out: {as_options(error)}."
     # options of the settings file beside the dumps, which the command line has overridden
@@ -239,7 +247,7 @@ def _section(one: Input, told: Told) -> dict[str, Any]:
     }
 
 
-def show_frames(one: Input) -> dict[str, Any]:
+def show_frames(one: Input, manifest: Mapping[str, Any]) -> dict[str, Any]:
     """
     Read the first source of a table again: its view, the sample in numbers, and pictures.
 
@@ -248,8 +256,7 @@ def show_frames(one: Input) -> dict[str, Any]:
     ScanfabError, OSError
         If it has changed, or cannot be read again.
     """
-    manifest = one.manifest or {}
-    for file in manifest.get("inputs") or []:
+    for file in manifest["inputs"]:
         path = Path(str(file.get("path")))
         if path.exists() and path.stat().st_size != file.get("size"):
             raise SettingsError(f"{path} has changed since the table was computed")

@@ -92,7 +92,8 @@ def overview(table: Path, rows: Sequence[Row]) -> str:
         }
         each = ", ".join(f"{number} in {variant}" for variant, number in grains.items())
         same = len(set(grains.values())) == 1
-        parts.append(f"{next(iter(grains.values()))} grains" if same else f"grains: {each}")
+        where = " a block" if "block" in rows[0] else ""
+        parts.append(f"{next(iter(grains.values()))} grains{where}" if same else f"grains: {each}")
     if column is not None:
         parts.append(f"{STRAINS[column][0]} {_span(rows, column, '.3g', 100)} %")
     return "; ".join(parts) + "."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from matplotlib import pyplot
 
 import scanfab
 from scanfab import Cell, Packing
@@ -66,3 +67,28 @@ def test_a_quantity_that_the_last_frame_lacks_leaves_its_planes_empty(packing):
     with drawn_page([Map(rows, quantity=None)]) as page:
         page.canvas.draw()
         assert any(np.ma.getmaskarray(one.get_array()).all() for one in meshes(page))
+
+
+@pytest.mark.parametrize(
+    ("blocks", "told"),
+    [
+        ({"grid": (4, 4, 4)}, "Hatched blocks lie at the surface"),
+        ({"slices": 2}, "All blocks lie at the surface"),
+        ({"shells": 3}, "variant a."),
+    ],
+)
+def test_one_quantity_on_given_axes_and_blocks_at_the_surface(packing, blocks, told):
+    rows = mapped(scanfab.find_contacts(Packing(packing.position, packing.radius)), **blocks)
+    figure, axes = Map(rows), pyplot.figure().subplots()
+    figure.draw(axes)
+    assert told in figure.caption
+    hatched = [patch for patch in axes.patches if patch.get_hatch()]
+    # in the lower one of the two planes next to the middle
+    planes = sorted({row.y for row in rows})
+    expected = [row for row in rows if row.at_surface and row.y == planes[len(planes) // 3]]
+    assert len(hatched) == (len(expected) if "grid" in blocks else 0)
+    assert bool(axes.get_title("left")) == ("grid" in blocks)
+    pyplot.close(axes.figure)
+    # on a page of its own, too
+    with drawn_page([Map(rows, quantity="alpha_vs_axial")]) as page:
+        page.canvas.draw()

@@ -125,3 +125,16 @@ def test_what_is_doubtful_about_tables_is_told_and_stands_in_the_page(table):
         page = page_of(paths)
     warned = page[page.index('id="warnings"') : page.index('id="sample"')]
     assert "also holds are used once" in warned
+
+
+def test_maps_beside_tables_have_no_labels_and_need_their_columns(table, tmp_path, capsys):
+    rows = [{**row, "block": 0, "x": 0.0, "y": 0.0, "z": 0.0, "at_surface": 0} for row in curve()]
+    words = [str(table(curve(), "a.jsonl")), str(table(rows, "map.jsonl"))]
+    labels = ["--label", "sheared", "--label", "by place"]
+    assert run(["report", *words, *labels, "-o", str(tmp_path / "r.html")]) == 0
+    assert "sheared" in words_of((tmp_path / "r.html").read_text("utf-8"))
+    for row in rows:
+        del row["variant"], row["alpha_vs_axial"]
+    lack = r"map\.jsonl: the map lacks the columns variant, alpha_vs_axial"
+    with pytest.raises(SettingsError, match=lack):
+        make_report([table(rows, "map.jsonl")])

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from scanfab.io.sources import READING, read_series
+from scanfab.pipeline.map_settings import MapSettings
 from scanfab.pipeline.options import MEANINGS
-from scanfab.pipeline.settings import Settings
 from scanfab.table.compare import compare_tables
 from scanfab.viz.report.tables import (
     caveats_of,
@@ -96,7 +96,7 @@ def test_turned_axes_lead_with_intensities_and_have_no_slope():
 
 def test_every_setting_has_a_meaning():
     """A setting that is new needs a meaning where it is declared."""
-    settings = {field.name for field in fields(Settings)} - {"workers"}
+    settings = {field.name for field in fields(MapSettings)} - {"workers"}
     assert {*READING, *settings, "fields", "digits"} == set(MEANINGS)
     assert all(MEANINGS.values())
     reading = inspect.signature(read_series).parameters.values()
