@@ -209,7 +209,7 @@ def is_hdf(head: bytes) -> bool:
     return head.startswith(IS_HDF)
 
 
-def read_hdf_file(path: Path, with_data: bool = True) -> HdfFile:
+def read_hdf_file(path: Path, with_data: bool = True, group: str = "") -> HdfFile:
     """
     Read all datasets of numbers and texts, and the attributes of all groups and datasets.
 
@@ -225,16 +225,16 @@ def read_hdf_file(path: Path, with_data: bool = True) -> HdfFile:
     ReadError
         If the file is damaged, or if its data are in other files.
     """
-    return fenced(read_in_worker, path, with_data)
+    return fenced(read_in_worker, path, with_data, group)
 
 
-def read_in_worker(path: str, with_data: bool) -> HdfFile:
+def read_in_worker(path: str, with_data: bool, group: str) -> HdfFile:
     """Read arrays and attributes, in the worker process; ValueError says what is wrong."""
     import h5py
 
     content = HdfFile({}, {})
     with h5py.File(path, "r") as file:
-        waiting = [("", file)]
+        waiting = [(group, file[group or "/"])]
         while waiting:
             name, node = waiting.pop(0)
             if isinstance(node, h5py.Dataset) and node.shape is not None:

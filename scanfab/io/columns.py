@@ -45,7 +45,7 @@ ROUNDED = 0.05
 EXACT = 2.0**53
 
 
-def has_radius(names: Sequence[str]) -> bool:
+def has_radius(names: Iterable[str]) -> bool:
     """Whether a column is named as a radius or a diameter."""
     lower = {name.lower() for name in names}
     return bool(lower & {*RADIUS_NAMES, *DIAMETER_NAMES})
@@ -196,7 +196,7 @@ def _radius(where: str, rest: dict[str, Any], options: ReadOptions, count: int) 
     name = first_of(RADIUS_NAMES, rest) if "radius" in sizes else None
     other = first_of(DIAMETER_NAMES, rest) if "diameter" in sizes else None
     if options.radius is not None:
-        if has_radius(list(rest)):
+        if has_radius(rest):
             raise ReadError(f"{where}: `radius` is for dumps without radii, but this one has them")
         return np.full(count, options.radius)
     if name is not None:

@@ -194,7 +194,7 @@ def _join(
     wrong = lost.all(axis=1) if walls else ~both
     if walls == "negative":
         wrong |= np.any(lost & (named >= 0), axis=1)
-    doubtful = ~both & (walls == "unknown") if not wrong.any() else wrong
+    doubtful = wrong if wrong.any() else ~both & (walls == "unknown")
     if doubtful.any():
         contact = int(np.argmax(doubtful))
         end = named[contact, np.argmax(lost[contact])].tolist()
@@ -304,9 +304,10 @@ def join_table(path: Path, grains: GrainTable, columns: Columns) -> JoinedContac
         first, second, *_ = unique[np.argmax(counts)]
         problem = f"{path}: {np.count_nonzero(counts > 1)} of {len(unique)} pairs are listed more "
         warn(f"{problem}than once, such as {first} and {second}: each row counts as a contact")
-    touched = rows_of_ids(grains, ids[walls]).max(axis=1)
-    count = np.bincount(touched[touched >= 0], minlength=len(grains.radius))
-    return joined._replace(wall_contacts=joined.wall_contacts + count)
+    # not contacts of two walls
+    with_walls = ids[walls & np.any(ids >= 0, axis=1)]
+    counted = join_ids(path, grains, with_walls, None, walls="negative")
+    return joined._replace(wall_contacts=counted.wall_contacts)
 
 
 def _with_ids(path: Path, grains: GrainTable, ids: IntArray) -> GrainTable:
@@ -317,19 +318,22 @@ def _with_ids(path: Path, grains: GrainTable, ids: IntArray) -> GrainTable:
     """
     if grains.id is not None:
         return grains
-    fits, count = [], len(grains.radius)
+    count = len(grains.radius)
+    if not len(ids):
+        return grains._replace(id=np.arange(count))
+    fitting = []
     for base in (0, 1):
         rows = ids - base
-        if len(rows) and rows.min() >= 0 and rows.max() < count:
+        if rows.min() >= 0 and rows.max() < count:
             length = np.linalg.norm(branches(grains, rows), axis=1)
             near = length < NEAR * grains.radius[rows].sum(axis=1)
-            fits += [base] * bool(np.mean(near) > NEARLY_ALL)
-    if len(ids) and len(fits) != 1:
+            if np.mean(near) > NEARLY_ALL:
+                fitting.append(base)
+    if len(fitting) != 1:
         problem = 'the grains have no ids, nor do the numbers fit rows: `columns={"id": ...}`'
         raise OtherGrainsError(f"{path}: names grains by numbers, but {problem} names their ids")
-    for base in fits:
-        note(f"the grains have no ids: contacts name their rows, counted from {base}")
-    return grains._replace(id=np.arange(count) + sum(fits))
+    note(f"the grains have no ids: contacts name their rows, counted from {fitting[0]}")
+    return grains._replace(id=np.arange(count) + fitting[0])
 
 
 def _vectors(path: Path, grains: GrainTable, table: Columns, names: str) -> FloatArray | None:

@@ -12,6 +12,7 @@ from typing import Any
 from scanfab.base.errors import SettingsError, note
 from scanfab.base.files import check_folder, refuse_inputs, whole_file
 from scanfab.base.option import refuse_unknown
+from scanfab.io.families import PathLike
 from scanfab.io.files import COMPRESSED_SUFFIXES, bare_name
 from scanfab.io.formats.own import HEADS, companion_kind, companion_there, companions_of
 from scanfab.io.options import READING_OPTIONS, parse_frames
@@ -21,7 +22,6 @@ from scanfab.io.sources import READING, read_series
 from scanfab.io.writer import Writer, installed_writers, writer_for, writer_named
 from scanfab.packing.packing import Packing
 
-PathLike = str | os.PathLike[str]
 STEP = "{step}"
 
 
@@ -153,20 +153,10 @@ def _packings(source: Any, chosen: slice) -> Iterator[tuple[int, Packing]]:
     return islice(enumerate(packings), *bounds)
 
 
-def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> None:
+def save_packing(packing: Packing, path: Path, writer: Writer) -> None:
     """
-    Write one packing to a file and its companion files; each file is complete or untouched.
-
-    Parameters
-    ----------
-    packing : Packing
-        The packing.
-    path : Path
-        The grain file.
-    writer : Writer, optional
-        By default the writer of the suffix of ``path``.
+    Write one packing to a grain file and its companion files; each is complete or untouched.
     """
-    writer = writer or writer_for(path)
     companions = [file for kind in HEADS if (file := companion_there(path, kind))]
     if companions:
         # they may belong to another grain file of the same stem

@@ -229,7 +229,7 @@ def _glob(members: list[Path], among: Iterable[Path]) -> str:
         for place, is_other in enumerate(differs):
             if is_other:
                 pieces[2 * place + 1] = star
-        pattern = str(members[0].with_name("".join(pieces)))
+        pattern = os.path.join(glob.escape(f"{members[0].parent}"), "".join(pieces))
         if not any(fnmatch(str(file), pattern) for file in others):
             return pattern
     return " ".join(map(str, members[:3])) + (" ..." if len(members) > 3 else "")

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 import os
 import time
-import warnings
 from collections.abc import Callable, Container, Iterator
 from contextlib import suppress
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.errors import PackingError, ReadError, warn
+from scanfab.base.errors import Note, PackingError, ReadError, collected, tell, warn
 from scanfab.base.option import refuse_unknown, unusable
 from scanfab.base.spelling import counted
 from scanfab.io.families import Family, PathLike, files_in
@@ -100,8 +99,8 @@ class FollowedSeries(Series):
         """The last stamp of each file, and the time since when it has it."""
         self._looked: list[Any] = []
         """The files and their stamps when the series was last opened."""
-        self._told: list[warnings.WarningMessage] = []
-        """Warnings from opening the files; they are shown once the first frame is taken."""
+        self._told: list[Note] = []
+        """Notes from opening the files; they are shown once the first frame is taken."""
         self._problem: Exception | None = None
         """Why the source cannot be opened, or the next frame cannot be read."""
 
@@ -118,8 +117,9 @@ class FollowedSeries(Series):
             begun = time.monotonic()
             if number == len(self._taken):
                 self._take_next()
-            while self._taken and self._told:
-                warnings.warn(self._told.pop(0).message, stacklevel=2)
+            if self._taken:
+                tell(self._told)
+                self._told = []
             if number < len(self._taken):
                 yield self._taken[number][0]
                 number += 1
@@ -186,9 +186,7 @@ class FollowedSeries(Series):
         looked = [(path, self._seen.get(path)) for path in names]
         if looked == self._looked:
             return
-        # warnings of threads that compute frames are recorded as well
-        with warnings.catch_warnings(record=True) as self._told, growing():
-            warnings.simplefilter("always")
+        with collected() as self._told, growing():
             try:
                 series = read_series(source, **self.reading)
             except (ReadError, OSError) as error:
@@ -252,7 +250,8 @@ class FollowedSeries(Series):
 def _state(series: Series, frame: Frame) -> State:
     """The present state of a frame."""
     path, stop = frame.snapshot.path, frame.snapshot.stop
-    stop = path.stat().st_size if stop is None and path.exists() else stop or 0
+    if stop is None:
+        stop = path.stat().st_size if path.exists() else 0
     return path, frame.snapshot.start, stop, [*filter(None, _contacts(series, frame))]
 
 

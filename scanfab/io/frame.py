@@ -149,7 +149,8 @@ class Frame:
             lists += [part.contacts for part in parts if part.contacts is not None]
         named = " and ".join(map(str, files))
         if len(lists) > 1:
-            raise ReadError(f"two contact lists for one frame: {named}: choose with `contacts`")
+            both = f"{path} and {named}" if grains.contacts is not None and takes_own else named
+            raise ReadError(f"two contact lists for one frame: {both}: choose with `contacts`")
         if not lists and takes_own:
             check_contacts_are_there(path, self.told)
         if not lists and series.contacts_from == "grains":
@@ -235,11 +236,15 @@ class Frame:
             return "cell" if is_given or ask is None else ask(self.snapshot.path)
 
     @property
-    def named(self) -> dict[str, bool]:
-        """Whether the user names a cell (or periodic directions), and a column of bodies."""
+    def cell_is_named(self) -> bool:
+        """Whether the user names a cell, or along which axes it repeats."""
         options = self.series.options
-        cell = bool(self.series.cells or options.cell or options.periodic)
-        return {"cell_is_named": cell, "bodies_are_named": options.bodies is not None}
+        return bool(self.series.cells or options.cell or options.periodic)
+
+    @property
+    def bodies_are_named(self) -> bool:
+        """Whether the user names the column of bodies."""
+        return self.series.options.bodies is not None
 
     def _options(self) -> ReadOptions:
         """The options for this frame, with its own cell if a file lists a cell for each frame."""

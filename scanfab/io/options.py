@@ -32,9 +32,10 @@ parse_periodic = optional(
 
 def parse_format(name: str, value: Any) -> str | None:
     """The name of an installed reader."""
-    if (given := parse_text(name, value)) is not None:
+    given: str | None = parse_text(name, value)
+    if given is not None:
         reader_named(given)
-    return given  # type: ignore[no-any-return]
+    return given
 
 
 def parse_columns(name: str, value: Any) -> dict[str, str] | None:
@@ -42,7 +43,7 @@ def parse_columns(name: str, value: Any) -> dict[str, str] | None:
     if value is None:
         return None
     if isinstance(value, Mapping):
-        return dict(value)
+        return {f"{standard}": f"{column}" for standard, column in value.items()}
     names: dict[str, str] = {}
     for part in str(value).split(","):
         standard, _, column = map(str.strip, part.partition("="))
@@ -67,7 +68,7 @@ def parse_cell(name: str, value: Any) -> tuple[float, ...] | str | PathLike[str]
 
 def parse_frames(name: str, value: str | int | slice | None) -> slice:
     """A slice from ``A:B:C`` or a single number; None gives all frames."""
-    if value is None or isinstance(value, slice):
+    if value is None or (isinstance(value, slice) and value.step != 0):
         return value or slice(None)
     words = str(value).split(":")
     with suppress(ValueError):
@@ -118,8 +119,8 @@ class Reading:
     """Periodic directions (default: from the dump)."""
     bodies: str | None = reading(parse_text, metavar="COLUMN")
     """
-    Column that numbers the clump of each sphere (default: id_multisphere, clumpId, clump_id or
-    clump, if there is one); id: each sphere is a grain of its own.
+    Column that numbers the clump of each sphere; a negative number is a grain of its own (default:
+    id_multisphere, clumpId, clump_id or clump, if there is one); id: each sphere is a grain.
     """
     max_unpacked: float | None = reading(parse_positive, metavar="TIMES")
     """How many times its compressed size a file may grow to (default: 1000)."""

@@ -70,9 +70,9 @@ class Snapshot:
     step: int | None = None
     time: float | None = None
     start: int = 0
-    """Offset of its first byte in the decompressed file."""
+    """Offset of its first byte in the decompressed file; in binary formats its number in there."""
     stop: int | None = None
-    """Offset behind its last byte; None: the end of the file."""
+    """Offset behind its last byte, or the next number; None: the end of the file."""
     stepless: bool = False
     """Whether the file states that there is no step; then a number in its name is not a step."""
     parts: tuple[Path, ...] = ()

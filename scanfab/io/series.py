@@ -245,11 +245,11 @@ class Series:
     def _snapshots_of(self, family: Family, path: Path) -> list[Snapshot]:
         """The snapshots of a file; the file is searched again if it has changed."""
         assert family.reader is not None
-        stamp = stamp_of(path) if path.exists() else None
-        if stamp is None or self.known.snapshots.get(path, (None, []))[0] != stamp:
+        known, stamp = self.known.snapshots, stamp_of(path) if path.exists() else None
+        if path not in known or known[path][0] != stamp:
             with unpacking_up_to(self.options.max_unpacked):
-                self.known.snapshots[path] = stamp, family.reader.snapshots(path)
-        return self.known.snapshots[path][1]
+                known[path] = stamp, family.reader.snapshots(path)
+        return known[path][1]
 
     def frames_expected(self) -> int:
         """
@@ -288,15 +288,18 @@ class Series:
         """
         if family.problem is not None:
             raise ReadError(family.problem)
-        name_step, step = frame.name_step, frame.snapshot.step
-        step = name_step if step is None else step
-        only = next(iter(family.files.values())) if len(family.files) == 1 else None
-        path = family.files.get(name_step, family.files.get(step, only))
-        if path is None:
-            return None
-        is_numbered = None not in family.files and step is not None
-        is_named = self.contacts_from == "path" and len(self.grains.files) == 1
-        is_sure = is_named or not is_numbered or bool({name_step, step} & set(family.files))
+        step = frame.name_step if frame.snapshot.step is None else frame.snapshot.step
+        for number in (frame.name_step, step):
+            if number in family.files:
+                path, is_sure = family.files[number], True
+                break
+        else:
+            if len(family.files) > 1:
+                return None
+            # the only file may be of another step, unless it has none or the user named it
+            ((number, path),) = family.files.items()
+            is_named = self.contacts_from == "path" and len(self.grains.files) == 1
+            is_sure = is_named or number is None or step is None
         return _of_moment(self._snapshots_of(family, path), frame.snapshot, is_sure)
 
     def beside(self, path: Path) -> list[Path]:
@@ -318,12 +321,10 @@ class Series:
             with suppress(ReadError):
                 listed = [(dump.path, *dump.parts) for dump in self.grains.reader.snapshots(path)]
                 dumps = [file for file in dict.fromkeys(chain(*listed)) if file.is_file()]
-        companions = [companion_file(path, kind) for kind in ("frame", "columns")]
-        files = [*dumps, *(file for file in companions if file.is_file())]
-        ask = getattr(self.grains.reader, "beside", None)
-        if ask is not None and self.cells is None and self.options.cell is None:
-            files += [file for dump in dumps or [path] for file in ask(dump)]
-        return files
+        files = [*dumps, *(companion_file(path, kind) for kind in ("frame", "columns"))]
+        if (ask := getattr(self.grains.reader, "beside", None)) is not None:
+            files += chain.from_iterable(map(ask, dumps or [path]))
+        return [file for file in files if file.is_file() and file != path]
 
     def files(self, number: int = ENDLESS, known: Container[Path] = ()) -> Iterator[Path]:
         """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -80,7 +80,7 @@ def read_series(
     *,
     format: str | None = None,
     contacts: str | PathLike = "auto",
-    columns: dict[str, str] | None = None,
+    columns: Mapping[str, str | int] | str | None = None,
     contact_columns: str | None = None,
     skip: int = 0,
     radius: float | None = None,
@@ -99,37 +99,7 @@ def read_series(
         A folder with one series, or its files, or globs. A file that is named twice is read once,
         with a warning. Contact files in the folders of single grain files are read if the step or
         the first words of their names match.
-    format : str, optional
-        Name of the reader; by default the content of the file decides.
-    contacts : str or path, optional
-        Source of the contacts. ``auto``: contact files if there are any, else geometry; ``file``:
-        contact files; ``geometric``: geometry; or a file, folder or glob, matched by step.
-    columns : dict, optional
-        Standard names to names in the file, for instance ``{"radius": "c_rad"}``. In tables without
-        names the numbers of columns from 1: ``{"x": 1, "y": 2, "z": 3, "diameter": 4}``.
-    contact_columns : str, optional
-        Meaning of the columns of a contact file: keywords of LIGGGHTS' ``compute pair/gran/local``,
-        or names of columns, ``"id1=c_ids[1],id2=c_ids[2]"``, which also work for tables.
-    skip : int, optional
-        Number of lines before a text table.
-    radius : float, optional
-        Radius of all grains, for dumps without radii; dump's length unit.
-    cell : tuple of float or path, optional
-        LX LY LZ or LX LY LZ XY XZ YZ in the dump's length unit, for formats without a cell; or a
-        CSV file with the cell of each frame: columns ``step`` or ``frame``, ``lx ly lz``, and
-        ``xy xz yz`` if the cell is tilted.
-    periodic : str, optional
-        The periodic directions, some of the letters x, y and z.
-    bodies : str, optional
-        Column that numbers the clump of each sphere: whole numbers, negative for a sphere that is a
-        grain of its own. By default ``id_multisphere``, ``clumpId``, ``clump_id`` or ``clump``, if
-        there is one; ``id`` makes each sphere a grain.
-    dim : {"auto", 2, 3}, optional
-        2: discs, whose centres share one coordinate; 3: spheres. ``auto``: 2, with a note, if the
-        first frame with grains has at least ten grains whose centres share exactly one coordinate.
-        The choice holds for all frames.
-    max_unpacked : float, optional
-        How many times its compressed size a file may grow to; 1000 by default.
+    {options}
 
     Returns
     -------
@@ -324,7 +294,10 @@ def _named_contacts(contacts: PathLike, options: ReadOptions) -> list[Family]:
     if not contact_families:
         problem = next((family.problem for family in families if family.problem), None)
         held = " and ".join(sorted({HOLDS[family.kind] for family in families})) or "no files"
-        raise ReadError(problem or f"{contacts}: expected contacts, found {held}")
+        lack = f"{contacts}: expected contacts, found {held}"
+        if any(family.kind == "other" for family in families):
+            lack += ': name columns by `contact_columns="id1=1,id2=2"`, whose numbers count from 1'
+        raise ReadError(problem or lack)
     return contact_families
 
 

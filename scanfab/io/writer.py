@@ -139,13 +139,8 @@ def _own_columns(packing: Packing) -> tuple[Columns, list[str]]:
     columns: Columns = {}
     notes: list[str] = []
     for name, values in packing.columns.items():
-        if values.dtype.kind == "S":
-            values = np.char.decode(values, "utf-8", "replace")
-        elif values.dtype.kind == "O":
-            values = values.astype(str)
-        elif values.dtype in (np.float16, np.longdouble):
-            values = values.astype(np.float64)
-        if values.dtype.kind not in "biufU":
+        # e and g are floats of other than 4 and 8 bytes, which few formats have
+        if values.dtype.kind not in "biufU" or values.dtype.char in "eg":
             notes.append(f"the column {name} is left out: it holds {values.dtype}")
             continue
         plain = re.sub(r"[^a-z0-9]", "", name.lower())

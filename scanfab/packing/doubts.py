@@ -70,7 +70,7 @@ def refuse_impossible(sample: Sample) -> None:
 
 
 def doubts_of(
-    sample: Sample, *, cell_is_named: bool = False, bodies_are_named: bool = False
+    sample: Sample, cell_is_named: bool = False, bodies_are_named: bool = False
 ) -> list[Note]:
     """
     Notes on what looks wrong in a frame whose contacts are known.

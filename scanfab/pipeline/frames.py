@@ -283,11 +283,13 @@ def no_such_reference(number: int, name: str, count: int) -> NoReferenceError:
 
 def doubts_of_frame(frame: Unread, sample: Sample, settings: Settings) -> list[Note]:
     """What looks wrong in a frame before anything is measured."""
-    file = frame if isinstance(frame, Frame) else None
-    notes = doubts_of(sample, **(file.named if file else {}))
-    # a packing made of arrays has the cell that its maker wants
-    if no_cell := cell_doubt(sample, file.carries if file else "cell"):
-        notes.append(Note("no_cell", no_cell))
+    if isinstance(frame, Packing):
+        # made of arrays, it has the cell and the bodies that its maker wants
+        notes = doubts_of(sample)
+    else:
+        notes = doubts_of(sample, frame.cell_is_named, frame.bodies_are_named)
+        if no_cell := cell_doubt(sample, frame.carries):
+            notes.append(Note("no_cell", no_cell))
     return notes if settings.boundary else notes + boundary_hints(sample, settings)
 
 

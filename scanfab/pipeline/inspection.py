@@ -141,7 +141,7 @@ def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
         refuse_impossible(sample)
     except PackingError as error:
         doubts.append(Note("impossible", str(error)))
-    doubts += doubts_of(sample, **frame.named)
+    doubts += doubts_of(sample, frame.cell_is_named, frame.bodies_are_named)
     if no_cell := cell_doubt(sample, frame.carries):
         doubts.append(Note("no_cell", no_cell))
     elif hint := cell_hint(sample, frame.carries):

@@ -136,7 +136,7 @@ def _packings(reader: Reader, path: Path, options: ReadOptions) -> list[Packing]
         assert snapshot.step is None or isinstance(snapshot.step, int), "a step is an int or None"
         table = reader.read_grains(snapshot, options)
         assert isinstance(table, GrainTable), f"{path.name}: read_grains() must return a GrainTable"
-        names = ("id", "columns", "contacts", "wall_contacts", "wall_forces", "cell")
+        names = ("id", "columns", "bodies", "contacts", "wall_contacts", "wall_forces", "cell")
         more = {name: getattr(table, name) for name in names}
         packings.append(Packing(table.position, table.radius, **more))
     return packings

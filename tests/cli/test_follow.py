@@ -136,6 +136,13 @@ def test_a_second_signal_interrupts(folder):
     assert not Path("t.csv").exists()
 
 
+def test_what_is_passed_over_is_told_once(folder, series, capsys):
+    shutil.copytree(series, folder, dirs_exist_ok=True)
+    (folder / "log.txt").write_text("nothing of use\n")
+    assert follow(seconds=0.3) == 0
+    assert capsys.readouterr().err.count("skipped log.txt") == 1
+
+
 def test_without_any_frame_the_table_has_no_rows(folder, capsys):
     (folder / "log.txt").write_text("nothing yet\n")
     assert follow(seconds=0.1) == 0

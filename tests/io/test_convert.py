@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import signal
 import subprocess
 import warnings
 from itertools import repeat
@@ -334,6 +336,33 @@ def test_lammps_reads_the_data_file_and_the_dump(tmp_path, tilt):
     mass = columns["density"] * 4 / 3 * np.pi * packing.radius**3
     np.testing.assert_allclose(again.columns["mass"][other], mass[order], rtol=1e-14)
     np.testing.assert_allclose(again.cell.vectors, cell.vectors, atol=1e-14)
+
+
+def test_a_text_that_numbers_no_frame_is_written_and_read(tmp_path):
+    """Its name is that of a column for the number of the frame."""
+    packing = scanfab.Packing([[0, 0, 0], [2, 0, 0]], 1.0, columns={"frame": ["a", "b"]})
+    (path,) = scanfab.convert(packing, tmp_path / "a.csv")
+    assert scanfab.read(path).columns["frame"].tolist() == ["a", "b"]
+
+
+@pytest.mark.parametrize("values", [[b"a", b"b"], ["a", None], np.zeros(2, np.float16), [1j, 2]])
+def test_a_column_that_few_formats_can_hold_is_left_out(tmp_path, values):
+    packing = scanfab.Packing([[0, 0, 0], [2, 0, 0]], 1.0, columns={"odd": values})
+    for suffix in (".csv", ".vtp", ".npz", ".xyz"):
+        with pytest.warns(ScanfabNote, match="the column odd is left out: it holds"):
+            scanfab.convert(packing, tmp_path / f"{suffix[1:]}_out{suffix}")
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+def test_a_forked_process_reads_companion_files(tmp_path):
+    """Polars, which this process has used, would wait there for ever."""
+    path = written(EVERYTHING, tmp_path, "csv")
+    scanfab.read(path)
+    child = os.fork()
+    if child == 0:
+        signal.alarm(60)
+        os._exit(len(scanfab.read(path).contacts) == 0)
+    assert os.waitpid(child, 0)[1] == 0
 
 
 def test_that_columns_of_contacts_have_no_place_is_told_once(tmp_path):

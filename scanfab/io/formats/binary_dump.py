@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
@@ -155,35 +156,31 @@ class NetcdfDump(shared.GrainsOnly):
 
     def names(self, path: Path) -> list[str]:
         """The names of all variables."""
-        return [*_read_netcdf(path, None)[0]]
+        return self._contents(path)[0]
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """The frames; ``start`` of a snapshot is the number of its frame."""
-        return shared.numbered_frames(path, _read_netcdf(path, None)[1])
+        return shared.numbered_frames(path, self._contents(path)[1])
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """The variables of the atoms, and the cell; ReadError if a value was never written."""
-        columns, box = _read_netcdf(snapshot.path, snapshot.start)
+        columns, box = fenced(variables_in_worker, snapshot.path, snapshot.start)
         for name, letter in POSITIONS.items():
             if name in columns and columns[name].shape[1:] == (3,):
                 named = zip("xyz", columns.pop(name).T, strict=True)
                 columns |= {f"{axis}{letter}": values for axis, values in named}
         return columns, _netcdf_cell(snapshot.path, box)
 
+    def _contents(self, path: Path) -> tuple[list[str], list[tuple[int, float]]]:
+        """The names of all variables, and the step and the time of each frame."""
+        if find_spec("netCDF4") is None:
+            raise ReadError(f'{path}: needs another package: pip install "scanfab[netcdf]"')
+        return fenced(contents_in_worker, path)
 
-def _read_netcdf(path: Path, frame: int | None) -> tuple[Any, Any]:
-    if find_spec("netCDF4") is None:
-        raise ReadError(f'{path}: needs another package: pip install "scanfab[netcdf]"')
-    return fenced(read_in_worker, path, frame)
 
-
-def read_in_worker(path: str, frame: int | None) -> tuple[Any, Any]:
-    """
-    Read the columns of the atoms in a frame, and the other variables of the frame.
-
-    If ``frame`` is None, return the names of all variables, and the step and the time of each
-    frame. ValueError says what is wrong.
-    """
+@contextmanager
+def _opened(path: str) -> Iterator[Any]:
+    """Open a file; ValueError if LAMMPS has not written it."""
     import netCDF4
 
     with netCDF4.Dataset(path, "r") as file:
@@ -191,15 +188,25 @@ def read_in_worker(path: str, frame: int | None) -> tuple[Any, Any]:
             raise ValueError("expected a file that LAMMPS wrote by dump netcdf")
         # keep raw values; netCDF4 masks values that were never written
         file.set_auto_scale(False)
-        if frame is None:
-            # LAMMPS stores the step as time, and the time step as its scale factor
-            time = file.variables["time"]
-            steps, scale = np.asarray(time[:], np.float64), float(time.scale_factor)
-            if not np.all((np.abs(steps) < 2.0**53) & (steps == np.rint(steps))):
-                raise ValueError("a frame has no step")
-            return [*file.variables], [(int(step), step * scale) for step in steps.tolist()]
-        atoms: dict[str, Any] = {}
-        others: Columns = {}
+        yield file
+
+
+def contents_in_worker(path: str) -> tuple[list[str], list[tuple[int, float]]]:
+    """The names of all variables, and the step and the time of each frame."""
+    with _opened(path) as file:
+        # LAMMPS stores the step as time, and the time step as its scale factor
+        time = file.variables["time"]
+        steps, scale = np.asarray(time[:], np.float64), float(time.scale_factor)
+        if not np.all((np.abs(steps) < 2.0**53) & (steps == np.rint(steps))):
+            raise ValueError("a frame has no step")
+        return [*file.variables], [(int(step), step * scale) for step in steps.tolist()]
+
+
+def variables_in_worker(path: str, frame: int) -> tuple[Columns, Columns]:
+    """The columns of the atoms in a frame, and its other variables; ValueError if one has gaps."""
+    atoms: dict[str, Any] = {}
+    others: Columns = {}
+    with _opened(path) as file:
         for name, variable in file.variables.items():
             dimensions, kind = variable.dimensions, np.dtype(variable.dtype).kind
             if dimensions[:1] == ("frame",) and kind in "iuf":

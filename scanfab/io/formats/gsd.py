@@ -7,7 +7,10 @@ hardly ever meant; therefore a file without diameters counts as having no radii.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -39,17 +42,17 @@ class GsdReader(GrainsOnly):
 
     def names(self, path: Path) -> list[str]:
         """The names of all arrays in all frames; without diameters the file holds points."""
-        return [name.rpartition("/")[2] for name in fenced(read_in_worker, path, None)[1]]
+        return [name.rpartition("/")[2] for name in fenced(contents_in_worker, path)[1]]
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """The frames with their steps; ``start`` of a snapshot is the number of its frame."""
-        steps = fenced(read_in_worker, path, None)[0]
+        steps, _ = fenced(contents_in_worker, path)
         return numbered_frames(path, ((step, None) for step in steps))
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """The arrays of the particles in the frame, or in the first frame, and the cell."""
         path, where = snapshot.path, f"{snapshot.path}, frame {snapshot.start}"
-        arrays = fenced(read_in_worker, path, snapshot.start)[2]
+        arrays = fenced(arrays_in_worker, path, snapshot.start)
         position = arrays.pop("particles/position", np.zeros((0, 3), np.float32))
         count = arrays.pop("particles/N", np.array([0])).tolist()
         box = arrays.get("configuration/box", np.zeros(0)).astype(np.float64).tolist()
@@ -76,25 +79,31 @@ class GsdReader(GrainsOnly):
         return columns, cell_of(f"{where}: its box", vectors, (True, True, not flat), origin)
 
 
-def read_in_worker(path: str, frame: int | None) -> tuple[list[int], list[str], Columns]:
-    """
-    Read the steps of all frames and the names of all arrays, or the arrays of one frame.
-
-    ValueError says why a file cannot be read.
-    """
+@contextmanager
+def _opened(path: str) -> Iterator[tuple[Any, list[str]]]:
+    """Open a file, with the names of its arrays; ValueError if HOOMD has not written it."""
     import gsd.fl
 
     with gsd.fl.open(path, mode="r") as file:
         if file.schema != "hoomd":
             raise ValueError(f"its schema is {file.schema!r}, expected 'hoomd'")
-        names = [name for name in file.find_matching_chunk_names("") if name.startswith(GROUPS)]
+        yield file, [name for name in file.find_matching_chunk_names("") if name.startswith(GROUPS)]
 
-        def array(number: int, name: str) -> AnyArray:
-            """The array of a frame; if it is constant, of the first frame; else an empty text."""
-            frames = [k for k in (number, 0) if file.chunk_exists(frame=k, name=name)]
-            return np.asarray(file.read_chunk(frame=frames[0], name=name) if frames else "")
 
-        if frame is None:
-            return [int(array(k, STEP).item() or 0) for k in range(file.nframes)], names, {}
-        found = {name: array(frame, name) for name in names}
-        return [], names, {name: own for name, own in found.items() if own.dtype.kind in "biuf"}
+def _array(file: Any, number: int, name: str) -> AnyArray:
+    """The array of a frame; if it is constant, of the first frame; else an empty text."""
+    frames = [k for k in (number, 0) if file.chunk_exists(frame=k, name=name)]
+    return np.asarray(file.read_chunk(frame=frames[0], name=name) if frames else "")
+
+
+def contents_in_worker(path: str) -> tuple[list[int], list[str]]:
+    """The steps of all frames, and the names of all arrays."""
+    with _opened(path) as (file, names):
+        return [int(_array(file, k, STEP).item() or 0) for k in range(file.nframes)], names
+
+
+def arrays_in_worker(path: str, frame: int) -> Columns:
+    """The arrays of numbers of one frame."""
+    with _opened(path) as (file, names):
+        found = {name: _array(file, frame, name) for name in names}
+    return {name: values for name, values in found.items() if values.dtype.kind in "biuf"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import Columns
 from scanfab.io.binary_files import is_hdf, read_hdf_file
-from scanfab.io.files import first_bytes
+from scanfab.io.files import Stamp, first_bytes, stamp_of
 from scanfab.io.formats.shared import GrainsOnly, numbered_frames
 from scanfab.io.mesh import joined_arrays
 from scanfab.io.reader import Carries, FileKind, Snapshot
@@ -69,7 +70,7 @@ class KratosReader(GrainsOnly):
         path = snapshot.path
         if is_hdf(first_bytes(path)):
             name = [*_groups(path)][snapshot.start]
-            arrays = read_hdf_file(path).below(name)
+            arrays = read_hdf_file(path, group=name).below(name)
             if any(values.shape != arrays["id"].shape for values in arrays.values()):
                 raise ReadError(f"{path}: group {name}: expected columns of one length")
             return arrays, None
@@ -99,6 +100,12 @@ class KratosReader(GrainsOnly):
 
 def _groups(path: Path) -> dict[str, float | None]:
     """The top groups that hold grains, in the order of their numbers, and their times."""
+    return _groups_at(path, stamp_of(path))
+
+
+@lru_cache(maxsize=1)
+def _groups_at(path: Path, _stamp: Stamp) -> dict[str, float | None]:
+    """The groups of a file as it was at some moment: a series asks for them at each frame."""
     file, times = read_hdf_file(path, with_data=False), {}
     for name in sorted(filter(str.isdecimal, file.attributes), key=int):
         if file.below(name).keys() >= DATASETS:

@@ -116,7 +116,7 @@ class LammpsReader(FormsReader):
         values = np.column_stack(list(columns.values())).astype(np.float64)
         if not len(values) or grains.id is None:
             return join_ids(path, grains, np.zeros((0, 2), np.int64), None, walls=False)
-        refuse_rounded_ids(path, values, grains)
+        refuse_rounded_ids(path, values, grains.id)
         places = self.found(path, values, grains) if option is None or self.lists_walls else None
         if isinstance(places, JoinedContacts):
             return places
@@ -302,10 +302,9 @@ def id_column(values: FloatArray, grains: GrainTable, *, is_flagged: bool) -> in
     return places[0] if len(places) == 1 else None
 
 
-def refuse_rounded_ids(path: Path, values: FloatArray, grains: GrainTable) -> None:
+def refuse_rounded_ids(path: Path, values: FloatArray, id: IntArray) -> None:
     """ReadError if ids of a million or more were rounded to six digits by the format %g."""
-    assert grains.id is not None
-    longer = grains.id[grains.id >= 1_000_000]
+    longer = id[id >= 1_000_000]
     digits = 10 ** (np.floor(np.log10(np.maximum(longer, 1))).astype(np.int64) - 5)
     longer = longer[longer % digits != 0]
     large = np.any(values >= 1e6, axis=0) & np.all(values == np.rint(values), axis=0)

@@ -78,11 +78,11 @@ class DataFile(GrainsOnly):
         rows = data[atoms.end() : behind.start() + 1 if behind else None]
         rows = re.sub(rb"[ \t]*#[^\n]*", b"", rows) if b"#" in rows else rows
         names = numbered(len(rows.lstrip().partition(b"\n")[0].split()) or len(PLAIN))
-        id, line = f"{options.columns.get('id', 1)}", data.count(b"\n", 0, atoms.end()) + 1
+        id, line = options.columns.get("id", "1"), data.count(b"\n", 0, atoms.end()) + 1
         layout = Layout(tuple(names), line=line, whole=(id,))
         columns = read_rows(snapshot, rows, layout, count=int(count), what="atoms")
         cell = _cell(path, header)
-        own = {f"{name}" for name in options.columns.values()}
+        own = {*options.columns.values()}
         if not own or not own <= {*names}:
             style = (atoms[2] or b"").decode("utf-8", "replace")
             others = [kind.decode() for kind in NO_SPHERES if header.get(kind, b"0") != b"0"]

@@ -9,6 +9,7 @@ whatever its ending. :func:`scanfab.convert` writes them, and reading the grain 
 
 from __future__ import annotations
 
+import csv
 import io
 import re
 from contextlib import suppress
@@ -26,6 +27,7 @@ from scanfab.io.families import numbers_in
 from scanfab.io.files import bare_name, check_memory, first_bytes, plain
 from scanfab.io.formats.shared import GrainsOnly
 from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
+from scanfab.io.text import by_polars
 from scanfab.io.writer import Left, as_arrays, contacts_of, csv_bytes, more_columns, stated_cell
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
@@ -92,29 +94,35 @@ def companions_of(packing: Packing, path: Path, left: Left) -> dict[Path, bytes]
     return {companion_file(path, kind): csv_bytes(table) for kind, table in tables.items()}
 
 
-def _rows(path: Path) -> Any:
-    """A companion file as a polars table of words; its first row has the names of the columns."""
-    import polars
-
+def _content(path: Path) -> bytes:
+    """The bytes of a companion file, all lines of which are complete."""
     file = plain(path)
     check_memory(path, IN_MEMORY * file.stat().st_size)
     data = file.read_bytes()
     if not data.endswith(b"\n"):
         raise ReadError(f"{path}: the last line has no end: the file is incomplete")
-    try:
-        # header row as words, because polars keeps doubled quotes in a header it parses itself
-        return polars.read_csv(data, has_header=False, infer_schema=False)
-    except polars.exceptions.PolarsError as error:
-        raise ReadError(f"{path}: cannot be read: {str(error).partition(chr(10))[0]}") from None
+    return data
 
 
 def _columns(path: Path) -> Columns:
-    """The columns of a companion file; each becomes int64 or float64 if all its words allow it."""
+    """The columns of a companion file."""
+    columns = by_polars(columns_of_csv, path, _content(path))
+    if isinstance(columns, str):
+        raise ReadError(f"{path}: {columns}")
+    return columns
+
+
+def columns_of_csv(_path: str, data: bytes) -> Columns | str:
+    """Columns of words, or of int64 or float64 if all words allow it; or a text: what is wrong."""
     import polars
 
-    words = _rows(path)
+    try:
+        # header row as words, because polars keeps doubled quotes in a header it parses itself
+        words = polars.read_csv(data, has_header=False, infer_schema=False)
+    except polars.exceptions.PolarsError as error:
+        return f"cannot be read: {error}".partition("\n")[0]
     if any(words.null_count().row(0)):
-        raise ReadError(f"{path}: a line is incomplete")
+        return "a line is incomplete"
     columns = {}
     for name, column in zip(words.row(0), words.slice(1), strict=True):
         casts = [column.cast(kind, strict=False) for kind in (polars.Int64, polars.Float64)]
@@ -181,11 +189,12 @@ def read_frame(path: Path) -> FrameData | None:
     file = companion_there(path, "frame")
     if file is None:
         return None
-    rows = _rows(file).rows()
-    words = {name: word for name, word in zip(rows[0], rows[-1], strict=True) if word}
-    along = words.get("periodic", "")
     try:
-        if rows[0] != FRAME or len(rows) != 2 or set(along) - set("xyz"):
+        names, *rows = csv.reader(_content(file).decode().splitlines())
+        row = rows[-1] if rows else []
+        words = {name: word for name, word in zip(FRAME, row, strict=False) if word}
+        along, sizes = words.get("periodic", ""), [len(one) for one in rows]
+        if tuple(names) != FRAME or sizes != [len(FRAME)] or set(along) - set("xyz"):
             raise ValueError(f"expected the line {','.join(FRAME)} and one row")
         cell = None
         if any(name in words for name in CELL):
@@ -194,7 +203,7 @@ def read_frame(path: Path) -> FrameData | None:
         counts = ("step", "grains", "contacts")
         step, grains, contacts = (int(words[count]) if count in words else None for count in counts)
         time = float(words["time"]) if "time" in words else None
-    except (KeyError, ValueError, PackingError) as error:
+    except (csv.Error, KeyError, ValueError, PackingError) as error:
         raise ReadError(f"{file}: cannot be read as cell, step and time: {error}") from None
     return FrameData(file, step, time, cell, grains, contacts)
 
@@ -270,7 +279,8 @@ class NpzFormat(GrainsOnly):
         """Grains, or for companion files contacts or ``cell``."""
         if first_bytes(path, 2) == IS_NPZ:
             return "grains"
-        return "contacts" if companion_kind(path) == "contacts" else "cell"
+        kind = companion_kind(path)
+        return "other" if kind is None else "contacts" if kind == "contacts" else "cell"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """The only snapshot, with the step and time of the packing."""

@@ -38,13 +38,11 @@ class CsvWriter:
     def write(self, packing: Packing, path: Path) -> Left:
         """Write one frame; a column that numbers frames (`time`) goes into a companion file."""
         known, own, notes = table_columns(packing)
-        numbers = {name: values for name, values in own.items() if values.dtype.kind in "iuf"}
-        times = {k: values for k, values in numbers.items() if plain_name(k) in FRAME_NAMES}
-        left = {k for k, values in times.items() if len(np.unique(values)) > 1}
-        held = {name: own[name] for name in own if name not in left}
+        times = {name: values for name, values in own.items() if plain_name(name) in FRAME_NAMES}
+        left = tuple(name for name, values in times.items() if len(np.unique(values)) > 1)
+        held = {name: values for name, values in own.items() if name not in left}
         path.write_bytes(self.table({**known, **held}))
-        columns = tuple(name for name in own if name in left)
-        return Left(contacts=True, frame=True, columns=columns, notes=tuple(notes))
+        return Left(contacts=True, frame=True, columns=left, notes=tuple(notes))
 
     def table(self, columns: Columns) -> bytes:
         """The bytes of the file."""

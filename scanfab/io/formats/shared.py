@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -129,9 +128,8 @@ def grains_of(
     if "1" in columns and not options.columns:
         advice = 'number them as the deck lists them: `columns="id=1,x=3,y=4,z=5,radius=6"`'
         raise ReadError(f"{snapshot.path}: the {len(columns)} columns have no names: {advice}")
-    named = {key: f"{own}" for key, own in options.columns.items()}
     where = "" if snapshot.step is None else f", step {snapshot.step}"
-    return grain_table(snapshot.path, columns, cell, replace(options, columns=named), where)
+    return grain_table(snapshot.path, columns, cell, options, where)
 
 
 def in_space(columns: Columns) -> Columns:
@@ -273,9 +271,13 @@ def marked_frames(
         for stop in [*starts[1:], size][: len(starts)]:
             stream.seek(start)
             head = stream.read(min(HEADER_BYTES, stop - start))
-            header = mark.match(head)
-            where, word = f"{path}: time of a frame", header[1] if header and not moment else b""
-            at = moment(path, head) if moment else (None, numbers(where, word, 1)[0])
+            at: tuple[int | None, float | None] | None
+            if moment is not None:
+                at = moment(path, head)
+            else:
+                header = mark.match(head)
+                word = header[1] if header else b""
+                at = None, numbers(f"{path}: time of a frame", word, 1)[0]
             # the header of the last frame may be cut off: keep the frame without step and time
             if at or stop == size:
                 frames.append(Snapshot(path, *(at or (None, None)), start, stop))

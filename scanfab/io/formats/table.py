@@ -140,13 +140,14 @@ class TableReader:
         path, head = snapshot.path, table_head(snapshot.path, options.skip)
         is_guessed = not head.is_named and not options.columns
         roles = _guessed(path, head) if is_guessed else self.told(options)._grains(path, head)
-        columns = _read(path, head, roles)
+        # not id1 and id2: an NPZ file may hold contacts, too, in arrays of another length
+        columns = _read(path, head, {k: own for k, own in roles.items() if k not in ("id1", "id2")})
         if is_guessed:
             _refuse_wrong_guess(path, roles, columns)
         elif head.is_named:
             for name in (name for name in columns if plain_name(name) in FRAME_NAMES):
                 if (count := len(np.unique(columns[name]))) > 1:
-                    expected = "expected one frame in a file"
+                    expected = "expected one frame in a file: write one for each, or rename it"
                     raise ReadError(f"{path}: the column {name} has {count} values: {expected}")
             check_units(path, roles)
         if "volume" in roles and not roles.keys() & {"radius", "diameter"}:
@@ -278,8 +279,7 @@ def find_columns(
     names, plain = table.own, [plain_name(name) for name in table.own]
     roles: dict[str, str] = {}
     for standard in (*named, *(what for what in known if what not in named)):
-        key = f"{named.get(standard, '')}"
-        if standard in named:
+        if (key := named.get(standard)) is not None:
             places = [place for place, name in enumerate(names) if name == key]
             if not places and re.fullmatch(r"[0-9]{1,6}", key) and 1 <= int(key) <= len(names):
                 places = [int(key) - 1]

@@ -7,6 +7,7 @@ scanfab writes PolyData (``.vtp``). Data without a usual name (cell, images) get
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from html import escape
 from pathlib import Path
 from typing import Any, Literal
@@ -43,6 +44,7 @@ FIELDS["time"] = "TimeValue"
 # rectilinear grids are boxes, not grains
 BOXES = ("RectilinearGrid", "RECTILINEAR_GRID")
 # kinds of files that list the files of one frame: grains, contacts, boxes
+LISTS = {".vtm": ("DataSet", "file")} | dict.fromkeys((".pvtp", ".pvtu"), ("Piece", "Source"))
 BLOCKS = ("vtkMultiBlockDataSet", "vtkPartitionedDataSetCollection")
 
 
@@ -76,12 +78,13 @@ class VtkReader(GrainsOnly):
         if is_cell_file(path):
             return "cell"
         mesh = read_mesh(path)
-        if mesh.has_faces:
+        # pieces of scan lines, which compute --vtk writes, say whether they are void
+        if mesh.has_faces or "void" in mesh.line_arrays:
             return "other"
         if len(mesh.points) == 0:
             # an empty frame, whose arrays VTK may have dropped: look for the word in the file
             return "grains" if b"radi" in plain(path).read_bytes().lower() else "other"
-        if has_radius(list(mesh.point_arrays)):
+        if has_radius(mesh.point_arrays):
             return "grains"
         return "contacts" if len(mesh.lines) else "points"
 
@@ -166,8 +169,11 @@ class VtkReader(GrainsOnly):
         return "nothing" if _read_box(path) is None else "box"
 
     def beside(self, path: Path) -> list[Path]:
-        """The files with the box of LIGGGHTS and the cell of YADE, if they exist."""
-        files = (_box_file(path), cell_file(path))
+        """The files that a file lists, and the box of LIGGGHTS or the cell of YADE, if any."""
+        files = [_box_file(path), cell_file(path)]
+        if (tags := LISTS.get(path.suffix.lower())) is not None:
+            with suppress(ReadError):
+                files += listed(path, *tags)
         return [file for file in files if file is not None]
 
     def _read_blocks(self, index: Path, options: ReadOptions) -> GrainTable:

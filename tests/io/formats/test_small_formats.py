@@ -120,6 +120,13 @@ def test_esys_particles_of_all_workers(tmp_path, behind):
     assert packing.contacts is None
 
 
+def test_esys_in_2d_is_not_periodic_across_whatever_the_header_says(tmp_path):
+    path = esys.run(tmp_path)
+    flat = path.read_text().replace("0 -1 0 4 5 6", "0 -1 2 4 5 2").replace("n 3D", "n 2D")
+    path.write_text(flat.replace("Boundaries 1 0 0", "Boundaries 1 0 1"))
+    assert scanfab.read(path).cell.periodic == (True, False, False)
+
+
 @pytest.mark.parametrize("source", ["", "snap*", "snap_t=*_0.txt"])
 def test_esys_snapshots_are_a_series_of_their_headers(tmp_path, source):
     for step in (200, 30, 1000):

@@ -383,6 +383,8 @@ def test_xyzd(tmp_path):
     path.write_bytes(np.column_stack([POSITION, 2 * RADIUS / 1.1]).astype("<f8").tobytes())
     with pytest.warns(ScanfabWarning, match=r"no packing\.nfo beside the file"):
         np.testing.assert_allclose(read(path).radius, RADIUS / 1.1, rtol=1e-15)
+    series = scanfab.read_series(path)
+    assert [*series.files()] == [path]
     # (1 - final) / (1 - theoretical) = 1.331
     info = "N: 64\n Dimensions: 4 4.5 5.0\n Theoretical Porosity: 0.5\nFinal Porosity: 0.3345 (Tol"
     write(tmp_path / "packing.nfo", info)
@@ -392,6 +394,7 @@ def test_xyzd(tmp_path):
     np.testing.assert_array_equal(packing.position, POSITION % [4, 4.5, 5])
     np.testing.assert_array_equal(packing.cell.vectors, np.diag([4, 4.5, 5]))
     assert packing.cell.periodic == (True, True, True)
+    assert [*series.files()] == [path, tmp_path / "packing.nfo"]
     write(tmp_path / "packing.nfo", info.replace("0.3345", "none"))
     with pytest.raises(ReadError, match="expected theoretical and final porosities"):
         read(path)
@@ -399,7 +402,8 @@ def test_xyzd(tmp_path):
 
 def test_arrays_of_positions(tmp_path):
     path = tmp_path / "a.npz"
-    np.savez_compressed(path, pos=POSITION, r=RADIUS, id=ID, other=np.arange(3), velocity=POSITION)
+    more = {"other": np.arange(3), "velocity": POSITION, "pairs": np.array([[0, 1]])}
+    np.savez_compressed(path, pos=POSITION, r=RADIUS, id=ID, **more)
     packing = read(path)
     assert_right(packing)
     np.testing.assert_array_equal(packing.id, ID)

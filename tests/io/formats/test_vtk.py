@@ -170,6 +170,9 @@ def test_the_files_of_a_frame_are_its_grains_and_contacts(tmp_path):
     packing = scanfab.read(path)
     np.testing.assert_array_equal(packing.contacts.pairs, [[0, 1], [1, 2]])
     assert packing.step is None
+    # a cell that the user names makes none of them less of an input
+    series = scanfab.read_series(path, cell=(99.0, 99.0, 99.0))
+    assert [*series.files()] == [path, *(tmp_path / name for name in names)]
     listing(path, "vtkMultiBlockDataSet", "DataSet", "file", names[1:2] * 2)
     with pytest.raises(ReadError, match=r"expected one file of grains.* 2 of grains and 0 of con"):
         scanfab.read(path)
