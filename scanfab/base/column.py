@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
+from types import UnionType
 from typing import get_args, get_origin, get_type_hints
 
 from scanfab.base.errors import ScanfabError
@@ -30,7 +31,7 @@ class Column:
     name : str
         Name in files and scripts.
     kind : type
-        ``int``, ``float`` or ``str``; ``list`` for columns that only JSON files hold. In any
+        ``int``, ``float`` or ``str``; ``list`` for columns that CSV and TSV cannot hold. In any
         column, None stands for a missing value.
     unit : str
         ``"length"`` and ``"time"`` stand for the units of the dump. Names, counts and dimensionless
@@ -68,9 +69,9 @@ class NoColumnError(ScanfabError, KeyError, AttributeError):
         return no_column(*self.args)
 
 
-def no_column(name: object, known: Iterable[str]) -> str:
+def no_column(name: object, known: Iterable[str], what: str = "column") -> str:
     """
-    The message for a wrong name of a column.
+    The message for a wrong name of a column, or of something else.
 
     Examples
     --------
@@ -80,8 +81,8 @@ def no_column(name: object, known: Iterable[str]) -> str:
     """
     names = list(known)
     near = get_close_matches(str(name), names, n=1)
-    hint = f"did you mean {near[0]}?" if near else f"the columns are {', '.join(names)}"
-    return f"there is no column {name!r}: {hint}"
+    hint = f"did you mean {near[0]}?" if near else f"the {what}s are {', '.join(names)}"
+    return f"there is no {what} {name!r}: {hint}"
 
 
 @cache
@@ -102,7 +103,8 @@ def columns_of_fields(kind: type) -> tuple[Column, ...]:
     for name, hint in get_type_hints(kind, include_extras=True).items():
         meaning, *unit = hint.__metadata__
         # ``float | None`` becomes ``float``, and ``list[str]`` becomes ``list``
-        of_value = next((argument for argument in get_args(hint.__origin__)), hint.__origin__)
-        held = hint.__origin__ if get_origin(hint.__origin__) is list else of_value
+        held = hint.__origin__
+        if isinstance(held, UnionType):
+            held = get_args(held)[0]
         columns.append(Column(name, get_origin(held) or held, "".join(unit), meaning))
     return tuple(columns)

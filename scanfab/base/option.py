@@ -124,7 +124,7 @@ def options_of(holder: type) -> tuple[Option, ...]:
         helps |= _docstrings(base.__module__).get(base.__name__, {})
     kinds = [KINDS.get(str(field.type).removesuffix(" | None"), str) for field in fields(holder)]
     return tuple(
-        Option(field.name, kind, helps[field.name], **field.metadata)
+        Option(**{"name": field.name, "kind": kind, "help": helps[field.name], **field.metadata})
         for field, kind in zip(fields(holder), kinds, strict=True)
     )
 

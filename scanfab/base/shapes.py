@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from scanfab.base.convex import Body, Convex, Quadric, image_of
 from scanfab.base.errors import SettingsError
-from scanfab.base.option import number
+from scanfab.base.option import number, numbers
 from scanfab.base.space import SPACE, Space, on_circle, on_sphere
 from scanfab.base.typing import FloatArray, IntArray
 
@@ -120,9 +120,8 @@ def sphere(radius: float, space: Space = SPACE) -> Convex:
     array([ True, False])
     """
     radius = number("a length above 0", lambda value: 0 < value < math.inf)("radius", radius)
-    high, frame = radius * np.diag(space.identity), radius * space.basis.T
-    if space.is_plane:
-        frame[:, 2] = space.normal
+    high = radius * np.diag(space.identity)
+    frame = _frame([radius] * space.dimension, space.basis[: space.dimension], space)
     body = DISC if space.is_plane else BALL
     quadric = Quadric(1.0, np.zeros((3, 3)), radius * radius)
     return Convex(np.zeros((0, 4)), quadric, -high, high, radius, f"radius {radius:g}", body, frame)
@@ -192,8 +191,10 @@ def _frame(
     sizes: Sequence[float] | FloatArray, turn: npt.ArrayLike | None, space: Space
 ) -> FloatArray:
     """Columns of the given lengths along the rows of a turn; in a plane, then its normal."""
+    expected = f"{space.dimension} lengths above 0"
+    parse = numbers(expected, lambda every: len(every) == space.dimension and min(every) > 0)
     axes = np.eye(3)[sorted(space.along)] if turn is None else turn
-    rows = np.multiply(np.asarray(sizes, dtype=float)[:, None], axes)
+    rows = np.multiply(np.array(parse("sizes", sizes))[:, None], axes)
     return np.column_stack([*rows, *([space.normal] if space.is_plane else [])])
 
 

@@ -54,8 +54,6 @@ class Space:
         """Factor of the fabric deviator F = 15/2 (G - I/3), in a plane F = 4 (G - I/2)."""
         self.intensity = 0.5 if flat else 1.5
         """Factor under the root of a = √(3/2 F:F), in a plane a = √(1/2 F:F)."""
-        self.ball = np.pi if flat else 4.0 / 3.0 * np.pi
-        """Volume of the unit ball; in a plane the area of the unit disc."""
         self.unit_shadow = 2.0 if flat else np.pi
         """Projected area of the unit ball; in a plane the width of the unit disc."""
 

@@ -174,9 +174,8 @@ class Forces:
             "fn": directional_mean(normals, forces.force_n, axis, space),
         }
         if forces.force is not None:
-            size = np.einsum("ci,ci->c", forces.force, normals)
-            across = forces.force - size[:, None] * normals
-            means["ft"] = directional_mean(normals, size, axis, space, across)
+            across = forces.force - forces.force_n[:, None] * normals
+            means["ft"] = directional_mean(normals, forces.force_n, axis, space, across)
         # a force that exceeds the mean by rounding alone is not strong
         rounding = ROUNDING * np.abs(forces.force_n).max()
         strong = forces.force_n > forces.force_n.mean() + rounding

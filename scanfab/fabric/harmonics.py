@@ -22,7 +22,7 @@ from scanfab.fabric.errors import error_of_mean
 from scanfab.fabric.measured import Measured
 
 ORDERS = (2, 4)
-FOURTH = "81 numbers, of which the last index changes fastest; in JSON only"
+FOURTH = "81 numbers, of which the last index changes fastest; in JSON and Parquet only"
 
 
 def harmonic(order: int, cosine: FloatArray, space: Space = SPACE) -> FloatArray:
@@ -93,7 +93,7 @@ def tensor4(vectors: FloatArray, weights: FloatArray) -> FloatArray:
 
 
 class Harmonics:
-    """Columns of the harmonics, and of the tensors, which only JSON can hold."""
+    """Columns of the harmonics, and of the tensors, which CSV and TSV cannot hold."""
 
     columns = (
         *numbers(

@@ -86,7 +86,7 @@ class SeparatedText(OwnFormat):
         rows = []
         try:
             names = next(lines, [])
-            for line in lines:
+            for line in filter(None, lines):
                 if len(line) != len(names):
                     expected = f"expected {counted(len(names), 'cell')} as in line 1"
                     raise csv.Error(f"{expected}, found {len(line)}: is this a table?")
@@ -121,7 +121,8 @@ def _value(name: str, cell: str) -> int | float | str | None:
                 return kind(cell)
             except ValueError:
                 continue
-    return cell or None
+    # a packing without a name has an empty source
+    return cell or ("" if name == "source" else None)
 
 
 def _text(data: bytes, name: str) -> str:
@@ -234,7 +235,9 @@ def foreign_formats() -> tuple[TableFormat, ...]:
 
 def known_formats() -> dict[str, TableFormat]:
     """All formats by suffix; other packages cannot replace the formats of this package."""
-    return {form.suffix: form for form in (*OWN_FORMATS, *foreign_formats()[::-1], *OWN_FORMATS)}
+    foreign = {form.suffix: form for form in reversed(foreign_formats())}
+    own = {form.suffix: form for form in OWN_FORMATS}
+    return own | foreign | own
 
 
 def format_of(path: Path) -> TableFormat:

@@ -59,7 +59,7 @@ class Plots:
             raise AttributeError(name)
         figures = figures_of(self._kind)
         if name not in figures:
-            raise AttributeError(no_column(name, figures).replace("column", "figure"))
+            raise AttributeError(no_column(name, figures, "figure"))
         figure, data = figures[name], self._data
         options = [*signature(figure).parameters.values()][1:]
 

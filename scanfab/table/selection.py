@@ -72,9 +72,6 @@ def choose_rows(
         found = f"{len(labels)} for {len(named)}"
         raise SettingsError(f"labels: expected {expected}: found {found}")
     for number, (name, rows) in enumerate(named):
-        for row in rows:
-            if row.get("source", "") is None:
-                row["source"] = ""  # CSV has an empty cell for a packing without a name
         check_rows(rows, name)
         if cutoff is not None:
             named[number] = name, _of_cutoff(name, rows, cutoff)

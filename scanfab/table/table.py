@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -121,8 +122,9 @@ class Table(Sequence[Row]):
         if key not in self.names:
             raise NoColumnError(key, self.names)
         values = self._frame[key]
-        is_number = values.dtype.is_numeric()
-        return values.to_numpy(writable=True) if is_number else np.array(values.to_list())
+        if values.dtype.is_numeric():
+            return values.to_numpy(writable=True)
+        return np.array(values.to_list(), dtype=object if values.null_count() else None)
 
     @property
     def rows(self) -> tuple[Row, ...]:
@@ -273,11 +275,9 @@ class Table(Sequence[Row]):
         SettingsError
             If pandas is not installed.
         """
-        try:
-            import pandas
-        except ImportError:
+        if find_spec("pandas") is None:
             raise SettingsError("to_pandas needs the package pandas: pip install pandas") from None
-        return pandas.DataFrame({name: self[name] for name in self.names})
+        return self._frame.to_pandas()
 
     def to_polars(self) -> polars.DataFrame:
         """

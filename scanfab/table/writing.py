@@ -117,7 +117,7 @@ def write_to(
         kept = [column for column in chosen if column.kind is not list]
         if chosen and not kept:
             lists = ", ".join(column.name for column in chosen)
-            raise SettingsError(f"fields: only .json and .jsonl can hold lists of numbers: {lists}")
+            raise SettingsError(f"fields: .csv and .tsv cannot hold lists of numbers: {lists}")
         chosen, excerpt = kept, replace(excerpt, fields=tuple(column.name for column in kept))
     table_format.write(stream, map(excerpt.of, rows), chosen)
 

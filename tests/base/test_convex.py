@@ -99,6 +99,13 @@ def test_a_sphere_has_a_radius_above_0(radius):
         sphere(radius)
 
 
+@pytest.mark.parametrize("sizes", [(0, 1, 1), (1, 1), (1, 2, math.nan), (-1, 2, 3)])
+@pytest.mark.parametrize("shape", [box, ellipsoid])
+def test_a_box_and_an_ellipsoid_have_three_sizes_above_0(shape, sizes):
+    with pytest.raises(SettingsError, match="sizes: expected 3 lengths above 0, found"):
+        shape(sizes)
+
+
 SINE = np.sqrt(1 - (AXES @ TURN[0]) ** 2)
 TUBE = np.pi * 0.64 * np.abs(AXES @ TURN[0]) + 2 * 0.8 * 2.8 * SINE
 SHADE = np.pi * np.linalg.norm(AXES * HALF.prod() / HALF, axis=1)

@@ -54,7 +54,8 @@ def test_its_columns_are_computed_and_stand_behind_the_own_ones():
 
 @pytest.mark.usefixtures("cubic")
 def test_its_columns_are_written_and_read_back(tmp_path):
-    values = dict.fromkeys(COLUMNS) | {"frame": 0, "c_fourth": 0.5, "vs_longest": None}
+    values = dict.fromkeys(COLUMNS) | {"source": "", "frame": 0, "c_fourth": 0.5}
+    values["vs_longest"] = None
     for suffix in [one.suffix for one in OWN_FORMATS]:
         write_rows(tmp_path / f"t{suffix}", [row_of(table_columns(), values)], table_columns())
         assert read_rows(tmp_path / f"t{suffix}") == [values]

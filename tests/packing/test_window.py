@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, SettingsError, box, sphere
+from scanfab import Cell, Packing, PackingError, SettingsError, box, sphere
 from scanfab.packing.window import SurfaceBox, Window, inner_ellipsoid
 from tests.helpers.lattices import ball_points, rotation
 
@@ -26,6 +26,11 @@ def test_many_points_are_looked_at_some_at_a_time():
     packing, rows = Packing([[0, 3, 4]], 1.0, cell=CELL), np.arange(300_000) % 3
     assert np.array_equal(window.contains(points[rows], packing), rows != 1)
     assert np.array_equal(window.may_meet(points[rows], 0.1 * rows, packing), rows != 1)
+
+
+def test_a_centre_is_a_point():
+    with pytest.raises(PackingError, match=r"center: expected shape \(3\)"):
+        Window([0.0, 0.0], sphere(1.0))
 
 
 def test_distance_is_to_the_nearest_image():

@@ -142,8 +142,6 @@ def test_a_frame_without_grains_has_no_cutoff_and_stays_once():
         ([curve(), curve()], ["coarse", "fine"], [{"coarse"}, {"fine"}]),
         # the label of a table of several sources stands before them
         ([[*curve("one"), *curve("two")]], ["new"], [{"new, one", "new, two"}]),
-        # a packing without a name comes back from CSV
-        ([[{**row, "source": None} for row in curve()]], None, [{""}]),
     ],
 )
 def test_labels_tell_two_runs_of_one_sample_apart(tables, labels, sources):

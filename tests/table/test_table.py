@@ -18,6 +18,7 @@ from scanfab.table.formats import OWN_FORMATS
 from scanfab.table.row import Row
 from scanfab.table.table import Table, load
 from scanfab.table.writing import write_rows
+from tests.helpers.tables import curve
 
 # the columns that scripts rely on
 FIXED = """
@@ -197,6 +198,9 @@ def test_data_frames_have_the_columns_and_kinds(results, monkeypatch):
     of_pandas = results.to_pandas()
     assert isinstance(of_pandas, pandas.DataFrame)
     assert tuple(of_pandas.columns) == COLUMNS
+    tensors = Table([{"a": [1.0, 2.0]}, {"a": None}])
+    assert tensors.to_pandas()["a"][0].tolist() == tensors["a"][0] == [1.0, 2.0]
+    assert tensors["a"][1] is None
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(SettingsError, match="to_pandas needs the package pandas: pip install"):
         results.to_pandas()
@@ -238,5 +242,16 @@ def test_figures_are_named_and_refuse_other_options(results):
     assert "evolution" in dir(results.plot)
     with pytest.raises(AttributeError, match="no figure 'evolutoin': did you mean evol"):
         results.plot.evolutoin  # noqa: B018
+    with pytest.raises(AttributeError, match="no figure 'colums': did you mean columns"):
+        results.plot.colums  # noqa: B018
     with pytest.raises(TypeError, match="evolution has no option 'fo'"):
         results.plot.evolution(fo="contacts")
+
+
+@pytest.mark.parametrize("suffix", [one.suffix for one in OWN_FORMATS])
+def test_a_packing_without_a_name_keeps_it(tmp_path, suffix):
+    table = Table([Row(**{**row, "source": ""}) for row in curve()])
+    table.save(tmp_path / f"t{suffix}")
+    again = load(tmp_path / f"t{suffix}")
+    assert set(again["source"]) == {""}
+    assert again.compare().summary == table.compare().summary

@@ -130,7 +130,7 @@ def test_lists_are_written_where_there_can_be_some(tmp_path, suffix):
     expected = [{"n": 1}, {"n": 2}] if is_text else [dict(row) for row in table]
     assert read_rows(path) == expected
     with pytest.raises(
-        SettingsError, match="can hold lists of numbers: a$" if is_text else "column 'b'"
+        SettingsError, match="cannot hold lists of numbers: a$" if is_text else "column 'b'"
     ):
         table.save(path, fields="a" if is_text else "b")
 
@@ -166,7 +166,7 @@ def test_the_content_tells_the_format(tmp_path, text):
     [
         (None, "cannot be read: No such file"),
         (b"", "expected a table, found an empty file"),
-        (b"a,b\n1,2\n1\n", "line 3: expected 2 cells as in line 1, found 1: is"),
+        (b"a,b\n1,2\n\n1\n", "line 4: expected 2 cells as in line 1, found 1: is"),
         (b"a,b\n1,2,3\n", "line 2: expected 2 cells as in line 1, found 3"),
         (b'{"a": 1}\n{"a": \n', "cannot be read as JSON"),
         (b"[{]", "cannot be read as JSON"),
