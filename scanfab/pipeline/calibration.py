@@ -17,7 +17,7 @@ from scanfab.base.option import options_of, refuse_unknown
 from scanfab.base.spelling import counted
 from scanfab.io.options import parse_frames
 from scanfab.pipeline.frame import OTHER_CUTOFFS, compute_frame
-from scanfab.pipeline.frames import Frames, Source, doubts_of_frame
+from scanfab.pipeline.frames import Frames, NoChosenFrameError, Source, doubts_of_frame
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import make_plan
 from scanfab.pipeline.settings import MAX_CHORDS, OF_SAMPLE, Settings
@@ -203,7 +203,11 @@ class _OneFrame:
 
     def __init__(self, source: Source, settings: Settings, frame: int) -> None:
         frames = Frames(source, replace(settings, frames=parse_frames("frame", frame)))
-        self.number, wanted = frames.one()
+        try:
+            self.number, wanted = frames.one()
+        except NoChosenFrameError as none:
+            has = str(none).rpartition(": ")[2]
+            raise SettingsError(f"frame: there is no frame {frame}: {has}") from None
         # the first frame of the series that has grains makes the plan
         first = frames.reference()
         if first is None:

@@ -8,7 +8,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
-from itertools import islice
+from itertools import islice, repeat
 from pathlib import Path
 from typing import Any
 
@@ -248,11 +248,12 @@ class Job:
 
     def _computed(self, advance: Advance) -> Iterator[tuple[Series, list[Row]]]:
         """The rows of each frame that is computed now, with its series."""
-        for place, one in enumerate(self.series):
+        observers = self.observers or repeat(None)
+        for one, notes, observe in zip(self.series, self.notes, observers, strict=False):
             done = {frame for source, frame in self.finished if source == one.name}
-            observe = self.observers[place] if self.observers else None
-            words: Any = {"done": done, "observe": observe, "notes": self.notes[place]}
-            computed = compute_frames(one, self.settings, executor=self.executor, **words)
+            computed = compute_frames(
+                one, self.settings, done=done, observe=observe, notes=notes, executor=self.executor
+            )
             try:
                 for rows in computed:
                     yield one, rows

@@ -43,7 +43,7 @@ from scanfab.table.row import Row
 # A separate scan measures the error of each block due to the sample. Its replicates show its noise.
 # Its axes are so many that their choice adds little: with 16 axes, the error of a block of a
 # hundred grains would scatter by a quarter.
-PART_REPLICATES, PART_AXES = 4, 96
+PART_REPLICATES, PART_AXES = range(4), 96
 # most chords of this scan; lines are set further apart to keep to it
 MOST_CHORDS = 1e9
 HOMOGENEITY = "homogeneity"
@@ -153,14 +153,15 @@ def _scan_parts(
     """Scan fewer lines, with blocks in eight parts, for errors due to the sample and the void."""
     rule, replicates = design_of(PART_AXES), []
     most = min(MOST_CHORDS, plan.max_chords)
-    spacing = coarse_spacing(solids, PART_REPLICATES * len(rule), plan, most, before)
+    spacing = coarse_spacing(solids, len(PART_REPLICATES) * len(rule), plan, most, before)
     finer, cutoffs = (blocks[0].finer(), blocks[1].finer()), [0.0, plan.cutoff]
-    for replicate in range(PART_REPLICATES):
-        words = {"spacing": spacing, "replicates": [replicate]}
-        sums = voids = gap_scan(solids, plan, finer, cutoffs)(rule, **words)
+    scan = gap_scan(solids, plan, finer, cutoffs)
+    clipped = gap_scan(replace(solids, edge=CLIP), plan, finer, cutoffs)
+    for replicate in PART_REPLICATES:
+        sums = voids = scan(rule, spacing=spacing, replicates=[replicate])
         if solids.edge == START:
             # this edge rule also counts the parts of segments outside the window
-            voids = gap_scan(replace(solids, edge=CLIP), plan, finer, cutoffs)(rule, **words)
+            voids = clipped(rule, spacing=spacing, replicates=[replicate])
         variants = {}
         for name in plan.variants:
             by_part = blocks[name in "cd"].by_part

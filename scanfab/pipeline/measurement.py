@@ -31,7 +31,7 @@ from scanfab.scan.tallies import FollowedTooFarError
 # A separate scan measures the error due to the sample. Its replicates show its noise, which is
 # subtracted. A spacing in mean radii gives the same number of segments per grain in small and large
 # samples (about 900 in dense packings), so noise and scatter fall together as grains are added.
-BLOCK_REPLICATES = 2
+BLOCK_REPLICATES = range(2)
 # Least number of axes times grains of this scan. With the usual directions, the error of an RV of a
 # few hundred grains would change with the seed by a quarter; with these, by a tenth or less.
 AXES_TIMES_GRAINS = 80_000
@@ -159,13 +159,13 @@ def _scan_octants(
     if len(rule) * count < AXES_TIMES_GRAINS:
         rule = design_of(AXES_TIMES_GRAINS / max(count, 1), solids.space)
     most = min(max(CHORDS_A_GRAIN * count, FEWEST_CHORDS), MOST_CHORDS)
-    spacing = coarse_spacing(solids, BLOCK_REPLICATES * len(rule), plan, most)
+    axes = len(BLOCK_REPLICATES) * len(rule)
+    spacing = coarse_spacing(solids, axes, plan, most)
     scan = partial(gap_scan(solids, plan, blocks, plan.cutoffs), most_steps=most)
     while True:
         try:
-            quick = is_quick(solids, spacing, BLOCK_REPLICATES * len(rule))
-            words = {"spacing": spacing, "replicates": range(BLOCK_REPLICATES), "quick": quick}
-            return scan(rule, **words), rule
+            quick = is_quick(solids, spacing, axes)
+            return scan(rule, spacing=spacing, replicates=BLOCK_REPLICATES, quick=quick), rule
         except FollowedTooFarError:
             # only a scan can tell how far lines run through a periodic medium
             if solids.chords(2.0 * spacing) < 1.0:

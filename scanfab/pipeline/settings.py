@@ -27,7 +27,7 @@ from scanfab.packing.boundary import BoundaryRule
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.rattlers import installed_rules
 from scanfab.pipeline import values
-from scanfab.pipeline.values import STRAIN_MODES, Axis, Length, StandardError, Vector, as_written
+from scanfab.pipeline.values import STRAIN_MODES, Axis, Length, Vector, as_written
 from scanfab.scan.directions import RULES, DirectionRule, rule_of
 from scanfab.scan.edges import CLIP, EDGE_COLUMNS, EDGES, ENDS
 
@@ -149,8 +149,8 @@ class Settings:
     design:DEGREE, icosahedral:DEGREE, product:DEGREE, fibonacci:N, equal-angle:STEP,
     equal-angle-full:STEP; auto meets `tolerance`.
     """
-    tolerance: StandardError | None = scan(
-        values.parse_tolerance, default="auto", metavar="X", choices=("auto",), first=True
+    tolerance: float | None = scan(
+        values.parse_tolerance, kind=str, default="auto", metavar="X", choices=("auto",), first=True
     )
     """
     Standard error of alpha_vs_axial that the scan aims at in every variant, if spacing or

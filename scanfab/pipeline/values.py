@@ -43,10 +43,6 @@ parse_error = number(
 )
 
 
-StandardError = float
-"""A standard error, for options that also take a word in its place."""
-
-
 class Axis(NamedTuple):
     """A unit vector; :func:`parse_axis` makes it from any three numbers."""
 

@@ -9,7 +9,6 @@ from functools import partial
 
 import numpy as np
 
-from scanfab.base.arrays import concatenated
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
@@ -119,23 +118,6 @@ class ScanSums:
         """
         which = "abcd".index(variant)
         return self.length[:, which], self.segments[:, which]
-
-    @classmethod
-    def concatenate(cls, parts: Iterable[ScanSums]) -> ScanSums:
-        """
-        Join the replicates of several scans.
-
-        Parameters
-        ----------
-        parts : iterable of ScanSums
-            Sums of scans with the same number of axes.
-
-        Returns
-        -------
-        ScanSums
-        """
-        whole: ScanSums = concatenated(list(parts))
-        return whole
 
 
 def scan_lines(

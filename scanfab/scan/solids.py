@@ -311,7 +311,7 @@ def cells_of(grains: CellGrains, width: float) -> Cells:
     start = np.cumsum(start)
     grain, image = np.empty(start[-1], np.int32), np.empty((start[-1], 3), np.int32)
     fill_cells(low, high, grains.periodic, parts, start[:-1].copy(), grain, image)
-    sphere = np.vstack([(grains.position[grain] + image @ vectors).T, grains.radius[grain]])
+    sphere = np.column_stack([grains.position[grain] + image @ vectors, grains.radius[grain]])
     farthest = [_farthest(grains, volume, solid) for solid in (slice(None), ~grains.removed)]
     return Cells(
         sphere, grains.removed[grain], vectors, inverse, corner, grains.periodic, parts, start,

@@ -66,10 +66,6 @@ class Following:
             self._taken += steps
         self.check(self._taken)
 
-    def __reduce__(self) -> tuple[type, tuple[float]]:
-        # another process counts its own steps; the caller checks the sum of all parts
-        return Following, (self.most,)
-
     def check(self, taken: float) -> None:
         """Raise FollowedTooFarError if so many steps are too many."""
         if taken >= self.most:

@@ -4,12 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scanfab.base.arrays import concatenated
 from scanfab.base.convex import Convex
 from scanfab.base.shapes import sphere
 from scanfab.fabric.void import void_fabric
 from scanfab.scan.directions import direction_rule
 from scanfab.scan.lines import line_triads
-from scanfab.scan.scan import ScanSums, scan_lines, sums_of
+from scanfab.scan.scan import scan_lines, sums_of
 from scanfab.scan.solids import Solids
 from scanfab.scan.tallies import tally_triads
 
@@ -46,10 +47,8 @@ def scan_along(solids, axes, spacing, cutoff=0.0, replicates=16, seed=0):
     """Scan along the same axes in every replicate: only the lines are shifted."""
     random = np.random.default_rng(seed)
     triads = line_triads(np.asarray(axes, dtype=float))
-    return ScanSums.concatenate(
-        scan_triads(solids, triads, random.random((len(triads), 2)), spacing, cutoff)
-        for _ in range(replicates)
-    )
+    shifts = random.random((replicates, len(triads), 2))
+    return concatenated([scan_triads(solids, triads, one, spacing, cutoff) for one in shifts])
 
 
 def ratio(length, segments):

@@ -58,6 +58,22 @@ def test_recommended_settings_reach_their_error(packing, found):
     assert table["alpha_vs_axial_se"].tolist() == errors
 
 
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
+@pytest.mark.parametrize("most", [2905, 12])
+def test_directions_of_discs_are_equal_angles(monkeypatch, most):
+    """Where more directions than are allowed would be needed, lines are closer."""
+    monkeypatch.setattr("scanfab.pipeline.calibration.SPACINGS", (2.0, 1.0))
+    monkeypatch.setattr("scanfab.pipeline.calibration.MOST_DIRECTIONS", most)
+    random = np.random.default_rng(2)
+    discs = Packing(random.random((200, 2)) * 14.0, random.uniform(0.3, 0.6, 200))
+    found = calibrate(discs, variants="c", tolerance=0.01, workers=1)
+    assert [row.value for row in ladder(found, "directions")] == [3, 5, 8, 16, 32, 64, 128]
+    (row,) = compute(discs, variants="c", workers=1, **found.options)
+    assert found.options["directions"] == str(row.directions)
+    assert row.directions <= most
+    assert row.alpha_vs_axial_se <= 0.01
+
+
 def step(value, alpha, error, **more):
     words = {"value": value, "variant": "c", "alpha_vs_axial": alpha, "alpha_vs_axial_se": error}
     empty = {column.name: None for column in columns_of_fields(StepRow)}
@@ -97,7 +113,8 @@ LEAVE_OUT = "leave out `cutoffs`, `moment` and all but one `rv`"
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({"frame": -2}, "frames: the series has no frame in -2:"), ({"moment": 2}, LEAVE_OUT),
+        ({"frame": -2}, "frame: there is no frame -2: .* has 1 frame, 0"),
+        ({"moment": 2}, LEAVE_OUT),
         ({"cutoffs": "0.1,0.2"}, LEAVE_OUT), ({"rv": (0.5, 0.6)}, LEAVE_OUT),
         ({"tolerence": 0.02}, "calibrate has no option 'tolerence': .*'tolerance'"),
     ],

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from scanfab import SettingsError, direction_rule, scan_lines
+from scanfab.base.arrays import concatenated
 from scanfab.scan.lines import line_triads, turned_triads
-from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import MAX_LINES
 from tests.helpers import naive
 from tests.helpers.lattices import Spheres, poisson_spheres, separate_spheres
@@ -69,7 +69,7 @@ def test_replicate_depends_on_its_number_alone(solids):
     together = scan_lines(solids, RULE, replicates=range(6), **options)
     first = scan_lines(solids, RULE, replicates=[0, 1], **options)
     rest = scan_lines(solids, RULE, replicates=[2, 3, 4, 5], **options)
-    assert raw(ScanSums.concatenate([first, rest])) == raw(together)
+    assert raw(concatenated([first, rest])) == raw(together)
     assert together.replicates == 6
 
 

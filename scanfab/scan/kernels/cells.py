@@ -31,7 +31,7 @@ class Cells(NamedTuple):
 
     sphere: FloatArray
     """
-    Centre and radius of each entry, shape (4, K).
+    Centre and radius of each entry, shape (K, 4).
 
     The entries of a cell lie together: looking up each grain elsewhere would take most of the time.
     """
@@ -140,9 +140,9 @@ def first_in_cell(cells: Cells, ray: Ray, number: int, without_removed: bool) ->
     n_x, n_y, n_z = ray.along[0], ray.along[1], ray.along[2]
     found = FAR
     for entry in range(np.uint64(start[number]), np.uint64(start[number + 1])):
-        x, y, z = sphere[0, entry] - p_x, sphere[1, entry] - p_y, sphere[2, entry] - p_z
+        x, y, z = sphere[entry, 0] - p_x, sphere[entry, 1] - p_y, sphere[entry, 2] - p_z
         depth = x * n_x + y * n_y + z * n_z
-        radius = sphere[3, entry]
+        radius = sphere[entry, 3]
         reach2 = radius * radius - (x * x + y * y + z * z - depth * depth)
         is_met = (depth > 0.0) & (reach2 > 0.0) & (not (without_removed & removed[entry]))
         # selections in place of branches, which would be predicted badly
