@@ -16,6 +16,7 @@ other, and replaced. *scheduler*: the same, but the scheduler is killed, and the
 
 from __future__ import annotations
 
+import argparse
 import subprocess
 import sys
 import tempfile
@@ -136,7 +137,7 @@ def fault(kind: str, folder: Path, random: Random, suffix: str) -> str:
     return "" if same else f"OTHER bytes in {suffix}"
 
 
-def main(kind: str, runs: int = 100, seed: int = 0) -> int:
+def main(kind: str, runs: int, seed: int) -> int:
     """The number of runs that are wrong; all are printed."""
     wrong = 0
     with tempfile.TemporaryDirectory() as name:
@@ -150,4 +151,10 @@ def main(kind: str, runs: int = 100, seed: int = 0) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(bool(main(sys.argv[1], *map(int, sys.argv[2:]))))
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("kind", choices=KINDS)
+    parser.add_argument("runs", type=int, nargs="?", default=100)
+    parser.add_argument("seed", type=int, nargs="?", default=0)
+    sys.exit(bool(main(**vars(parser.parse_args()))))

@@ -404,3 +404,17 @@ def test_a_run_without_rows_leaves_the_table_that_is_there(compute):
     assert compute("table.csv", "--frames", "9:", told=told)[0] == 1
     assert Path("table.csv").read_bytes() == before
     assert [compute("other.csv", "--frames", "9:")[0] for _ in range(2)] == [0, 0]
+
+
+def test_series_have_references_of_their_own_and_must_be_named_again(compute, resumes):
+    """The last frame of each, whose number would be another in a longer series."""
+    Path("few").mkdir()
+    shutil.copy("dumps/dump_0.txt", "few")
+    both = {"sources": ("dumps", "few")}
+    assert compute("table.csv", "--reference=-1", **both) == (0, 5)
+    assert read_manifest(Path("table.csv"))["settings"]["references"] == [3, 0]
+    assert resumes("table.csv", 0, "--reference=-1", **both)
+    told = "its source few is not named now"
+    assert compute("table.csv", "--reference=3", "--resume", told="settings (reference") == (2, 0)
+    assert compute("t.csv", **both) == (0, 5)
+    assert compute("t.csv", "--resume", told=told) == (2, 0)

@@ -44,6 +44,17 @@ def test_a_row_for_each_variant_and_block_x_fastest(packing, grid):
     assert other["alpha_vs_axial"][0] != grid["alpha_vs_axial"][0]
 
 
+def test_the_ellipsoid_of_an_open_whole_has_more_blocks_at_its_surface(packing):
+    """It lies inside the hull of the centres, where the whole ends by the rule clip."""
+    whole = scanfab.find_contacts(Packing(packing.position, packing.radius))
+    clip, ends = (
+        mapped(whole, grid=(9, 9, 9), edge=edge, spacing=0.6)[0]["at_surface"]
+        for edge in ("clip", "ends")
+    )
+    assert np.all(ends >= clip)
+    assert 0 < clip.sum() < ends.sum() < 9**3
+
+
 @pytest.mark.parametrize("variants", ["a", "b"])
 def test_blocks_together_are_the_row_of_compute(packing, variants):
     blocks, _ = mapped(packing, grid=(3, 2, 1), variants=variants)

@@ -1,6 +1,7 @@
 """Stress, void ratio and what follows: closed forms, naive ways, and the programs' own numbers."""
 
 import json
+import warnings
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 import scanfab
 from scanfab import Cell, ContactList, Packing, Sample, Window, sphere
 from scanfab.base.shapes import box, cylinder, ellipsoid
+from scanfab.base.space import Space
 from scanfab.packing.contacts import ListedWallForces
 from scanfab.packing.sample import VARIANTS
 from scanfab.pipeline.state import cut_volumes, sample_state
@@ -128,6 +130,32 @@ def test_lenses_and_points_agree():
     points = cut_volumes(places, radius, ellipsoid((1.5, 1.5, 1.5 + 1e-9)))
     assert np.max(np.abs(exact - points) / radius**3) < 0.06
     assert points.sum() == pytest.approx(exact.sum(), rel=3e-4)
+
+
+@pytest.mark.parametrize("beyond", [-1.2, -0.4, 0.0, 0.7])
+def test_a_disc_in_a_rectangle_is_cut_at_its_side(beyond):
+    """What lies outside is a segment of the circle: its sector less a triangle."""
+    plane = Space(2)
+    angle = 2 * np.arccos(np.clip(-beyond, -1, 1))
+    area = np.pi - (angle - np.sin(angle)) / 2
+    place = np.array([[2.0 + beyond, 0.0, 0.0]])
+    found = cut_volumes(place, np.ones(1), box((4.0, 6.0), None, plane), plane)
+    assert found == pytest.approx(area, abs=0.01 * np.pi)
+
+
+@pytest.mark.parametrize("variants", ["a", "c"])
+def test_walls_whose_forces_are_unknown_are_told(variants):
+    """Of an RV those in it."""
+    packing, told = cubic(), "grains touch walls, but the forces of these"
+    walls = np.all(packing.position < 1.0, axis=1).astype(int)
+    packing = packing.with_contacts(packing.contacts, walls)
+    words = {"variants": variants, "with_": "state", "directions": 9, "spacing": 1.0}
+    for center in ((0.0, 0.0, 0.0), (3.0, 3.0, 3.0)):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            scanfab.compute(packing, rv_radius=1.5, rv_center=center, **words)
+        is_told = any(told in str(one.message) for one in caught)
+        assert is_told == (variants == "a" or center[0] == 0.0)
 
 
 # the programs' own numbers
