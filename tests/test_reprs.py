@@ -98,7 +98,7 @@ def test_of_a_scan():
         ({"cutoff": 0.25, "axis": "x"}, "Settings(cutoff=0.25, axis='x')"),
         ({"boundary": ["type=2", "id>7"]}, "Settings(boundary=['type=2', 'id>7'])"),
         ({"frames": slice(2, None)}, "Settings(frames='2:')"),
-        ({"directions": 25}, "Settings(directions='lebedev:11')"),
+        ({"directions": 25}, "Settings(directions='25')"),
         ({"rv": 0.7, "tolerance": "auto"}, "Settings()"),
         ({"workers": 77}, "Settings(workers=77)"),
         ({"cutoffs": "0,1rmin"}, "Settings(cutoffs=[0.0, '1rmin'])"),

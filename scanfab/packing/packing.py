@@ -154,11 +154,6 @@ class Packing:
         return f"Packing: {', '.join(parts)}{cell}"
 
     @property
-    def dimension(self) -> int:
-        """3, or 2 of discs in a plane."""
-        return self.space.dimension
-
-    @property
     def place_across(self) -> float:
         """The coordinate that the centres of all discs share, dump's length unit."""
         assert self.space.across is not None

@@ -15,12 +15,10 @@ from scanfab.base.arrays import cast
 from scanfab.base.errors import Note, PackingError
 from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, IntArray
-from scanfab.packing.boundary import BoundaryRule, select_boundary
 from scanfab.packing.contacts import Contacts
 from scanfab.packing.escaped import Escaped, escaped_grains, notes_of_escaped
 from scanfab.packing.packing import Packing
-from scanfab.packing.rattlers import RattlerRule, Touching, count, installed_rules
-from scanfab.packing.search import find_contacts
+from scanfab.packing.rattlers import RattlerRule, Touching, count
 from scanfab.packing.window import Window
 
 
@@ -341,34 +339,3 @@ class Sample:
         """
         counted = self.once(self.counted(variant, window) & ~self.removed(variant))
         return float(self.numbers_of(variant)[counted].mean()) if counted.any() else None
-
-
-@dataclass(frozen=True)
-class SampleRule:
-    """How particles are sorted, and contacts found: the same rules for all frames of a series."""
-
-    boundary: tuple[BoundaryRule, ...] = ()
-    """Particles for which one of these rules holds are boundary."""
-    min_contacts: int = 2
-    """A grain with fewer neighbours is a rattler."""
-    rattlers: str = "count"
-    """Name of an installed rule."""
-    min_force: float = 0.0
-    """For the rule ``force``, relative to the mean normal force."""
-    contact_tolerance: float = 0.0
-    """Tolerance of contacts by geometry, relative to the sum of the radii."""
-
-    def sample(self, packing: Packing) -> Sample:
-        """
-        Sort the particles of a packing, whose contacts are found by geometry if no file lists them.
-
-        Raises
-        ------
-        SettingsError
-            If the packing lacks the column of a boundary rule.
-        """
-        if packing.contacts is None:
-            packing = find_contacts(packing, self.contact_tolerance)
-        boundary = select_boundary(packing, self.boundary)
-        rule = installed_rules()[self.rattlers]
-        return Sample(packing, boundary, self.min_contacts, rule, self.min_force)

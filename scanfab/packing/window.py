@@ -180,6 +180,10 @@ class Window:
             branch[outside[inside]] = moved[inside]
         return branch
 
+    def placed(self, points: FloatArray, packing: Packing) -> FloatArray:
+        """The image of each point to which :meth:`branches` leads, in the dump's coordinates."""
+        return self.center + self.branches(points, packing)
+
     def images(
         self, points: FloatArray, packing: Packing, margin: float = 0.0
     ) -> tuple[FloatArray, FloatArray]:

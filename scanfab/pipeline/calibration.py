@@ -13,7 +13,6 @@ from typing import Annotated, Any
 
 from scanfab.base.column import LENGTH
 from scanfab.base.errors import Note, PackingError, SettingsError, tell
-from scanfab.base.option import options_of, refuse_unknown
 from scanfab.base.spelling import counted
 from scanfab.io.options import parse_frames
 from scanfab.pipeline.frame import OTHER_CUTOFFS, compute_frame
@@ -148,10 +147,10 @@ def calibrate(
     Returns
     -------
     Calibration
-        Steps of all ladders, and recommended settings. These start from the widest spacing and the
-        fewest directions beyond which nothing changes. Directions are then added until the error
-        of the scan is below a twentieth of the error of the sample, or at the tolerance if that is
-        larger.
+        Steps of all ladders, and recommended settings. These start from the fewest directions
+        beyond which nothing changes, and from the spacing beyond which nothing changes, but at most
+        0.25 rmin. Directions are then added until the error of the scan is below a twentieth of the
+        error of the sample, or at the tolerance if that is larger.
 
     Raises
     ------
@@ -170,10 +169,11 @@ def calibrate(
     >>> sorted({row.ladder for row in found.rows})
     ['cutoff', 'directions', 'recommended', 'rv', 'spacing']
     """
-    refuse_unknown("calibrate", options, [option.name for option in options_of(Settings)])
     settings = Settings(variants=variants, **options)
-    if settings.lists_gaps or len(settings.rvs) > 1:
-        raise SettingsError("calibrate: leave out `cutoffs`, `moment` and all but one `rv`")
+    if settings.lists_gaps or len(settings.rvs) > 1 or settings.frames != slice(None):
+        raise SettingsError(
+            "calibrate: leave out `cutoffs`, `moment`, `frames` and all but one `rv`"
+        )
     # a number, so that the ladders differ in nothing but their steps
     most = settings.max_chords or MAX_CHORDS
     settings = replace(settings, tolerance=settings.aim(), max_chords=most)
@@ -205,9 +205,8 @@ class _OneFrame:
         frames = Frames(source, replace(settings, frames=parse_frames("frame", frame)))
         try:
             self.number, wanted = frames.one()
-        except NoChosenFrameError as none:
-            has = str(none).rpartition(": ")[2]
-            raise SettingsError(f"frame: there is no frame {frame}: {has}") from None
+        except NoChosenFrameError:
+            raise SettingsError(f"frame: there is no frame {frame}: {frames.extent()}") from None
         # the first frame of the series that has grains makes the plan
         first = frames.reference()
         if first is None:

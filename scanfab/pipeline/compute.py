@@ -29,7 +29,7 @@ from scanfab.pipeline.cluster import DaskExecutor, DeadWorkersError
 from scanfab.pipeline.frame import FrameResult, compute_frame
 from scanfab.pipeline.frames import Frames, Source, Unread, doubts_of_frame
 from scanfab.pipeline.map_settings import MapSettings
-from scanfab.pipeline.plan import Plan, make_plan, plan_without_grains
+from scanfab.pipeline.plan import Plan, make_plan, unscanned_plan
 from scanfab.pipeline.series_notes import Facts, SeriesNotes
 from scanfab.pipeline.settings import Settings
 from scanfab.scan.directions import DirectionRule
@@ -191,9 +191,15 @@ def fabric_map(
     return Table(compute_rows(source, settings, executor=executor), settings.columns)
 
 
-def compute_rows(source: Source, settings: Settings, **more: Any) -> Iterator[Row]:
+def compute_rows(
+    source: Source,
+    settings: Settings,
+    *,
+    observe: Observer | None = None,
+    executor: Executor | None = None,
+) -> Iterator[Row]:
     """The rows of :func:`compute_frames`, one by one."""
-    for rows in compute_frames(source, settings, **more):
+    for rows in compute_frames(source, settings, observe=observe, executor=executor):
         yield from rows
 
 
@@ -229,15 +235,17 @@ def compute_frames(
     if not isinstance(executor, Executor | None):
         raise unusable("executor", "a concurrent.futures.Executor", executor)
     frames = Frames(source, settings)
+    reference = None
     # an error in a file of strains is raised before the first frame is read
-    plan, reference = plan_without_grains(settings), None
+    plan = unscanned_plan(settings)
     with collected() as told:
         found = frames.reference()
     if found is not None:
         plan = make_plan(settings, found[2])
         reference = found[0], float(found[2].packing.radius[found[2].grains].min())
         tell(plan.notes)
-    notes, own = notes or SeriesNotes(frames.settings), ThreadPoolExecutor(settings.workers)
+    notes = notes or SeriesNotes(frames.settings)
+    own = ThreadPoolExecutor(settings.workers)
     try:
         jobs = _jobs(frames, plan, done, observe, told, is_far=executor is not None)
         for computed in _in_order(jobs, executor or own, settings, own):
@@ -310,7 +318,8 @@ class _Job:
         return self.frame.snapshot.path if isinstance(self.frame, Frame) else None
 
     def __call__(self, threads: int) -> _Computed:
-        begun, plan = time.perf_counter(), replace(self.plan, workers=threads)
+        begun = time.perf_counter()
+        plan = replace(self.plan, workers=threads)
         with collected() as told:
             frame = self.sample or self.frame
             found = compute_frame(frame, plan, number=self.number, source=self.source)

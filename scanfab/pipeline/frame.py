@@ -24,7 +24,7 @@ from scanfab.packing.columns import RV_COLUMN, sample_values
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample, Variant
 from scanfab.packing.search import near_pairs
-from scanfab.pipeline.frames import packing_of, sample_rule
+from scanfab.pipeline.frames import sample_of
 from scanfab.pipeline.map_rows import map_rows
 from scanfab.pipeline.measurement import (
     Measurement,
@@ -107,7 +107,7 @@ def compute_frame(
         If the frame cannot be read or measured.
     """
     if not isinstance(frame, Sample):
-        frame = sample_rule(plan.settings).sample(packing_of(frame))
+        frame = sample_of(frame, plan.settings)
     try:
         return _computed(frame, plan, number, source)
     except PackingError as error:
@@ -128,7 +128,9 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
     }
     if not has_grains:
         return FrameResult(source, number, frame, (), list(_empty_rows(known, plan)))
-    rvs, plan = plan.rvs, plan.in_frame(frame)
+    # rows have the order of the settings; in the frame, RVs without a void fabric come last
+    rvs = plan.rvs
+    plan = plan.in_frame(frame)
     notes = [*frame.doubts_of_escaped(), *empty_rvs(plan.rvs)]
     if plan.map_blocks is not None:
         rows, told, blocks = map_rows(frame, plan, known, f"frame {number}")
@@ -257,8 +259,7 @@ class VariantColumns:
         """The block of the sample that each chosen contact lies in."""
         places = compressed(chosen, self.sample.contacts.point)
         if self.window is not None:
-            # images of the points next to the centre of the RV
-            places = self.window.center + self.window.branches(places, self.sample.packing)
+            places = self.window.placed(places, self.sample.packing)
         blocks = self.measurement.blocks[self.variant.in_window]
         numbers: IntArray = in_parts(blocks.of, places)
         return numbers

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import count, islice
 from typing import Any
@@ -24,10 +24,17 @@ from scanfab.base.spelling import counted
 from scanfab.io.follow import FollowedSeries
 from scanfab.io.frame import Frame
 from scanfab.io.series import ENDLESS, Series
-from scanfab.packing.boundary import BoundaryRule, enclosing_class, existing_values
+from scanfab.packing.boundary import (
+    BoundaryRule,
+    enclosing_class,
+    existing_values,
+    select_boundary,
+)
 from scanfab.packing.doubts import cell_doubt, doubts_of
 from scanfab.packing.packing import Packing
-from scanfab.packing.sample import Sample, SampleRule
+from scanfab.packing.rattlers import installed_rules
+from scanfab.packing.sample import Sample
+from scanfab.packing.search import find_contacts
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import as_written
 
@@ -220,7 +227,7 @@ class Frames:
 
     def read(self, frame: Unread) -> Sample:
         """Read a frame and sort its particles into grains, boundary and rattlers."""
-        return sample_rule(self.settings).sample(packing_of(frame))
+        return sample_of(frame, self.settings)
 
     def check_boundary(self, first: Sample) -> list[Note]:
         """
@@ -249,9 +256,14 @@ class Frames:
             return NoChosenFrameError(self.source.lack)
         if count == 0:
             return SettingsError(f"expected frames, found none in {self.name or 'the source'}")
-        name, frames = self.name or "the packing", as_written(self.settings.frames)
-        has = "1 frame, 0" if count == 1 else f"{count} frames, 0 to {count - 1}"
-        return NoChosenFrameError(f"frames: the series has no frame in {frames}: {name} has {has}")
+        frames = as_written(self.settings.frames)
+        return NoChosenFrameError(f"frames: the series has no frame in {frames}: {self.extent()}")
+
+    def extent(self) -> str:
+        """How many frames there are, in words."""
+        count = len(self.source)
+        numbers = "1 frame, 0" if count == 1 else f"{count} frames, 0 to {count - 1}"
+        return f"{self.name or 'the packing'} has {numbers}"
 
 
 def number_of_reference(source: Series | _Stream, settings: Settings) -> int | None:
@@ -298,9 +310,14 @@ def packing_of(frame: Unread) -> Packing:
     return frame if isinstance(frame, Packing) else frame.read()
 
 
-def sample_rule(settings: Settings) -> SampleRule:
-    """The settings that sort particles into grains, boundary and rattlers."""
-    return SampleRule(**{field.name: getattr(settings, field.name) for field in fields(SampleRule)})
+def sample_of(frame: Unread, settings: Settings) -> Sample:
+    """Read a frame, find its contacts if no file lists them, and sort its particles."""
+    packing = packing_of(frame)
+    if packing.contacts is None:
+        packing = find_contacts(packing, settings.contact_tolerance)
+    boundary = select_boundary(packing, settings.boundary)
+    rule = installed_rules()[settings.rattlers]
+    return Sample(packing, boundary, settings.min_contacts, rule, settings.min_force)
 
 
 def _counts_from_end(frames: slice) -> bool:

@@ -208,8 +208,9 @@ def from_yade() -> Packing:
     # YADE lists interactions as they began; this is the order in which O.save writes them
     touching.sort(key=lambda one: sorted([one.id1, one.id2]))
     pairs = np.array([(row.get(one.id1, -1), row.get(one.id2, -1)) for one in touching], np.int64)
+    pairs = pairs.reshape(-1, 2)
     image = np.array([one.cellDist for one in touching], np.int64).reshape(-1, 3)
-    pairs, force, wall_forces = pairs.reshape(-1, 2), None, None
+    force = wall_forces = None
     is_inner = (pairs >= 0).all(axis=1)
     walls = np.flatnonzero(~is_inner)
     walled = pairs[walls].max(axis=1)

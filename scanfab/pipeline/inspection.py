@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 from scanfab.base.column import LENGTH
@@ -110,7 +110,8 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
     ScanfabError
         If a frame cannot be read, or no frame has boundary particles although they are named.
     """
-    frames, any_chosen = Frames(series, settings), False
+    # the RV is reported whatever the variants
+    frames, any_chosen = Frames(series, replace(settings, variants="c")), False
     window: Window | None = None
     if settings.reference is not None and (reference := frames.reference()) is not None:
         window = _rv(frames, reference[2])

@@ -111,9 +111,8 @@ def _scan_blocks(
 ) -> MapSums:
     """Scan one replicate after the other; sums by axis of all together would be too large."""
     parts = []
-    scan = gap_scan(solids, plan, blocks, [plan.cutoff])
     for replicate in replicates:
-        sums = scan(plan.rule, spacing=plan.spacing, replicates=[replicate], most_steps=most_steps)
+        sums = gap_scan(solids, plan, blocks, [plan.cutoff], [replicate], most_steps)
         most_steps -= float(sums.scan.steps.sum())
         kept = {name: sums.in_blocks(name, 0, plan.settings.moment) for name in plan.variants}
         fabrics = {
@@ -155,13 +154,12 @@ def _scan_parts(
     most = min(MOST_CHORDS, plan.max_chords)
     spacing = coarse_spacing(solids, len(PART_REPLICATES) * len(rule), plan, most, before)
     finer, cutoffs = (blocks[0].finer(), blocks[1].finer()), [0.0, plan.cutoff]
-    scan = gap_scan(solids, plan, finer, cutoffs)
-    clipped = gap_scan(replace(solids, edge=CLIP), plan, finer, cutoffs)
+    lines, clipped = replace(plan, rule=rule, spacing=spacing), replace(solids, edge=CLIP)
     for replicate in PART_REPLICATES:
-        sums = voids = scan(rule, spacing=spacing, replicates=[replicate])
+        sums = voids = gap_scan(solids, lines, finer, cutoffs, [replicate])
         if solids.edge == START:
             # this edge rule also counts the parts of segments outside the window
-            voids = clipped(rule, spacing=spacing, replicates=[replicate])
+            voids = gap_scan(clipped, lines, finer, cutoffs, [replicate])
         variants = {}
         for name in plan.variants:
             by_part = blocks[name in "cd"].by_part
@@ -254,10 +252,8 @@ class VariantMap:
             }
 
     def _placed(self, points: FloatArray) -> FloatArray:
-        """The periodic images of points that are nearest to the window's centre."""
-        if self.window is None:
-            return points
-        return self.window.center + self.window.branches(points, self.sample.packing)
+        """The images of points that lie in the window, or are next to it."""
+        return points if self.window is None else self.window.placed(points, self.sample.packing)
 
     def _by_part(self, points: FloatArray, *values: Any) -> list[FloatArray]:
         """Sums of values over points, by the block and part that hold the points, (B, 8) each."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -67,7 +67,7 @@ class Measurement:
     """Notes on tolerances that the scan did not meet."""
 
     def kept(
-        self, variant: str, place: int = 0, moment: int = 0
+        self, variant: str, place: int = 0, moment: int | None = None
     ) -> tuple[FloatArray, FloatArray | IntArray]:
         """
         Sums of kept segments as :meth:`GapSums.kept`, at the plan's cut-off number ``place``.
@@ -76,7 +76,8 @@ class Measurement:
         """
         if self.gaps is None:
             return self.sums.kept(variant)
-        return self.gaps.kept(variant, place, moment or self.plan.settings.moment)
+        moment = self.plan.settings.moment if moment is None else moment
+        return self.gaps.kept(variant, place, moment)
 
     def spheres_of(self, variant: Variant) -> tuple[FloatArray, FloatArray, Convex | None]:
         """
@@ -146,8 +147,7 @@ def _all_gaps(
     """All gaps of the lines of a scan, if several cut-offs or another moment need them."""
     if not plan.settings.lists_gaps and len(plan.cutoffs) == 1:
         return None
-    scan = gap_scan(solids, plan, blocks, plan.cutoffs)
-    return scan(plan.rule, spacing=plan.spacing, replicates=range(sums.replicates))
+    return gap_scan(solids, plan, blocks, plan.cutoffs, range(sums.replicates))
 
 
 def _scan_octants(
@@ -161,11 +161,12 @@ def _scan_octants(
     most = min(max(CHORDS_A_GRAIN * count, FEWEST_CHORDS), MOST_CHORDS)
     axes = len(BLOCK_REPLICATES) * len(rule)
     spacing = coarse_spacing(solids, axes, plan, most)
-    scan = partial(gap_scan(solids, plan, blocks, plan.cutoffs), most_steps=most)
     while True:
         try:
             quick = is_quick(solids, spacing, axes)
-            return scan(rule, spacing=spacing, replicates=BLOCK_REPLICATES, quick=quick), rule
+            lines = replace(plan, rule=rule, spacing=spacing)
+            every = BLOCK_REPLICATES
+            return gap_scan(solids, lines, blocks, plan.cutoffs, every, most, quick), rule
         except FollowedTooFarError:
             # only a scan can tell how far lines run through a periodic medium
             if solids.chords(2.0 * spacing) < 1.0:
@@ -183,17 +184,20 @@ def blocked_sums(
 
 
 def gap_scan(
-    solids: Solids, plan: Plan, blocks: tuple[Blocks, Blocks], cutoffs: Sequence[float]
-) -> Callable[..., GapSums]:
-    """
-    Prepare a scan that lists all gaps by block, with the variants and seed of a plan.
-
-    Rule, spacing and replicates are still to be given, and the limit of steps, if there is one.
-    """
-    return partial(
-        scan_gaps, solids,
-        cutoffs=cutoffs, blocks=(blocks[0].moved(solids.origin), blocks[1].moved(solids.origin)),
-        variants=plan.variants, seed=plan.settings.seed, workers=plan.workers, most_steps=math.inf,
+    solids: Solids,
+    plan: Plan,
+    blocks: tuple[Blocks, Blocks],
+    cutoffs: Sequence[float],
+    replicates: Iterable[int],
+    most_steps: float = math.inf,
+    quick: bool = False,
+) -> GapSums:
+    """List all gaps along the lines of a plan by block; blocks are in the dump's coordinates."""
+    return scan_gaps(
+        solids, plan.rule, spacing=plan.spacing, cutoffs=cutoffs,
+        blocks=(blocks[0].moved(solids.origin), blocks[1].moved(solids.origin)),
+        variants=plan.variants, replicates=replicates, seed=plan.settings.seed,
+        workers=plan.workers, most_steps=most_steps, quick=quick,
     )  # fmt: skip
 
 

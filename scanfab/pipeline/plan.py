@@ -165,11 +165,11 @@ class Plan:
             yield replace(self, rvs=(rv,), variants=variants, replicates=replicates, auto="")
 
 
-def plan_without_grains(settings: Settings, sample: Sample | None = None) -> Plan:
+def unscanned_plan(settings: Settings, sample: Sample | None = None) -> Plan:
     """
-    The plan of a series without grains: its frames have rows, but nothing is scanned.
+    The plan before its lines are chosen; that of a series without grains stays so.
 
-    With a ``sample``, the first frame that has grains, it is what :func:`make_plan` starts from.
+    ``sample`` is the reference frame; without it the frames have rows, but nothing is scanned.
     """
     space = SPACE if sample is None else sample.packing.space
     return Plan(
@@ -206,7 +206,7 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     refuse_impossible(sample)
     packing = sample.packing
     settings = settings.in_space(packing.space)
-    plan = plan_without_grains(settings, sample)
+    plan = unscanned_plan(settings, sample)
     radii = packing.radius[sample.grains]
     lengths = {"rmin": float(radii.min()), "rmean": float(radii.mean()), "rmax": float(radii.max())}
     box = SurfaceBox.of(packing, sample.gathered)

@@ -133,8 +133,6 @@ def asked_for(
     """
     names = [option.name for option in options_of(type(settings)) if option.decides]
     written = {name: as_written(getattr(settings, name)) for name in names}
-    if settings.directions is not None:
-        written["directions"] = settings.directions.asked_as
     named = {"scanfab": version("scanfab"), "sources": list(sources)}
     found = {**named, **reading, **written, **excerpt.asked()}
     return dict(json.loads(json.dumps(found, default=os.fspath)))

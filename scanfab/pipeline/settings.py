@@ -235,9 +235,10 @@ class Settings:
         """Messages about options that contradict each other, each with what to do."""
         shape, takes = self.rv_shape, values.SHAPES.get(self.rv_shape)
         sizes = {"rv_radius": self.rv_radius, "rv_size": self.rv_size, "rv_shape": takes is None}
-        for name in (name for name, given in sizes.items() if given and len(self.rvs) > 1):
-            several = f"`rv` asks for {len(self.rvs)}"
-            yield f"{name}: gives the RV one size, but {several}: leave out one of the two options"
+        several = f"`rv` asks for {len(self.rvs)}: leave out one of the two options"
+        for name, given in sizes.items():
+            if given and len(self.rvs) > 1:
+                yield f"{name}: gives the RV one size, but {several}"
         if self.rv_size and not takes:
             instead = "choose `rv_radius`" if takes == "" else "its file gives the size"
             yield f"rv_size: the shape {shape} takes no sizes: {instead}"

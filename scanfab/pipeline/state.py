@@ -201,7 +201,7 @@ def _rays(count: int, space: Space = SPACE) -> FloatArray:
     return np.concatenate([rule.axes, -rule.axes])
 
 
-def _points_in_ball(space: Space = SPACE) -> FloatArray:
+def _points_in_ball(space: Space) -> FloatArray:
     """Points that fill the unit ball, or disc, evenly, each with its opposite, shape (P, 3)."""
     from scipy.stats import qmc
 

@@ -77,11 +77,11 @@ def cell_of(sample: Sample) -> Cell:
 
 
 def centers_of(sample: Sample, mode: str) -> FloatArray:
-    """Centres of boundary particles or grains, shape (K, 3); SettingsError if there are none."""
+    """Centres of boundary particles or grains, shape (K, 3); SettingsError without boundary."""
     chosen = sample.boundary if mode == "boundary" else sample.gathered
     if not chosen.any():
-        text = f"{mode} was asked for, but the frame has none: name them with `boundary`"
-        raise SettingsError(f"strain: {text}")
+        text = "boundary was asked for, but the frame has no boundary particles: name them"
+        raise SettingsError(f"strain: {text} with `boundary`")
     return sample.packing.position[chosen]
 
 

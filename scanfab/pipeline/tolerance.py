@@ -19,7 +19,7 @@ from scanfab.pipeline.plan import NOISE, Plan
 from scanfab.pipeline.settings import MAX_CHORDS
 from scanfab.scan.directions import design_of, rule_of
 from scanfab.scan.scan import ScanSums, scan_lines
-from scanfab.scan.solids import Solids, is_affordable, most_lines
+from scanfab.scan.solids import MAX_LINES, Solids, most_lines
 from scanfab.scan.tallies import FollowedTooFarError
 
 LOGGER = logging.getLogger("scanfab")
@@ -124,7 +124,7 @@ def scan_to_tolerance(
     solids: Solids,
     plan: Plan,
     aims: Mapping[str, float],
-    where: str = "the frame",
+    where: str,
     scan: Callable[..., Any] = scan_variants,
     errors_of: Callable[..., Errors] = variant_errors,
 ) -> tuple[Any, Plan, list[Note]]:
@@ -275,7 +275,7 @@ class _AutoScan:
                 better = replace(better, rule=design_of(axes, space))
         growth = space.lines(len(better.rule) / len(plan.rule), better.spacing / plan.spacing)
         affordable = growth * plan.replicates <= self.left
-        affordable = affordable and is_affordable(self.solids, better.spacing)
+        affordable = affordable and most_lines(self.solids, better.spacing) <= MAX_LINES
         return better if growth > 1.0 and affordable else None
 
     def _notes(self) -> Iterator[Note]:
@@ -310,9 +310,11 @@ def _within_budget(plan: Plan, solids: Solids) -> Plan:
     chords = axes * (solids.chords(plan.spacing) + most_lines(solids, plan.spacing))
     if chords <= plan.max_chords:
         return plan
-    if plan.auto != "replicates" or plan.max_chords < axes:
-        raise SettingsError(
-            f"max_chords: expected at least {chords:.2g}, the chords of {plan.replicates} "
-            f"replicates, found {plan.max_chords:g}: choose a wider `spacing` or fewer `directions`"
-        )
-    return replace(plan, spacing=plan.spacing * plan.space.apart(chords / plan.max_chords))
+    # lines that are wider apart still make a chord for each axis
+    if plan.auto == "replicates" and axes <= plan.max_chords:
+        return replace(plan, spacing=plan.spacing * plan.space.apart(chords / plan.max_chords))
+    least, wider = (axes, "") if plan.auto == "replicates" else (chords, "a wider `spacing` or ")
+    raise SettingsError(
+        f"max_chords: expected at least {math.ceil(least)}, the chords of {plan.replicates} "
+        f"replicates, found {plan.max_chords:g}: choose {wider}fewer `directions`"
+    )

@@ -94,8 +94,9 @@ def as_written(value: Any) -> Any:
         return next((name for name, axis in AXES.items() if axis == value), tuple(value))
     if isinstance(value, tuple):
         return [as_written(item) for item in value]
-    # a boundary rule is written as its text, a direction rule as its name
-    return getattr(value, "text", getattr(value, "name", value))
+    if isinstance(value, BoundaryRule):
+        return value.text
+    return value.asked_as if isinstance(value, DirectionRule) else value
 
 
 def parse_length(name: str, text: str | float | Length) -> Length:
@@ -156,7 +157,7 @@ def parse_lengths(name: str, text: Any) -> tuple[Length, ...]:
     if not 1 <= count <= MOST_CUTOFFS:
         raise unusable(name, f"1 to {MOST_CUTOFFS} lengths (these are {count})", text)
     # multiples of the step are exact after rounding; adding steps one by one would not be
-    return tuple(Length(round(first + k * step, 12), *units) for k in range(count))
+    return tuple(Length(float(f"{first + k * step:.12g}"), *units) for k in range(count))
 
 
 def parse_axis(name: str, text: str | Iterable[float] | None) -> Axis:
@@ -196,7 +197,7 @@ def parse_fractions(name: str, value: Any) -> float | tuple[float, ...]:
 
 def parse_sizes(name: str, value: Any) -> tuple[float, ...]:
     """Parse two or three lengths; a value that is not given becomes an empty tuple."""
-    if value is None or value in ((), []):
+    if value is None or (isinstance(value, tuple | list) and not value):
         return ()
     expected = "two or three lengths above 0, such as 2,3,4"
     return numbers(expected, lambda sizes: len(sizes) in (2, 3) and min(sizes) > 0)(name, value)

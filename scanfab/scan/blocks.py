@@ -81,7 +81,7 @@ class Blocks:
         origin: FloatArray,
         periodic: BoolArray,
         position: FloatArray,
-        space: Space = SPACE,
+        space: Space,
     ) -> Blocks:
         """
         Halves of a cell's periods; along its other vectors, halves of the extent of positions.
@@ -92,7 +92,7 @@ class Blocks:
             The cell: lattice vectors as rows, its corner, and which vectors are periodic.
         position : ndarray, shape (N, 3)
             Positions of the grains, dump's length unit.
-        space : Space, optional
+        space : Space
             For discs: their plane, across which there are no halves.
         """
         along = (position - origin) @ np.linalg.inv(vectors)

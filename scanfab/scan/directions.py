@@ -83,9 +83,6 @@ class DirectionRule:
             and np.array_equal(self.weights, other.weights)
         )
 
-    def __hash__(self) -> int:
-        return hash(self.name)
-
     def __repr__(self) -> str:
         degree = "of no degree" if self.degree is None else f"exact to degree {self.degree}"
         bias = f", bias {self.bias:.2g}" if self.bias > 1e-9 else ""

@@ -135,7 +135,6 @@ def scan_gaps(
     sums = sums.reshape(*offsets.shape[:2], len(variants), -1, len(least), 3)
     number, length, square = np.moveaxis(np.swapaxes(sums, 1, 2), -1, 0)
     scan = sums_of(triads, tallies, variants, solids.edge)
-    following.check(float(scan.steps.sum()))
     return GapSums(triads[:, :, 2], variants, number, length, square, scan)
 
 

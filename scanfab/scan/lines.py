@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scanfab.base.arrays import concatenated
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.space import SPACE, Space
@@ -118,17 +119,6 @@ class Segments:
         length: FloatArray = np.linalg.norm(self.ends[:, 1] - self.ends[:, 0], axis=1)
         return length
 
-    @classmethod
-    def concatenate(cls, parts: Iterable[Segments]) -> Segments:
-        """Join the pieces of several sets of lines; line numbers go on from set to set."""
-        ends, void, line, first = [np.zeros((0, 2, 3))], [np.zeros(0, bool)], [np.arange(0)], 0
-        for part in parts:
-            ends.append(part.ends)
-            void.append(part.void)
-            line.append(part.line + first)
-            first += int(part.line.max(initial=-1)) + 1
-        return cls(np.concatenate(ends), np.concatenate(void), np.concatenate(line))
-
 
 def cut_lines(
     position: FloatArray,
@@ -136,6 +126,7 @@ def cut_lines(
     triad: FloatArray,
     points: FloatArray,
     window: Convex | None = None,
+    first: int = 0,
 ) -> Segments:
     """
     Cut parallel lines into solid and void segments.
@@ -184,7 +175,7 @@ def cut_lines(
         places[..., :2], places[..., 2] = point, bounds
         ends.append(places @ triad)
         void.append(is_void)
-        line.append(np.full(len(bounds), number))
+        line.append(np.full(len(bounds), first + number))
     return Segments(np.concatenate(ends), np.concatenate(void), np.concatenate(line))
 
 
@@ -248,9 +239,10 @@ def sample_segments(
     reach = 0.0 if window is None else window.reach
     if window is None and len(position):
         reach = float((np.linalg.norm(position, axis=1) + radius).max())
-    if reach == 0:
-        return Segments.concatenate([])
-    points = grid_points(reach, max(lines // len(triads), 1), space)
-    return Segments.concatenate(
-        cut_lines(position, radius, triad, points, window) for triad in triads
-    )
+    points = grid_points(reach, max(lines // len(triads), 1), space) if reach else np.zeros((0, 2))
+    parts = [
+        cut_lines(position, radius, triad, points, window, k * len(points))
+        for k, triad in enumerate(triads)
+    ]
+    whole: Segments = concatenated(parts)
+    return whole

@@ -230,11 +230,6 @@ def shortest_gap(solids: Solids) -> float:
     return SHORTEST * float(radius.min()) if len(radius) else 0.0
 
 
-def is_affordable(solids: Solids, spacing: float) -> bool:
-    """Whether one axis of a replicate has no more lines than are allowed."""
-    return most_lines(solids, spacing) <= MAX_LINES
-
-
 def most_lines(solids: Solids, spacing: float) -> float:
     """Upper bound for the lines of one axis and replicate, with those that meet nothing."""
     reach = solids.reach
@@ -259,6 +254,8 @@ def check_space(solids: Solids, rule: DirectionRule) -> None:
 
 def check_spacing(solids: Solids, spacing: float) -> None:
     """Raise SettingsError if the lines are too many to be scanned in reasonable time."""
+    if not spacing > 0.0:
+        raise SettingsError(f"spacing: expected a length above 0, found {spacing:g}")
     lines = most_lines(solids, spacing)
     if lines > MAX_LINES:
         raise SettingsError(

@@ -64,17 +64,13 @@ class Following:
         """
         with self._lock:
             self._taken += steps
-        self.check(self._taken)
-
-    def check(self, taken: float) -> None:
-        """Raise FollowedTooFarError if so many steps are too many."""
-        if taken >= self.most:
+        if self._taken >= self.most:
             raise FollowedTooFarError(
                 f"void segments that leave the cell are long: following them through its images "
                 f"takes more than {self.most:.2g} steps. Much of the cell is empty, or a variant "
                 f"keeps few grains: check the cell's size (`cell`) and its periodic axes "
-                f"(`periodic`), choose a wider `spacing` or other `variants`, or allow more "
-                f"(`max_chords`)"
+                f"(`periodic`), choose a wider `spacing` or other `variants`, or in an "
+                f"auto scan allow more (`max_chords`)"
             )
 
 

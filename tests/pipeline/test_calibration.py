@@ -107,7 +107,7 @@ def test_an_rv_within_another_differs_from_it_by_less_than_two_samples_do():
     assert 0.005 * 400 < unsteady < 0.08 * 400
 
 
-LEAVE_OUT = "leave out `cutoffs`, `moment` and all but one `rv`"
+LEAVE_OUT = "leave out `cutoffs`, `moment`, `frames` and all but one `rv`"
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,8 @@ LEAVE_OUT = "leave out `cutoffs`, `moment` and all but one `rv`"
         ({"frame": -2}, "frame: there is no frame -2: .* has 1 frame, 0"),
         ({"moment": 2}, LEAVE_OUT),
         ({"cutoffs": "0.1,0.2"}, LEAVE_OUT), ({"rv": (0.5, 0.6)}, LEAVE_OUT),
-        ({"tolerence": 0.02}, "calibrate has no option 'tolerence': .*'tolerance'"),
+        ({"frames": ":1"}, LEAVE_OUT),
+        ({"tolerence": 0.02}, "Settings has no option 'tolerence': .*'tolerance'"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_calibrated_is_refused(packing, options, told):

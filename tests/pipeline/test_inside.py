@@ -189,7 +189,7 @@ def test_in_two_dimensions_ovito_ignores_the_third() -> None:
     data = made_up(radius=0.5)
     data.cell_[2, 2], data.cell_.is2D = 0.0, True
     packing = scanfab.from_ovito(data)
-    assert (packing.dimension, packing.cell.periodic) == (2, (True, True, False))
+    assert (packing.space.dimension, packing.cell.periodic) == (2, (True, True, False))
     np.testing.assert_array_equal(packing.position[:, :2], [[1, 1], [2, 1]])
     assert len(scanfab.find_contacts(packing, tolerance=1e-6).contacts) == 1
 

@@ -106,6 +106,8 @@ def test_the_rv_is_that_of_the_first_frame_whichever_frames_are_chosen(tmp_path)
     every = reports(tmp_path, texts)
     (last,) = reports(tmp_path, texts, frames="2:")
     assert last.rv_center == every[0].rv_center
+    (other,) = reports(tmp_path, texts, frames="2:", variants="ab")
+    assert other == last
     flat = [(*ROWS[0][:5], 0.0), *ROWS[1:]]
     (last,) = reports(tmp_path, [dump_text(flat), *texts[1:]], frames="2:")
     assert last.rv_center[0] == pytest.approx(every[0].rv_center[0] + 0.25)

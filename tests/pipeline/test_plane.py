@@ -62,8 +62,8 @@ def test_frames_of_mixed_dimension_are_an_error(discs):
 def test_positions_with_two_coordinates_are_discs(discs):
     position, radius = discs
     packing = Packing(position, radius)
-    assert (packing.dimension, packing.space, packing.position[:, 2].any()) == (2, XY, False)
-    assert Packing(packing.position, radius).dimension == 3
+    assert (packing.space, packing.position[:, 2].any()) == (XY, False)
+    assert Packing(packing.position, radius).space == SPACE
     assert Packing(packing.position, radius, dim=2).space == XY
     for words, told in (
         ({"dim": 3}, "dim: expected 2"),

@@ -55,6 +55,8 @@ def test_frames_are_slices(text, frames):
         ("0:3rmin:0.1rmin", [round(0.1 * k, 12) for k in range(31)], {"rmin"}),
         ("0.5:1:0.2", [0.5, 0.7, 0.9], {""}),
         ("2rmax:2rmax:1rmax", [2], {"rmax"}),
+        # in metres
+        ("0:1e-12:2.5e-13", [0, 2.5e-13, 5e-13, 7.5e-13, 1e-12], {""}),
         ("0.001,1rmin, 2rmean", [0.001, 1, 2], {"", "rmin", "rmean"}),
         ([0.5, "1rmin"], [0.5, 1], {"", "rmin"}),
         (0.5, [0.5], {""}),
@@ -76,7 +78,7 @@ def test_values_are_kept_as_they_are_meant():
     assert Settings(directions=rule).directions is rule
     boundary = ["type=2", "id>5"]
     assert [one.text for one in Settings(boundary=boundary).boundary] == boundary
-    for text in ("1,2,3", "1 2 3", "1, 2, 3", [1, 2, 3]):
+    for text in ("1,2,3", "1 2 3", "1, 2, 3", [1, 2, 3], np.array([1, 2, 3])):
         found = Settings(rv_shape="box", rv_size=text, rv_center=text)
         assert found.rv_size == found.rv_center == (1.0, 2.0, 3.0)
     assert Settings(rv_size=[]).rv_size == ()

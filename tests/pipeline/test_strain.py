@@ -56,7 +56,11 @@ def test_strain_is_by_the_cell_that_repeats_else_by_the_boundary(periodic, optio
     [
         (None, {"strain": "cell"}, "the dump has no cell"),
         (ALL, {"strain": "cell", "axis": OBLIQUE}, "the axis is not x, y or z"),
-        (None, {"strain": "boundary", "boundary": ()}, "has none: name them with `boundary`"),
+        (
+            None,
+            {"strain": "boundary", "boundary": ()},
+            "no boundary particles: name them with `boundary`",
+        ),
     ],
 )
 def test_what_is_not_there_cannot_be_measured(periodic, options, message):

@@ -93,7 +93,8 @@ def test_budget_holds_for_periodic_packings_too(repeated, variants):
     assert 0.1e6 < chords <= 1.1e6
     with pytest.raises(SettingsError, match=r"max_chords: expected at least .*, found 10000"):
         compute(repeated, spacing=0.02, variants=variants, max_chords=1e4)
-    with pytest.raises(SettingsError, match=r"max_chords: expected at least .*, found 100:"):
+    told = "max_chords: expected at least 256, .* found 100: choose fewer `directions`"
+    with pytest.raises(SettingsError, match=told):
         compute(repeated, max_chords=100, variants=variants)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from scanfab import direction_rule
 from scanfab.base.shapes import sphere
-from scanfab.scan.lines import Segments, cut_lines, grid_points, line_triads, sample_segments
+from scanfab.scan.lines import cut_lines, grid_points, line_triads, sample_segments
 from tests.helpers import naive
 from tests.helpers.lattices import shaken_cubic
 
@@ -62,7 +62,6 @@ def test_lines_that_meet_nothing_have_no_pieces():
             found = cut_lines(np.zeros((1, 3)), np.ones(1), np.eye(3), points, window)
             assert len(found.length) == 0
     assert len(sample_segments(np.zeros((0, 3)), np.zeros(0), np.eye(3)[None], 9).length) == 0
-    assert len(Segments.concatenate([]).length) == 0
 
 
 def test_lines_of_several_directions_are_numbered_on(spheres):

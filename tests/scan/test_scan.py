@@ -111,6 +111,9 @@ def test_spacing_that_asks_for_too_many_lines_is_an_error(solids):
     spacing = 2 * 3.0 / MAX_LINES**0.5
     with pytest.raises(SettingsError, match=r"^spacing: .* choose a wider spacing"):
         scan_lines(solids, RULE, spacing=spacing, cutoff=0.3)
+    for spacing in (0.0, -0.5, np.nan):
+        with pytest.raises(SettingsError, match="spacing: expected a length above 0, found"):
+            scan_lines(solids, RULE, spacing=spacing, cutoff=0.3)
 
 
 def test_reported_error_is_the_scatter_over_seeds():

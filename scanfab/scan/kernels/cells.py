@@ -20,7 +20,7 @@ from scanfab.scan.kernels.strips import FAR
 Int32Array = npt.NDArray[np.int32]
 
 # allows vector instructions in a loop that looks for the smallest number
-LEAST = {"nnan", "nsz", "contract"}
+NO_NAN = {"nnan", "nsz", "contract"}
 
 # a ray that misses the grid by less than this fraction of a cell is in it, but for rounding
 SLIGHT = 1e-9
@@ -126,7 +126,7 @@ def room_for_ray() -> Ray:
 # longer than the work itself.
 
 
-@inner(forceinline=True, fastmath=LEAST, error_model="numpy")
+@inner(forceinline=True, fastmath=NO_NAN, error_model="numpy")
 def first_in_cell(cells: Cells, ray: Ray, number: int, without_removed: bool) -> float:
     """
     Distance to the first solid that reaches into a cell.

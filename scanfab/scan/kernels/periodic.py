@@ -72,7 +72,7 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
 
 @part()
 def prism_along(
-    normal: FloatArray, vectors: FloatArray, periodic: BoolArray, in_plane: bool = False
+    normal: FloatArray, vectors: FloatArray, periodic: BoolArray, in_plane: bool
 ) -> Prism:
     """The prism of the lines along a direction."""
     third, steepest = 0, -1.0
