@@ -59,7 +59,7 @@ def test_strain_is_by_the_cell_that_repeats_else_by_the_boundary(periodic, optio
         (
             None,
             {"strain": "boundary", "boundary": ()},
-            "no boundary particles: name them with `boundary`",
+            "no boundary particles: name them",
         ),
     ],
 )
