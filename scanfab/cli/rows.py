@@ -66,6 +66,7 @@ def write_table(
                 dask = scanfab.dask_executor(outputs.scheduler, scheduler_file=file)
                 executor = stack.enter_context(dask)
             vtk, resume = outputs.vtk, outputs.resume
+            resumed = outputs.output if resume else None
             drawn = [] if outputs.plot is None else [outputs.plot]
             drawn += [] if vtk is None else paraview_files(vtk)
             job = Job(
@@ -77,7 +78,7 @@ def write_table(
                 manifest_path=outputs.manifest,
                 drawn=drawn,
                 more={"settings_file": listed} if (listed := as_listed(ctx)) else {},
-                observers=vtk_folders(vtk, len(series), settings, resume) if vtk else (),
+                observers=vtk_folders(vtk, series, settings, resumed) if vtk else (),
                 told=ctx.obj,
                 executor=executor,
             )

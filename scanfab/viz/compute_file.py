@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
+from itertools import chain
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -22,6 +23,7 @@ from scanfab.pipeline.frame import FrameResult
 from scanfab.pipeline.job import Job
 from scanfab.pipeline.map_settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.options import listening
+from scanfab.pipeline.record import part_of
 from scanfab.pipeline.settings import Settings
 from scanfab.table.table import Table, load
 from scanfab.table.writing import Excerpt
@@ -118,7 +120,8 @@ def compute_file(
     with listening() as told:
         series = _opened(source, options)
         settings = kind(**options)
-        folders = () if vtk is None else vtk_folders(Path(vtk), len(series), settings, resume)
+        resumed = Path(output) if resume else None
+        folders = () if vtk is None else vtk_folders(Path(vtk), series, settings, resumed)
         job = Job(
             series,
             settings,
@@ -158,19 +161,29 @@ def paraview_files(folder: Path) -> list[Path]:
     return [path for path in folder.rglob("*") if path.suffix in (".vtp", ".vtu", ".pvd")]
 
 
-def vtk_folders(folder: Path, count: int, settings: Settings, go_on: bool) -> list[VtkFolder]:
+def vtk_folders(
+    folder: Path, series: Sequence[Series], settings: Settings, resumed: Path | None
+) -> list[VtkFolder]:
     """
     Make the folders for ParaView files; each of several series has a folder of its own.
+
+    ``resumed`` is the table that the run goes on with, if it exists.
 
     Raises
     ------
     SettingsError
-        If a folder cannot be made or written to, or if there are several cut-offs.
+        If a folder cannot be made or written to or holds the dumps, or if there are several
+        cut-offs.
     """
     if settings.cutoffs:
         raise SettingsError("vtk: files for ParaView are of one cut-off: leave out `cutoffs`")
-    several = [folder / f"series-{number}" for number in range(1, count + 1)]
-    return [VtkFolder(one, go_on) for one in (several if count > 1 else [folder])]
+    for source in chain.from_iterable(one.sources for one in series):
+        # the next run would take the files for dumps
+        if Path(source).resolve() == folder.resolve():
+            raise SettingsError(f"vtk: {folder} holds the dumps: name another folder")
+    several = [folder / f"series-{number}" for number in range(1, len(series) + 1)]
+    go_on = resumed is not None and (resumed.exists() or part_of(resumed).exists())
+    return [VtkFolder(one, go_on) for one in (several if len(series) > 1 else [folder])]
 
 
 class VtkFolder:

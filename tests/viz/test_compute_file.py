@@ -231,6 +231,7 @@ def test_series_that_make_no_table_are_refused(short_series, dumps, tmp_path):
         ([series, other], {}, "read with the same options"),
         ([series[1:], scanfab.read_series(dumps)[:2]], {}, "parts of the same frames"),
         (series, {"radius": 1.0}, "radius: the series is open already"),
+        (series, {"vtk": short_series}, "vtk: .* holds the dumps: name another folder"),
     ):
         with pytest.raises(scanfab.SettingsError, match=said):
             from_python(tmp_path / "table.csv", sources, **options)

@@ -172,6 +172,19 @@ def test_a_resumed_collection_keeps_its_frames(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
+def test_a_collection_is_kept_only_with_the_table_that_is_resumed(tmp_path):
+    """Otherwise it would mix frames of two samples."""
+    for name, steps in (("one", (3, 7)), ("two", (4,))):
+        (tmp_path / name).mkdir()
+        for step in steps:
+            write(tmp_path / name / f"dump_{step}.txt", dump_text(cubic_rows(), step=step))
+        vtk, scan = tmp_path / "vtk", {"directions": 9, "spacing": "0.5rmin", "variants": "c"}
+        table = tmp_path / f"{name}.csv"
+        scanfab.compute_file(tmp_path / name, table, vtk=vtk, resume=True, **scan)
+        assert pyvista.get_reader(vtk / "grains.pvd").time_values == [float(one) for one in steps]
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 def test_a_frame_without_grains_and_a_name_beyond_ascii(tmp_path):
     folder = tmp_path / 'grüße<&">'
     folder.mkdir()
