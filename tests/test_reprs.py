@@ -68,8 +68,7 @@ OBJECTS = [
     ),
     (
         Calibration((), ("A sentence.", "Another."), {"spacing": "0.25rmin"}),
-        "Calibration: 0 steps of variants\n  A sentence.\n  Another.\n"
-        "  recommended: spacing='0.25rmin'",
+        "Calibration: 0 rows\n  A sentence.\n  Another.\n  recommended: spacing='0.25rmin'",
     ),
     (Report("x" * 1_234_567, True), "Report: an HTML page of 1.2 MB, with void fabric"),
     (Report("x", False), "Report: an HTML page of 1e-06 MB, without any void fabric"),

@@ -53,11 +53,14 @@ TITLES = {
 }
 # columns of a fabric table on a terminal; a narrow terminal drops the last, never the first STAY
 SHOWN = (
-    "frame", "strain", "block", "variant", "grains", "contacts", "alpha_vs_axial", "total",
-    "alpha_c_axial", "at_surface", "alpha_vs_axial_se", "alpha_vs_axial_sample_se", "alpha_vs",
-    "mean_length", "coordination", "solid_fraction", "r_inner", "r_outer", "x", "y", "z",
+    "source", "frame", "strain", "block", "variant", "rv", "cutoff", "grains", "contacts",
+    "alpha_vs_axial", "total", "alpha_c_axial", "at_surface", "alpha_vs_axial_se",
+    "alpha_vs_axial_sample_se", "alpha_vs", "mean_length", "coordination", "solid_fraction",
+    "r_inner", "r_outer", "x", "y", "z",
 )  # fmt: skip
-STAY = 9
+# these columns are not shown if all rows have the same value
+OFTEN_SAME = ("source", "rv", "cutoff")
+STAY = 12
 
 
 class Command(click.Command):
@@ -236,6 +239,7 @@ def print_csv(
 
 def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:
     """Print a fabric table: the columns that the user chose, or those that fit the terminal."""
+    from scanfab.table.curves import short_names
     from scanfab.table.row import total_error
 
     shown = [{**row, "total": total_error(row, "alpha_vs_axial")} for row in rows]
@@ -244,7 +248,11 @@ def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:
     if excerpt.fields:
         print_rows(shown, excerpt.fields, len(excerpt.fields), digits)
     else:
-        print_rows(shown, SHOWN, STAY, digits)
+        names = short_names(row["source"] for row in shown)
+        same = {name for name in OFTEN_SAME if len({row.get(name) for row in shown}) <= 1}
+        columns = [name for name in SHOWN if name not in same]
+        shown = [{**row, "source": names[row["source"]]} for row in shown]
+        print_rows(shown, columns, STAY - len(same), digits)
 
 
 def print_rows(

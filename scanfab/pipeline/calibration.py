@@ -105,7 +105,7 @@ class Calibration:
     --------
     >>> from scanfab import Calibration
     >>> Calibration((), (), {"spacing": "0.25rmin"})
-    Calibration: 0 steps of variants
+    Calibration: 0 rows
       recommended: spacing='0.25rmin'
     """
 
@@ -114,9 +114,9 @@ class Calibration:
     options: dict[str, str]
 
     def __repr__(self) -> str:
-        steps = counted(len(self.rows), "step of a variant", "steps of variants")
         options = ", ".join(f"{name}={value!r}" for name, value in self.options.items())
-        lines = [f"Calibration: {steps}", *self.findings, f"recommended: {options}"]
+        rows = counted(len(self.rows), "row")
+        lines = [f"Calibration: {rows}", *self.findings, f"recommended: {options}"]
         return "\n  ".join(lines)
 
     @property
@@ -137,7 +137,7 @@ def calibrate(
         The series. Lengths relative to radii, and the RV, come from its first frame that has
         grains, as for :func:`scanfab.compute`.
     frame : int, optional
-        Number of the frame; default: the last.
+        Place of the frame in the series, as in ``series[frame]``; default: the last.
     variants : str, optional
         Letters out of abcd.
     **options

@@ -328,11 +328,11 @@ class VariantColumns:
             return {"no_inner_window": text}
         if self.measured.segment_count == 0:
             times = self.cutoff / float(sample.packing.radius[sample.grains].min())
-            text = (
-                f"no void segment reaches the cut-off {self.cutoff:g}, {times:.4g} times the "
-                f"smallest radius: lengths are in the dump's unit, did you mean 1rmin?"
-            )
-            return {"cutoff_too_long": text}
+            text = f"no void segment reaches the cut-off {self.cutoff:g}, {times:.4g} times the "
+            advice = "choose a shorter one, or a larger RV"
+            if times > 5.0:
+                advice = "lengths are in the dump's unit, did you mean 1rmin?"
+            return {"cutoff_too_long": f"{text}smallest radius: {advice}"}
         if void is None:
             text = "in some direction no void segment is kept, so there is no void fabric"
             return {"empty_direction": text}

@@ -205,8 +205,8 @@ def compare_tables(
     _tell_of_strains(rows, column, strain_max)
     if is_turned(rows):
         note(TURNED)
-    origins = {row.get("contacts_from") for row in rows} - {None, ""}
-    if len(origins) > 1:
+    origins = {(row["source"], row["contacts_from"]) for row in rows if row.get("contacts_from")}
+    if len(origins) > len({source for source, _ in origins}):
         note(
             "contacts come from files in some frames and from geometry in others (contacts_from): "
             "the slope on the contact fabric mixes both"

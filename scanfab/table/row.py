@@ -23,6 +23,7 @@ WIDTH, PAIRS = 26, 3
 SHOWN = {
     "source": "source",
     "frame": "frame",
+    "block": "block",
     "strain": "strain",
     "shear_strain": "shear strain",
     "variant": "variant",
@@ -160,10 +161,13 @@ def variant_of(row: Mapping[str, Any]) -> str:
 
 
 def groups_of(rows: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], list[Any]]:
-    """Group rows by source and :func:`variant_of`, in the order of their first rows."""
+    """Group rows by source and :func:`variant_of`, in the order of frames in each group."""
     groups: dict[tuple[str, str], list[Any]] = {}
     for row in rows:
         groups.setdefault((row["source"], variant_of(row)), []).append(row)
+    for group in groups.values():
+        # the last frame is the headline, but parts of a series may be given in any order
+        group.sort(key=lambda row: row.get("frame") or 0)
     return groups
 
 
@@ -248,7 +252,7 @@ def _lines(rows: Rows, names: Sequence[str]) -> list[list[str]]:
             return with_error(number_of(row, name), total_error(row, name))
         return "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
 
-    shown = list(names[:MOST_COLUMNS])
+    shown = [*names[:MOST_COLUMNS], *(name for name in names[MOST_COLUMNS:] if name == "rv")]
     if any(name in names for name in ANISOTROPIES):
         same = [name for name in OFTEN_SAME if len({row.get(name) for row in rows}) <= 1]
         shown = [name for name in SHOWN if name in names and name not in same]

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from scanfab.cli.compare import print_comparison
-from scanfab.cli.console import SHOWN, STAY, print_table
+from scanfab.cli.console import OFTEN_SAME, SHOWN, STAY, print_table
 from scanfab.io.reader import installed_readers
 from scanfab.table.columns import table_columns
 from scanfab.table.compare import compare_tables
@@ -48,8 +48,8 @@ def heads(line: str) -> list[str]:
 
 def test_what_does_not_fit_is_left_out_least_telling_first(lines):
     counts = []
-    # only maps have blocks
-    always = [name for name in SHOWN[:STAY] if name in ROWS[0] or name == "total"]
+    # only maps have blocks, and these rows have one source and cut-off
+    always = [name for name in SHOWN[:STAY] if name in {*ROWS[0], "total"} - {*OFTEN_SAME}]
     optional = [name for name in SHOWN[STAY:] if name in ROWS[0]]
     for width in (40, 60, 80, 119, 120, 121, 200):
         head, *rows = lines(width, print_table, ROWS, Excerpt())
@@ -65,6 +65,18 @@ def test_what_does_not_fit_is_left_out_least_telling_first(lines):
     cells = dict(zip(columns, rows[0].split(), strict=True))
     errors = [cells[name] for name in ("± total", "± scan", "± sample")]
     assert errors == ["0.0005", "0.0003", "0.0004"]
+
+
+def test_what_tells_rows_apart_is_shown_only_where_it_differs(lines):
+    first, other = (
+        a_row(**VALUES, rv=0.7),
+        a_row(**VALUES, source="a/folder/" * 9 + "other", rv=0.4, cutoff=0.5),
+    )
+    head, _, row = lines(60, print_table, [first, other], Excerpt())
+    shown = dict(zip(heads(head), row.split(), strict=True))
+    assert (shown["source"], shown["rv"], shown["cutoff"]) == ("other", "0.4", "0.5")
+    (head, *_) = lines(200, print_table, ROWS, Excerpt())
+    assert not {"source", "rv", "cutoff"} & set(heads(head))
 
 
 def test_a_map_says_which_block_a_row_is_of(lines):

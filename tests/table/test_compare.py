@@ -42,6 +42,20 @@ def test_slopes_are_those_of_least_squares():
     assert (row.peak, row.peak_strain, row.final) == (-0.05, 0.02, -0.03)
 
 
+def test_parts_of_a_series_may_be_given_in_any_order():
+    rows = curve()
+    assert compare_tables([*rows[3:], *rows[:3]]).summary[0] == compare_tables(rows).summary[0]
+
+
+def test_a_note_says_that_contacts_are_of_two_kinds_within_a_source():
+    kinds = ("file", "geometry")
+    sources = [[{**row, "contacts_from": kind} for row in curve(kind)] for kind in kinds]
+    compare_tables([*sources[0], *sources[1]])
+    mixed = [{**row, "contacts_from": kinds[row["frame"] > 2]} for row in curve()]
+    with pytest.warns(ScanfabNote, match="the slope on the contact fabric mixes both"):
+        compare_tables(mixed)
+
+
 def with_octants(rows):
     """Rows with values without each octant, which octant k changes in its own way."""
     of = {"alpha_vs_axial": void_without, "alpha_c_axial": contact_without}

@@ -68,9 +68,12 @@ def groups_of(rows: Sequence[Mapping[str, Any]]) -> list[Group]:
     Raises
     ------
     SettingsError
-        If the table has nothing to draw.
+        If the table has nothing to draw, or rows of several cut-offs.
     """
     curves = curves_of(rows)
+    if any(len(set(numbers_of(curve.rows, "cutoff"))) > 1 for curve in curves):
+        several = "the rows have several cut-offs, which a curve cannot show"
+        raise SettingsError(f"{several}: choose one, as by table.select(cutoff=...)")
     if not any(np.isfinite(curve.values("alpha_vs_axial")).any() for curve in curves):
         raise SettingsError("there is nothing to draw: no row of the table has a void fabric")
     sources = list(dict.fromkeys(curve.source for curve in curves))

@@ -44,6 +44,12 @@ def bars_of(axes):
     return [np.ptp(segment[:, 1]) for one in found for segment in one.get_segments()]
 
 
+def test_rows_of_several_cut_offs_are_no_curve():
+    rows = [{**row, "cutoff": cutoff} for cutoff in (0.1, 0.2) for row in curve()]
+    with pytest.raises(SettingsError, match=r"several cut-offs.*choose one"):
+        groups_of(rows)
+
+
 def with_state(rows):
     return [
         {**row, "p": 2.0 + k, "q": None, "acst_c": 0.1 * k, "acst_c_se": 0.02}
