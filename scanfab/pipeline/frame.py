@@ -20,7 +20,6 @@ from scanfab.fabric.measured import Measured
 from scanfab.fabric.registry import GROUPS, OWN_FABRICS, checked_values
 from scanfab.io.frame import Frame
 from scanfab.io.series import other_space
-from scanfab.packing.columns import RV_COLUMN, sample_values
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample, Variant
 from scanfab.packing.search import near_pairs
@@ -39,7 +38,7 @@ from scanfab.pipeline.rv import RV, empty_rvs
 from scanfab.pipeline.state import contact_forces, doubts_of_state, refuse_forces, sample_state
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.edges import CLIP, ENDS
-from scanfab.table.columns import installed_fabrics, row_of
+from scanfab.table.columns import RV_COLUMN, installed_fabrics, row_of
 from scanfab.table.row import Row
 
 # with fewer grains the numbers of a row mean little
@@ -204,9 +203,13 @@ class VariantColumns:
 
     def columns(self) -> dict[str, Any]:
         """Values by column, without the columns that are the same in all rows of a frame."""
-        plan, measured = self.plan, self.measured
-        row = sample_values(self.sample, self.variant, self.window, len(measured.normals))
-        row |= {
+        plan, measured, sample = self.plan, self.measured, self.sample
+        counted = sample.counted(self.variant, self.window)
+        row = {
+            "grains": sample.number(counted & ~sample.removed(self.variant)),
+            "rattlers": sample.number(counted & sample.rattlers),
+            "contacts": len(measured.normals),
+            "coordination": sample.coordination(self.variant, self.window),
             "solid_fraction": self.solid_fraction,
             "directions": len(plan.rule),
             "replicates": self.sums.replicates,

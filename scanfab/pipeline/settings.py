@@ -24,12 +24,11 @@ from scanfab.base.space import Space
 from scanfab.base.spelling import spelt_place
 from scanfab.io.options import parse_frames
 from scanfab.packing.boundary import BoundaryRule
-from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.rattlers import installed_rules
 from scanfab.pipeline import values
 from scanfab.pipeline.values import STRAIN_MODES, Axis, Length, Vector, as_written
 from scanfab.scan.directions import RULES, DirectionRule, rule_of
-from scanfab.scan.edges import CLIP, EDGE_COLUMNS, EDGES, ENDS
+from scanfab.scan.edges import CLIP, EDGES, ENDS
 
 # A scan of so many chords takes one processor one to two minutes. A frame of a dense packing needs
 # some hundred times less for a tolerance of 1e-4, and a tenth of it is the limit if the tolerance
@@ -348,6 +347,7 @@ class Settings:
         """Names of columns that only these settings add to the default columns."""
         # to print the help of a command needs no fabric
         from scanfab.fabric.registry import GROUPS
+        from scanfab.table.columns import EDGE_COLUMNS, RV_COLUMN
 
         shaped = self.rv_shape != "sphere" or self.rv_follows != "none"
         several = len(self.rvs) > 1

@@ -11,8 +11,6 @@ from scanfab.base.column import LENGTH, Column
 from scanfab.fabric.predicted import PREDICTED_ALPHA, WINDOW_ALPHA
 from scanfab.fabric.registry import GROUPS, OWN_FABRICS, Fabric, load_fabrics
 from scanfab.fabric.usual import Contact, Void
-from scanfab.packing.columns import RV_COLUMN, SAMPLE_COLUMNS
-from scanfab.scan.edges import EDGE_COLUMNS, SCAN_COLUMNS
 from scanfab.table.row import Row
 
 FRAME_COLUMNS = (
@@ -22,6 +20,36 @@ FRAME_COLUMNS = (
     Column("time", float, "time", "simulation time of the dump"),
     Column("strain", float, "", "strain 1 - L/L0 along the loading axis, positive in compression"),
     Column("variant", str, "", "a: whole, b: without rattlers, c: RV, d: RV without rattlers"),
+)
+SAMPLE_COLUMNS = (
+    Column("grains", int, "", "solid in this variant, centre in the window; a clump is one"),
+    Column("rattlers", int, "", "grains with too few neighbours, centre in the window"),
+    Column("contacts", int, "", "contacts between grains that enter gc_*; of clumps, each point"),
+    Column("contacts_from", str, "", "file or geometric"),
+    Column(
+        "coordination",
+        float,
+        "",
+        "mean number of contacts of the grains counted in grains, boundary's included; of clumps, "
+        "neighbours",
+    ),
+)
+RV_COLUMN = Column(
+    "rv", float, "", "size of the RV as a fraction of the sample's, where several are asked for"
+)
+SCAN_COLUMNS = (
+    Column("solid_fraction", float, "", "of the variant's solids in the RV or cell; else empty"),
+    Column("directions", int, "", "axes of the direction rule, in each replicate"),
+    Column("replicates", int, "", "number of replicates"),
+    Column("lines", int, "", "scan lines that meet the window (for the whole: any solid)"),
+    Column("segments", int, "", "void segments kept"),
+    Column("spacing", float, LENGTH, "distance of neighbouring lines, all replicates together"),
+    Column("cutoff", float, LENGTH, "shortest void segment kept"),
+)
+
+EDGE_COLUMNS = (
+    Column("edge", str, "", "rule at the window's surface: clip, start or ends; empty without one"),
+    Column("left_out", float, "", "share of segments that start leaves out: they leave the sample"),
 )
 SHEAR = (
     "√(2/3 e:e) of the deviator e of the logarithmic strain since the first frame; empty unless "
