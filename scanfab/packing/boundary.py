@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.errors import SettingsError
+from scanfab.base.errors import Note, SettingsError
 from scanfab.base.typing import BoolArray
 from scanfab.packing.packing import Packing
 
@@ -102,16 +102,31 @@ def select_boundary(packing: Packing, rules: Sequence[BoundaryRule]) -> BoolArra
     return np.asarray(np.any([none, *(rule.select(packing) for rule in rules)], axis=0))
 
 
-def existing_values(packing: Packing, rules: Sequence[BoundaryRule]) -> str:
-    """Spell the values in the columns of some expressions, for messages."""
+def boundary_hints(rules: Sequence[BoundaryRule], packing: Packing) -> list[Note]:
+    """A note on rules that select no particle; without rules, on what looks like a boundary."""
+    if rules:
+        if select_boundary(packing, rules).any():
+            return []
+        text = f"`boundary`: no particle has {spelt_rules(rules, packing)}"
+        return [Note("no_such_boundary", text)]
+    expression = enclosing_class(packing)
+    if expression is None:
+        return []
+    text = f"the particles with {expression} enclose the others: if they are a boundary, "
+    return [Note("unnamed_boundary", f'{text}name them: `boundary="{expression}"`')]
+
+
+def spelt_rules(rules: Sequence[BoundaryRule], packing: Packing) -> str:
+    """Spell rules, and the values that a packing has in their columns."""
+    named = " or ".join(rule.text for rule in rules)
     if len(packing) == 0:
-        return "there are no particles"
+        return f"{named}: there are no particles"
     told = []
     for name in dict.fromkeys(rule.column for rule in rules):
         found = [f"{value:g}" for value in np.unique(_column(packing, name))]
         is_short = len(found) <= MOST_LISTED
         told.append(f"{name} is {' or '.join(found) if is_short else f'{found[0]} to {found[-1]}'}")
-    return "; ".join(told)
+    return f"{named}: {'; '.join(told)}"
 
 
 def enclosing_class(packing: Packing) -> str | None:

@@ -181,7 +181,21 @@ class Window:
         return branch
 
     def placed(self, points: FloatArray, packing: Packing) -> FloatArray:
-        """The image of each point to which :meth:`branches` leads, in the dump's coordinates."""
+        """
+        The image of each point to which :meth:`branches` leads.
+
+        Parameters
+        ----------
+        points : ndarray, shape (N, 3)
+            Dump's coordinates.
+        packing : Packing
+            The packing, whose cell may be periodic.
+
+        Returns
+        -------
+        ndarray, shape (N, 3)
+            Dump's coordinates.
+        """
         return self.center + self.branches(points, packing)
 
     def images(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
@@ -24,12 +24,7 @@ from scanfab.base.spelling import counted
 from scanfab.io.follow import FollowedSeries
 from scanfab.io.frame import Frame
 from scanfab.io.series import ENDLESS, Series
-from scanfab.packing.boundary import (
-    BoundaryRule,
-    enclosing_class,
-    existing_values,
-    select_boundary,
-)
+from scanfab.packing.boundary import boundary_hints, select_boundary, spelt_rules
 from scanfab.packing.doubts import cell_doubt, doubts_of
 from scanfab.packing.packing import Packing
 from scanfab.packing.rattlers import installed_rules
@@ -191,7 +186,7 @@ class Frames:
             if self.named is not None and number < self.named and not is_stream:
                 continue
             is_named = number == self.named
-            sample = self.read(frame) if is_named else self.sample(number, frame)
+            sample = sample_of(frame, self.settings) if is_named else self.sample(number, frame)
             if number in self.chosen:
                 self.ready[number] = sample
             if sample is not None and sample.grains.any():
@@ -218,16 +213,12 @@ class Frames:
         if number in self.ready:
             return self.ready.pop(number)
         try:
-            return self.read(frame)
+            return sample_of(frame, self.settings)
         except (PackingError, ReadError) as error:
             if self.settings.on_error == "stop":
                 raise
             tell([Note(SKIPPED, str(error), kind=SkippedFrameWarning)], f"frame {number}")
             return None
-
-    def read(self, frame: Unread) -> Sample:
-        """Read a frame and sort its particles into grains, boundary and rattlers."""
-        return sample_of(frame, self.settings)
 
     def check_boundary(self, first: Sample) -> list[Note]:
         """
@@ -244,7 +235,7 @@ class Frames:
                 missing = [rule for rule in missing if not rule.select(packing).any()]
         if not missing:
             return []
-        message = f"no particle of any frame has {_values_there(first, missing)}"
+        message = f"no particle of any frame has {spelt_rules(missing, first.packing)}"
         if len(missing) == len(rules):
             raise SettingsError(f"boundary: {message}")
         return [Note("no_such_boundary", f"`boundary`: {message}")]
@@ -302,7 +293,7 @@ def doubts_of_frame(frame: Unread, sample: Sample, settings: Settings) -> list[N
         notes = doubts_of(sample, frame.cell_is_named, frame.bodies_are_named)
         if no_cell := cell_doubt(sample, frame.carries):
             notes.append(Note("no_cell", no_cell))
-    return notes if settings.boundary else notes + boundary_hints(sample, settings)
+    return notes if settings.boundary else notes + boundary_hints((), sample.packing)
 
 
 def packing_of(frame: Unread) -> Packing:
@@ -346,26 +337,6 @@ def of_whole(series: Series, settings: Settings) -> tuple[Series, Settings]:
     stop = None if chosen.stop >= ENDLESS else chosen.stop
     step = None if chosen.step == 1 else chosen.step
     return series.whole, replace(settings, frames=slice(chosen.start, stop, step))
-
-
-def boundary_hints(sample: Sample, settings: Settings) -> list[Note]:
-    """A note if the boundary selects no particle, or if particles look like an unnamed boundary."""
-    if settings.boundary:
-        if sample.boundary.any():
-            return []
-        text = f"`boundary`: no particle has {_values_there(sample, settings.boundary)}"
-        return [Note("no_such_boundary", text)]
-    expression = enclosing_class(sample.packing)
-    if expression is None:
-        return []
-    text = f"the particles with {expression} enclose the others: if they are a boundary, "
-    return [Note("unnamed_boundary", f'{text}name them: `boundary="{expression}"`')]
-
-
-def _values_there(sample: Sample, rules: Sequence[BoundaryRule]) -> str:
-    """Rules of the boundary that select no particle, and the values that particles have."""
-    named = " or ".join(rule.text for rule in rules)
-    return f"{named}: {existing_values(sample.packing, rules)}"
 
 
 def samples(source: Source, **options: Any) -> Iterator[tuple[int, Sample]]:

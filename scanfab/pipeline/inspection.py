@@ -12,10 +12,11 @@ from scanfab.base.errors import Note, PackingError, ReadError, ScanfabNote, coll
 from scanfab.base.option import unusable
 from scanfab.io.frame import Frame
 from scanfab.io.series import Series
+from scanfab.packing.boundary import boundary_hints
 from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
-from scanfab.pipeline.frames import Frames, boundary_hints
+from scanfab.pipeline.frames import Frames, sample_of
 from scanfab.pipeline.rv import rvs_of
 from scanfab.pipeline.settings import Settings
 from scanfab.table.row import Record
@@ -134,10 +135,12 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
 def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
     """Read a frame and collect doubts, including errors that would prevent a measurement."""
     with collected() as told:
-        sample = frames.read(frame)
+        sample = sample_of(frame, frames.settings)
     tell(note for note in told if note.kind is ScanfabNote)
     doubts = [note for note in told if note.kind is not ScanfabNote]
-    doubts += boundary_hints(sample, frames.settings) if len(sample.packing) else []
+    doubts += (
+        boundary_hints(frames.settings.boundary, sample.packing) if len(sample.packing) else []
+    )
     try:
         refuse_impossible(sample)
     except PackingError as error:

@@ -17,7 +17,7 @@ from scanfab.io.series import Series
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import Window
-from scanfab.pipeline.frames import Frames, doubts_of_frame
+from scanfab.pipeline.frames import Frames, doubts_of_frame, sample_of
 from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import Strains
@@ -140,7 +140,7 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     # damaged frames are skipped; only a damaged frame that is asked for is an error
     frames = Frames(series, replace(settings, on_error="skip"))
     frame = series[number]
-    sample = frames.read(frame)
+    sample = sample_of(frame, settings)
     tell(doubts_of_frame(frame, sample, settings))
     found = frames.reference()
     first = None if found is None else found[2]
@@ -160,7 +160,7 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
         # at zero strain, the last frame tells which of the strains tells the frames apart
         for last_number, last in reversed(list(frames)):
             with suppress(PackingError, ReadError):
-                later = _strains(last_number, frames.read(last), first, settings)
+                later = _strains(last_number, sample_of(last, settings), first, settings)
                 column = frame_strain_column(later)
                 break
     strain = spelt_strain(strains, column)

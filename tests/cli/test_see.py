@@ -231,6 +231,6 @@ def test_a_folder_of_paraview_files_is_a_series_of_its_grains(series, tmp_path, 
     assert f"contacts      {contacts}" in out
     # and no computation replaces them
     before = {path: path.read_bytes() for path in (tmp_path / "vtk").iterdir()}
-    with pytest.raises(SettingsError, match="would replace the input"):
+    with pytest.raises(SettingsError, match="holds the dumps"):
         scanfab.compute_file(tmp_path / "vtk", tmp_path / "u.csv", vtk=tmp_path / "vtk")
     assert {path: path.read_bytes() for path in (tmp_path / "vtk").iterdir()} == before
