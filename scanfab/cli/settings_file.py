@@ -84,7 +84,7 @@ def _read(path: Path) -> dict[str, Any]:
     options: dict[str, Any] = content.get(SECTION, {})
     for key in (key for key in options if key not in KEYS):
         near = get_close_matches(key, KEYS, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else "it may say how samples are computed"
+        hint = f"did you mean {near[0]!r}?" if near else "give it on the command line"
         raise click.UsageError(f"{path}: {key!r} cannot be set in a settings file: {hint}")
     return options
 

@@ -65,8 +65,8 @@ VOLUMETRIC_STRAIN = Column(
     "volumetric_strain",
     float,
     "",
-    "-ln(V/V0) since the first frame, positive in compression; empty unless the cell is periodic "
-    "along all its vectors",
+    "-ln(V/V0) since the reference frame, positive in compression; empty unless the cell is "
+    "periodic along all its vectors",
 )
 WITH_TWO = "mean number of contacts of the grains with two or more contacts"
 NO_DIRECTION = "empty if √(3/2 s:s) < 0.02 p"

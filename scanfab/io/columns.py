@@ -212,8 +212,11 @@ def _radius(where: str, rest: dict[str, Any], options: ReadOptions, count: int) 
         return 0.5 * _lengths(where, rest.pop(other), "a diameter")
     like = next((name for name in rest if LIKE_A_RADIUS.search(name)), "...")
     listed, doubt = ", ".join(rest) or "none", " (if that is one)" * (like != "...")
-    advice = f'name it with `columns={{"radius": "{like}"}}`{doubt}, or give all grains a `radius`'
-    raise ReadError(f"{where}: no radius: expected radius or diameter, found {listed}; {advice}")
+    advice = (
+        f'name it with `columns={{"radius": "{like}"}}`{doubt} or `columns={{"diameter": "..."}}`'
+    )
+    found = f"no radius: expected radius or diameter, found {listed}"
+    raise ReadError(f"{where}: {found}; {advice}, or give all grains a `radius`")
 
 
 def other_size(radius: FloatArray, diameter: AnyArray) -> int | None:

@@ -138,7 +138,9 @@ class Series:
         frames = list(islice(self, place, place + 1) if place >= 0 else deque(self, -place))
         if not frames or len(frames) < -place:
             count = counted(len(self), "frame")
-            raise NoFrameError(f"{self.name}: has {count}, there is no frame {place}")
+            raise NoFrameError(
+                f"{self.name}: there is no frame {place}: it has {count}, counted from 0"
+            )
         return frames[0]
 
     def _with(self, numbers: range) -> Series:

@@ -210,7 +210,9 @@ def _no_grains(
     readable = [family for family in families if family.reader is not None]
     if readable:
         held = ", ".join(f"{HOLDS[f.kind]} ({Path(f.pattern).name})" for f in readable[:5])
-        return ReadError(f"{where}: no grains: expected points with a radius, found {held}")
+        advice = "name the file of the grains, or leave out `format`"
+        text = f"no grains: expected points with a radius, found {held}: {advice}"
+        return ReadError(f"{where}: {text}")
     folders = [path for path in paths if path.is_dir()]
     below = [f"{sub}" for path in folders for sub in sorted(path.glob("[!.]*")) if sub.is_dir()]
     if below:

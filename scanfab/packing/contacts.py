@@ -333,10 +333,10 @@ def _refuse_long(pairs: RowArray, length: FloatArray, packing: Packing) -> None:
     if np.any(excess > 0):
         worst = int(np.argmax(excess))
         one, two = packing.id[pairs[worst]]
-        advice = "is this the contact list of another step?"
-        if not packing.is_periodic:
-            cure = "if the sample is periodic, name its cell (`cell` and `periodic`)"
-            advice = f"{cure}; or {advice}"
+        cell = "if the sample is periodic, name its cell (`cell` and `periodic`)"
+        if packing.is_periodic:
+            cell = "does the cell (`cell` and `periodic`) belong to this sample?"
+        advice = f"{cell}; or is this the contact list of another step?"
         raise PackingError(
             f"the grains {one} and {two} are listed as a contact, but their centres are "
             f"{length[worst]:g} apart and their radii add up to {radius[worst].sum():g}: {advice}"

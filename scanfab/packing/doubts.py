@@ -19,8 +19,8 @@ from scanfab.packing.window import SurfaceBox
 # A clump is smaller than this part of the sample, or of the period. A body whose length is at most
 # LONG times the median of all is like the others.
 SMALL, LONG = 0.5, 3.0
-# No packing of spheres has so many contacts a grain.
-MANY_CONTACTS = 30
+# No packing of spheres has so many contacts a grain: it has 6 at random, at most 12 in a lattice.
+MANY_CONTACTS = 15
 # Volume of the grains over that of the box of their surfaces. Only clumps of many spheres overlap
 # as much.
 SOLIDS = 20.0
@@ -241,7 +241,7 @@ def _many_contacts(sample: Sample) -> str:
     if sample.contacts.source != "geometric" or mean < MANY_CONTACTS:
         return ""
     told = f"{mean:.0f} contacts a grain by geometry ({_sizes(sample)})"
-    return f"{told}: check the units of radius and position"
+    return f"{told}: check the units of radius and position; is the radius a diameter?"
 
 
 def _no_contacts(sample: Sample) -> str:

@@ -145,14 +145,14 @@ class Window:
         if self.shape.reach > MOST_PERIODS * lattice.shortest:
             raise SettingsError(
                 f"the {self} reaches through more than {MOST_PERIODS} periods of the cell "
-                f"({lattice.shortest:g}): choose a smaller one (`rv`, `rv_size`)"
+                f"({lattice.shortest:g}): choose a smaller RV"
             )
         for shift in lattice.within(2.0 * self.shape.reach):
             if self.shape.meets_itself(shift):
                 period = ", ".join(f"{part:.4g}" for part in shift)
                 raise SettingsError(
                     f"the {self} overlaps its own image, ({period}) away in the periodic cell, so "
-                    f"that grains would count twice: choose a smaller one (`rv`, `rv_size`)"
+                    f"that grains would count twice: choose a smaller RV"
                 )
 
     def branches(self, points: FloatArray, packing: Packing) -> FloatArray:

@@ -383,10 +383,10 @@ def _finding(ladder: str, rows: list[StepRow]) -> str:
     variant = rows[0].variant
     own = {row.value: row.alpha_vs_axial or 0.0 for row in rows if row.variant == variant}
     best = max(own, key=lambda value: abs(own[value]))
-    paper = ""
-    if own.get(PAPER_CUTOFF):
-        paper = f"; at the paper's 1 r_min it is {own[PAPER_CUTOFF] / own[best]:.0%} of that"
-    return (
-        f"cut-off: it decides what is measured; in variant {variant} the anisotropy is largest "
-        f"({own[best]:.2g}) at {best:g} r_min{paper}"
-    )
+    paper = ", the paper's"
+    if best != PAPER_CUTOFF:
+        paper = (
+            f"; at the paper's 1 r_min it is {own.get(PAPER_CUTOFF, 0.0) / own[best]:.0%} of that"
+        )
+    largest = f"the anisotropy of variant {variant} is largest ({own[best]:.2g})"
+    return f"cut-off: {largest} at {best:g} r_min{paper}"

@@ -131,6 +131,9 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
     rvs = plan.rvs
     plan = plan.in_frame(frame)
     notes = [*frame.doubts_of_escaped(), *empty_rvs(plan.rvs)]
+    if plan.strains.file is not None and known["strain"] is None:
+        text = f"{settings.strain} has no row for this frame, so its strain is empty"
+        notes.append(Note("no_strain_in_file", text, kind=ScanfabNote))
     if plan.map_blocks is not None:
         rows, told, blocks = map_rows(frame, plan, known, f"frame {number}")
         return FrameResult(source, number, frame, (), rows, (*notes, *told), blocks)
@@ -332,7 +335,7 @@ class VariantColumns:
         if self.measured.segment_count == 0:
             times = self.cutoff / float(sample.packing.radius[sample.grains].min())
             text = f"no void segment reaches the cut-off {self.cutoff:g}, {times:.4g} times the "
-            advice = "choose a shorter one, or a larger RV"
+            advice = "check the radii, or choose a shorter cut-off or a larger RV"
             if times > 5.0:
                 advice = "lengths are in the dump's unit, did you mean 1rmin?"
             return {"cutoff_too_long": f"{text}smallest radius: {advice}"}

@@ -99,7 +99,7 @@ class Frames:
 
     def __init__(self, source: Source, settings: Settings) -> None:
         if isinstance(source, str) or not isinstance(source, Iterable | Packing):
-            expected = "a Packing, a Series or an iterable of packings"
+            expected = "a Packing, a Series (of scanfab.read_series) or an iterable of packings"
             raise SettingsError(f"expected {expected}, found {source!r}")
         self.source: Series | _Stream
         self.settings = settings

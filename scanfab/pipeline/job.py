@@ -206,9 +206,11 @@ class Job:
         """
         assert self.output is not None
         is_table = self.output.is_file() and manifest_of(self.output).is_file()
-        if is_table and not self.resume:
-            what = "the table that is there will be replaced at the end of this run"
-            note(f"{self.output}: {what}; `resume` would go on with it")
+        if self.output.is_file() and not self.resume:
+            what = (
+                f"the {'table' if is_table else 'file'} that is there will be replaced at the end"
+            )
+            note(f"{self.output}: {what} of this run{'; `resume` would go on with it' * is_table}")
         if not (self.resume and self._part.frames):
             self._part.begin(self.asked)
         known = set[Path]()
@@ -261,7 +263,7 @@ class Job:
                     advance()
             except NoChosenFrameError as none:
                 # an array of more jobs than frames has jobs without frames
-                note(f"{str(none).removeprefix('frames: ')}: it has no row in this table")
+                note(f"{str(none).removeprefix('frames: ')}, so the table has no rows of it")
         self.is_over = True
         for one in self.series:
             if isinstance(one, FollowedSeries):

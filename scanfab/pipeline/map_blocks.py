@@ -55,7 +55,7 @@ class MapBlocks(NamedTuple):
     @classmethod
     def of(cls, settings: MapSettings, sample: Sample) -> MapBlocks:
         """
-        Find the region of a map from the first frame that has grains.
+        Find the region of a map from the reference frame.
 
         Raises
         ------

@@ -364,5 +364,5 @@ class VariantMap:
         text = "too few blocks to tell whether the sample is homogeneous"
         if self.at_surface.any():
             text += f": {inner.sum()} of {len(inner)} are neither empty nor at a surface"
-            text += " (choose smaller blocks, or those of the RV with `edge=start`)"
+            text += ' (blocks inside the RV are not: `variants="c"` with `edge="start"`)'
         return Note(HOMOGENEITY, text, (self.variant.name,), ScanfabNote)

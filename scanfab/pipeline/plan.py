@@ -1,4 +1,4 @@
-"""The plan of a series: settings turned into lengths by its first frame that has grains."""
+"""The plan of a series: settings turned into lengths by its reference frame."""
 
 from __future__ import annotations
 
@@ -187,14 +187,14 @@ def unscanned_plan(settings: Settings, sample: Sample | None = None) -> Plan:
 
 def make_plan(settings: Settings, sample: Sample) -> Plan:
     """
-    Make the plan of a series from settings and the first frame that has grains.
+    Make the plan of a series from settings and the reference frame.
 
     Parameters
     ----------
     settings : Settings
         Settings; all later steps use only the plan.
     sample : Sample
-        The first frame that has grains.
+        The reference frame.
 
     Raises
     ------

@@ -41,7 +41,7 @@ def rvs_of(settings: Settings, sample: Sample | None = None) -> tuple[RV, ...]:
     """
     The RVs in ascending order; empty if no variant needs an RV.
 
-    ``sample`` is the first frame that has grains; without it the RVs have no windows.
+    ``sample`` is the reference frame; without it the RVs have no windows.
 
     Raises
     ------
@@ -164,7 +164,7 @@ def doubts_of_rv(window: Window, sample: Sample) -> list[Note]:
 @dataclass(frozen=True, eq=False)
 class Deformation:
     """
-    The affine deformation that an RV follows, relative to the first frame that has grains.
+    The affine deformation that an RV follows, relative to the reference frame.
 
     A point x of that frame lies at o + F (x - o₀) in another frame, with F = H H₀⁻¹. If the RV
     follows the cell, H has the cell's vectors as columns and o is its origin. If it follows

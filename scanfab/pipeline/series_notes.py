@@ -149,13 +149,8 @@ class SeriesNotes:
         clearest = max(rows, key=lambda row: row["alpha_c"] / (row["alpha_c_axial_se"] or np.inf))
         axis = [clearest[f"gc_axis_{name}"] for name in "xyz"]
         near = [name for name, part in zip(AXES, axis, strict=True) if abs(part) > ALONG]
-        where = (
-            f'is along {near[0]}: `axis="{near[0]}"` loads along it'
-            if near
-            else (f"is {spelt_place(axis)}: `axis` can be any direction X,Y,Z")
-        )
-        yield Note(
-            "turned_axis",
-            f"the loading axis is not the axis of the contact fabric, which {where}",
-            kind=ScanfabNote,
-        )
+        major = f'{near[0]}: choose `axis="{near[0]}"`' if near else spelt_place(axis)
+        if not near:
+            major += ': in simple shear `axis="X,Y,Z"` takes the direction of compression'
+        text = f"the loading axis is not the major axis of the contact fabric, {major}"
+        yield Note("turned_axis", text, kind=ScanfabNote)

@@ -81,7 +81,7 @@ class Settings:
     """
     Size of the representative volume (RV), relative to the sample: the radius of a sphere as a
     fraction of half the smallest extent of the grains, the sizes of other shapes as fractions of
-    half the extents. Each of several fractions gives a row of its own, from the same lines.
+    half the extents. `compute` takes several: each gives a row of its own, from the same lines.
     """
     rv_radius: float | None = window(values.parse_radius, metavar="L")
     """Radius of the spherical RV in the dump's units, instead of `rv`."""
@@ -105,9 +105,10 @@ class Settings:
     """
     edge: str = window(default=CLIP, choices=EDGES)
     """
-    How to count void segments that the surface of the RV cuts. clip: their part inside counts;
-    start: their full length counts, one half for each end inside; ends: their part inside and the
-    number of their ends inside count, which corrects for the cut.
+    How to count void segments that the surface of the RV cuts. clip (the paper's): their part
+    inside counts, so mean lengths are a little too small. start: their full length counts, one half
+    for each end inside. ends: their part inside and the number of their ends inside count. Neither
+    start nor ends has this bias.
     """
     variants: str = sample(values.parse_variants, default="abcd", metavar="LETTERS", first=True)
     """
@@ -118,8 +119,8 @@ class Settings:
         values.parse_boundary, default=(), metavar="EXPR", several=True, first=True
     )
     """
-    Which particles are boundary: "type=2", "mask=3,4", "id>=13723". Repeat the option to combine
-    conditions (or); in Python, give a list.
+    Which particles are boundary: "type=2", "mask=3,4", "id>=13723", "id=1..800", "type!=1". Repeat
+    the option to combine conditions (or); in Python, give a list.
     """
     cutoff: Length = scan(values.parse_length, default="1rmin", metavar="L")
     """
@@ -139,7 +140,10 @@ class Settings:
     spacing: Length | None = scan(
         values.parse_spacing, default="auto", metavar="L", choices=("auto",)
     )
-    """Distance between neighbouring scan lines, written as `cutoff` is; auto meets `tolerance`."""
+    """
+    Distance between neighbouring scan lines: a length in the dump's units, or relative to the
+    radii, such as 0.2rmin; auto meets `tolerance`.
+    """
     directions: DirectionRule | None = scan(
         values.parse_directions, default="auto", metavar="N|RULE", choices=DIRECTIONS
     )
@@ -174,7 +178,9 @@ class Settings:
     force exceeds `min_force`.
     """
     min_force: float = sample(values.parse_share, default=0.0)
-    """With `rattlers="force"`: only contacts whose normal force exceeds X times the mean count."""
+    """
+    With `rattlers="force"`: a contact counts only if its normal force exceeds X times the mean.
+    """
     contact_tolerance: float = sample(values.parse_share, default=0.0)
     """
     For contacts found by geometry: two grains touch if their distance is below (r1 + r2)(1 + X).
@@ -192,9 +198,16 @@ class Settings:
     stress, fabric against stress), invariants, harmonics. Several: forces,state.
     """
     strain: str = sample(values.parse_strain, default="auto", choices=STRAIN_MODES, also="FILE.csv")
-    """Where the axial strain comes from; auto: the cell if it is periodic, else the boundary."""
+    """
+    What the axial strain is measured by: the extent of cell, boundary or grains, or FILE.csv with
+    the columns step (or frame) and strain. auto: the cell if it is periodic along the loading axis,
+    else the boundary; without either the strain is empty.
+    """
     frames: slice = reading(parse_frames, metavar="A:B:C", first=True)
-    """Which frames, as a Python slice (default: all)."""
+    """
+    Which frames: a number (0 is the first, -1 the last), or a Python slice such as :10, ::5 or -3:
+    (default: all).
+    """
     reference: int | None = reading(
         optional(whole("the number of a frame, such as 0 or -1", lambda _: True)), metavar="FRAME"
     )
@@ -271,7 +284,7 @@ class Settings:
         Parameters
         ----------
         space : Space
-            Space of the first frame that has grains: only a frame shows that the grains are discs.
+            Space of the reference frame: only a frame shows that the grains are discs.
 
         Returns
         -------

@@ -173,21 +173,21 @@ def is_flipped(cell: Cell | None, before: Cell | None) -> bool:
 
 
 class Strains(NamedTuple):
-    """Reference of the strains of a series: its first frame that has grains, or a file."""
+    """Reference of the strains of a series: its reference frame, or a file."""
 
     mode: str
     """Mode of :func:`axial_length`; unused if there is a file."""
     axis: Vector
     file: FrameFile | None = None
     length: float | None = None
-    """Length L0 in the first frame that has grains, dump's length unit."""
+    """Length L0 in the reference frame, dump's length unit."""
     cell: Cell | None = None
-    """Cell of the first frame that has grains."""
+    """Cell of the reference frame."""
 
     @classmethod
     def of(cls, settings: Settings, first: Sample | None = None) -> Strains:
         """
-        Start from settings and the first frame that has grains, if there is one.
+        Start from settings and the reference frame, if there is one.
 
         Raises
         ------

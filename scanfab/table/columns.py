@@ -52,8 +52,8 @@ EDGE_COLUMNS = (
     Column("left_out", float, "", "share of segments that start leaves out: they leave the sample"),
 )
 SHEAR = (
-    "√(2/3 e:e) of the deviator e of the logarithmic strain since the first frame; empty unless "
-    "the cell is periodic along all its vectors"
+    "√(2/3 e:e) of the deviator e of the logarithmic strain since the reference frame; empty "
+    "unless the cell is periodic along all its vectors"
 )
 SHEAR_STRAIN = Column("shear_strain", float, "", SHEAR)
 # parts of the jackknife, which only errors are made of: the last columns of a table

@@ -126,11 +126,9 @@ def why_not_strain(rows: Rows) -> str | None:
     lacking = _lacking(rows, "strain")
     if not lacking or not numbers_of(rows, "strain"):
         return None
-    instead, cure = abscissa_words(rows), "chooses the length that it is measured by"
-    if strain_column(rows) is not None:
-        instead, cure = "shear_strain", "chooses another length"
-    why = f"because {'; '.join(lacking)}"
-    return f"{instead} is used in place of the axial strain, {why}: `strain` of compute {cure}"
+    instead = abscissa_words(rows) if strain_column(rows) is None else "shear_strain"
+    why = f"is used, because {'; '.join(lacking)}"
+    return f"{instead} {why}: `strain` of compute can measure it by another length"
 
 
 def _lacking(rows: Rows, column: str) -> list[str]:
@@ -144,9 +142,10 @@ def _lacking(rows: Rows, column: str) -> list[str]:
         without = [frame for frame, strain in strains.items() if strain is None]
         known = [strain for strain in strains.values() if strain is not None]
         if without:
-            problems.append(f"{source} has none" + (f" in frame {without[0]}" if known else ""))
+            where = f" in frame {without[0]}" if known else ""
+            problems.append(f"{source} has no axial strain{where}")
         elif len(known) > 1 and max(known) - min(known) < SAME:
-            problems.append(f"{source} has the same in all frames ({known[0]:g})")
+            problems.append(f"the axial strain of {source} is {known[0]:g} in all frames")
     return problems
 
 

@@ -110,9 +110,9 @@ class Look:
     """Number of the frame, counted from 0."""
     sample: Sample
     strain: str
-    """Its strain since the first frame that has grains, in words; empty if it is not known."""
+    """Its strain since the reference frame, in words; empty if it is not known."""
     first: Sample | None
-    """The first frame that has grains, which fixes all lengths of the series."""
+    """The reference frame, which fixes all lengths of the series."""
     plan: Plan | None
     """None if the settings do not fit the series."""
     axis: Vector

@@ -42,7 +42,7 @@ def test_rows_on_one_stream_and_words_on_the_other(calibrate, ask, tmp_path):
     assert list(rows[0]) == [column.name for column in columns_of_fields(StepRow)]
     assert {row["frame"] for row in rows} == {"6"}
     assert figure.stat().st_size > 10_000
-    assert "cut-off: it decides what is measured" in told
+    assert "cut-off: the anisotropy of variant c is largest" in told
     printed = ask(*command_of(told), "--workers", "1", "--frames", "6").rows
     best = [row for row in rows if row["ladder"] == "recommended"]
     for name in ("variant", "alpha_vs_axial", "alpha_vs_axial_se", "segments"):

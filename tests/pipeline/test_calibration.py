@@ -140,8 +140,8 @@ def test_the_sentences_say_what_the_rows_show(found):
     alpha = {row.value: row.alpha_vs_axial for row in ladder(found, "cutoff") if row.alpha_vs_axial}
     best = max(alpha, key=lambda value: abs(alpha[value]))
     assert said["cut-off"] == (
-        f"it decides what is measured; in variant c the anisotropy is largest ({alpha[best]:.2g}) "
-        f"at {best:g} r_min; at the paper's 1 r_min it is {alpha[1.0] / alpha[best]:.0%} of that"
+        f"the anisotropy of variant c is largest ({alpha[best]:.2g}) at {best:g} r_min; "
+        f"at the paper's 1 r_min it is {alpha[1.0] / alpha[best]:.0%} of that"
     )
     assert said["recommended"].startswith("error of the scan ")
 

@@ -72,7 +72,7 @@ def test_a_strain_that_nobody_measures():
 def test_a_loading_axis_across_the_fabric():
     """The bed is stretched along x and z, so that grains touch along y."""
     packing = bed(stretch=(1.15, 1, 1.15))
-    assert any('is along y: `axis="y"`' in one for one in told([packing]))
+    assert any('of the contact fabric, y: choose `axis="y"`' in one for one in told([packing]))
     assert not any("loading axis" in one for one in told([packing], axis="y"))
 
 

@@ -290,7 +290,7 @@ def _facts(look: Look) -> list[tuple[str, str]]:
     smallest = float(radii.min())
     axis = [name for name, part in zip("xyz", look.axis, strict=True) if part == 1.0]
     facts = [
-        ("grains", f"{first.number(first.grains)} in the first frame that has grains"),
+        ("grains", f"{first.number(first.grains)} in the reference frame"),
         ("radii", f"smallest {smallest:.4g}, mean {radii.mean():.4g}, largest {radii.max():.4g}"),
         ("boundary", f"{boundary} particles" if boundary else "none"),
         ("cell", _cell(look.sample.packing.cell)),
@@ -314,7 +314,7 @@ def _facts(look: Look) -> list[tuple[str, str]]:
         )
         now = ""
         if others not in ([], [part]):
-            now = f" in the first frame that has grains, {others[0]} in frame {look.number}"
+            now = f" in the reference frame, {others[0]} in frame {look.number}"
         size = f"{radius:.4g}, {part} of half the sample's smallest extent{now}"
         facts.append(("radius of the RV", f"{size}, {radius / radii.mean():.3g} mean radii"))
     return facts

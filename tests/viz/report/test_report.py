@@ -73,7 +73,7 @@ def test_the_sample_is_told_in_full(page):
         "boundary mask=3 Which particles are boundary",
         "triaxial-spheres-00000006.vtk.gz",
         "sample_data/yade_triaxial: where α vs is largest, its standard error, of scan and",
-        "grains 800 in the first frame",
+        "grains 800 in the reference frame",
         "radii smallest 0.0005042, mean 0.0009907, largest 0.001499",
         "boundary 1000 particles",
         "cell not periodic",
@@ -264,7 +264,7 @@ def test_a_constant_strain_names_no_end(table, plain):
 def test_an_rv_is_told_beside_the_sample_that_it_was_made_for_and_the_one_shown(page, computed):
     """Under the heading of the last frame, in which the sample is shorter."""
     found = re.search(
-        r"0\.7 of half the sample's smallest extent in the first frame that has grains, "
+        r"0\.7 of half the sample's smallest extent in the reference frame, "
         r"([\d.]+) in frame 6,",
         words_of(page),
     )
