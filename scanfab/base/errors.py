@@ -16,8 +16,6 @@ from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 Value = TypeVar("Value")
-SKIPPED = "skipped"
-"""Code of the note about a frame that was skipped because it could not be read."""
 
 
 class ScanfabError(Exception):
@@ -138,5 +136,5 @@ def joined(notes: Iterable[Note]) -> tuple[Note, ...]:
 def tell(notes: Iterable[Note], where: str = "") -> None:
     """Issue a warning for each note; ``where`` names its frame."""
     for note in notes:
-        text = note.told(f"{where} skipped" if note.code == SKIPPED else where)
+        text = note.told(f"{where} skipped" if note.kind is SkippedFrameWarning else where)
         warnings.warn(text, note.kind, stacklevel=3)

@@ -42,24 +42,24 @@ def kind_of(path: Path) -> str | None:
         return None  # opening the path will raise an error that says why
 
 
-def check_file(path: Path, expected: str = "a file", instead: str = "") -> None:
+def check_file(path: Path, is_table: bool = False) -> None:
     """Raise ReadError for a pipe or device; a table may also come from ``<(command)``."""
     kind = kind_of(path)
     passed_on = kind in ("a pipe", "a socket") and os.fspath(path).startswith(INHERITED)
-    if kind is not None and not (passed_on and expected == "a table"):
-        instead = instead or "give - in place of its name, and `format=NAME`"
+    if kind is not None and not (passed_on and is_table):
+        expected, more = ("a table", "") if is_table else ("a file", ", and `format=NAME`")
         raise ReadError(
             f"{path}: is {kind}, expected {expected}: to read what a program writes "
-            f"from standard input, {instead}"
+            f"from standard input, give - in place of its name{more}"
         )
 
 
 def check_folder(path: Path) -> None:
     """Raise SettingsError if a file cannot be written here; pipes and devices can."""
-    if kind_of(path) == "a socket" or path.is_dir():
-        what = "a folder" if path.is_dir() else "a socket"
-        raise SettingsError(f"{path}: is {what}: name a file to write")
-    if kind_of(path) is not None:
+    kind = "a folder" if path.is_dir() else kind_of(path)
+    if kind in ("a folder", "a socket"):
+        raise SettingsError(f"{path}: is {kind}: name a file to write")
+    if kind is not None:
         return
     if not path.parent.is_dir():
         raise SettingsError(f"{path}: there is no folder {path.parent} to write to")

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from scanfab.base.convex import Body, Convex, Quadric, image_of
 from scanfab.base.errors import SettingsError
-from scanfab.base.option import number, numbers
+from scanfab.base.option import number, numbers, unusable
 from scanfab.base.space import SPACE, Space, on_circle, on_sphere
 from scanfab.base.typing import FloatArray, IntArray
 
@@ -27,28 +27,29 @@ class Product(Body):
     """
     The product of a ball or disc of radius 1 and of edges from -1 to 1 along the other axes.
 
-    A cylinder is a disc times an edge; a cube is three edges. ``is_round`` is the number of axes of
-    the round part: 3 for a ball, 2 for a disc, 0 for none.
+    A cylinder is a disc times an edge; a cube is three edges. A ball has 3 round axes, a disc 2.
     """
 
-    def __init__(self, is_round: int, edges: int) -> None:
-        size = is_round + edges
-        axes = np.eye(3)[is_round:size]
+    def __init__(self, round_axes: int, edges: int) -> None:
+        size = round_axes + edges
+        axes = np.eye(3)[round_axes:size]
         planes = np.column_stack([np.concatenate([axes, -axes]), np.ones(2 * edges)])
-        outline = {0: np.zeros((1, 3)), 2: on_circle(), 3: on_sphere()}[is_round]
+        outline = {0: np.zeros((1, 3)), 2: on_circle(), 3: on_sphere()}[round_axes]
         for axis in axes:
             # one copy is reversed, so that the corners of a square follow one another around it
             outline = np.concatenate([outline + axis, outline[::-1] - axis])
-        volume = VOLUME_OF_BALL[is_round] * 2.0**edges
-        form = np.repeat([1.0, 0.0], [is_round, 3 - is_round])
+        volume = VOLUME_OF_BALL[round_axes] * 2.0**edges
+        form = np.repeat([1.0, 0.0], [round_axes, 3 - round_axes])
         super().__init__(outline, planes, volume, form, is_flat=size == 2)
-        self.is_round, self.size = is_round, size
+        self.round_axes, self.size = round_axes, size
 
     def support(self, along: FloatArray) -> FloatArray:
         """The point of the body that lies furthest along each vector, shape (N, 3)."""
         place = np.where(along < 0.0, -1.0, 1.0) * (np.arange(3) < self.size)
-        across = np.linalg.norm(along[:, : self.is_round], axis=1, keepdims=True)
-        place[:, : self.is_round] = along[:, : self.is_round] / np.where(across > 0.0, across, 1.0)
+        across = np.linalg.norm(along[:, : self.round_axes], axis=1, keepdims=True)
+        place[:, : self.round_axes] = along[:, : self.round_axes] / np.where(
+            across > 0.0, across, 1.0
+        )
         return place
 
     def reach(self, frame: FloatArray) -> float:
@@ -57,9 +58,9 @@ class Product(Body):
 
         It is slightly too large for a sheared cylinder, whose axis is not normal to its ends.
         """
-        if not self.is_round:
+        if not self.round_axes:
             return super().reach(frame)
-        ends, axis = frame[:, : self.is_round], frame[:, self.is_round : self.size].sum(axis=1)
+        ends, axis = frame[:, : self.round_axes], frame[:, self.round_axes : self.size].sum(axis=1)
         widest = np.linalg.svd(ends, compute_uv=False)[0]
         square = widest**2 + axis @ axis
         return float(np.sqrt(square + 2.0 * np.linalg.norm(ends.T @ axis)))
@@ -71,16 +72,16 @@ class Product(Body):
         The results are those of :meth:`scanfab.Convex.overlap`. They are products over the factors
         of the body: an edge shares a shorter edge, a disc a lens, and a ball two caps.
         """
-        step = np.abs(shift[:, self.is_round : self.size]).T
+        step = np.abs(shift[:, self.round_axes : self.size]).T
         edge = np.maximum(2.0 - length * step, 0.0)
         shared, slope = [*edge], [*np.where(edge > 0.0, step, 0.0)]
-        across = np.linalg.norm(shift[:, : self.is_round], axis=1)
+        across = np.linalg.norm(shift[:, : self.round_axes], axis=1)
         q = np.minimum(length * across, 2.0)
-        if self.is_round == 2:
+        if self.round_axes == 2:
             chord = np.sqrt(4.0 - q**2)
             shared.append(2.0 * np.arccos(0.5 * q) - 0.5 * q * chord)
             slope.append(across * chord)
-        elif self.is_round == 3:
+        elif self.round_axes == 3:
             shared.append(self.volume * (1.0 - 0.75 * q + q**3 / 16.0))
             slope.append(np.pi * across * (1.0 - 0.25 * q**2))
         others = [np.prod(shared[:i] + shared[i + 1 :], axis=0) for i in range(len(shared))]
@@ -121,7 +122,7 @@ def sphere(radius: float, space: Space = SPACE) -> Convex:
     """
     radius = number("a length above 0", lambda value: 0 < value < math.inf)("radius", radius)
     high = radius * np.diag(space.identity)
-    frame = _frame([radius] * space.dimension, space.basis[: space.dimension], space)
+    frame = _frame("radius", [radius] * space.dimension, space.basis[: space.dimension], space)
     body = DISC if space.is_plane else BALL
     quadric = Quadric(1.0, np.zeros((3, 3)), radius * radius)
     return Convex(np.zeros((0, 4)), quadric, -high, high, radius, f"radius {radius:g}", body, frame)
@@ -152,7 +153,7 @@ def box(
     >>> box([2.0, 3.0, 4.0]).high
     array([1. , 1.5, 2. ])
     """
-    frame, body = _frame(np.multiply(0.5, edges), turn, space), SQUARE if space.is_plane else BLOCK
+    frame, body = _frame("edges", edges, turn, space, 0.5), SQUARE if space.is_plane else BLOCK
     return image_of(body, frame, "box " + " x ".join(f"{edge:g}" for edge in edges))
 
 
@@ -183,18 +184,23 @@ def ellipsoid(
     array([2., 3., 4.])
     """
     name, body = ("ellipse", DISC) if space.is_plane else ("ellipsoid", BALL)
+    frame = _frame("semi_axes", semi_axes, turn, space)
     size = f"{name} of semi-axes {', '.join(f'{axis:g}' for axis in semi_axes)}"
-    return image_of(body, _frame(semi_axes, turn, space), size)
+    return image_of(body, frame, size)
 
 
 def _frame(
-    sizes: Sequence[float] | FloatArray, turn: npt.ArrayLike | None, space: Space
+    name: str,
+    lengths: Sequence[float] | FloatArray,
+    turn: npt.ArrayLike | None,
+    space: Space,
+    scale: float = 1.0,
 ) -> FloatArray:
-    """Columns of the given lengths along the rows of a turn; in a plane, then its normal."""
+    """Columns of the scaled lengths along the rows of a turn; in a plane, then its normal."""
     expected = f"{space.dimension} lengths above 0"
     parse = numbers(expected, lambda every: len(every) == space.dimension and min(every) > 0)
     axes = np.eye(3)[sorted(space.along)] if turn is None else turn
-    rows = np.multiply(np.array(parse("sizes", sizes))[:, None], axes)
+    rows = np.multiply(scale * np.array(parse(name, lengths))[:, None], axes)
     return np.column_stack([*rows, *([space.normal] if space.is_plane else [])])
 
 
@@ -219,12 +225,15 @@ def cylinder(radius: float, height: float, axis: npt.ArrayLike = (0.0, 0.0, 1.0)
     >>> cylinder(1.0, 6.0).high
     array([1., 1., 3.])
     """
+    if not np.linalg.norm(axis) > 0:
+        raise unusable("axis", "a vector that is not 0", axis)
     along = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
     aside = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
     aside /= np.linalg.norm(aside)
     turn = np.array([aside, np.cross(along, aside), along])
     size = f"cylinder of radius {radius:g}, height {height:g}"
-    return image_of(COLUMN, _frame([radius, radius, 0.5 * height], turn, SPACE), size)
+    frame = _frame("radius, height / 2", [radius, radius, 0.5 * height], turn, SPACE)
+    return image_of(COLUMN, frame, size)
 
 
 def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatArray]:

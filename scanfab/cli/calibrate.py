@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import scanfab
-from scanfab.cli.console import announce, draw, is_readable, print_csv, print_rows, working
+from scanfab.cli.console import (
+    announce,
+    digits_of,
+    draw,
+    is_readable,
+    print_csv,
+    print_rows,
+    working,
+)
 from scanfab.cli.options import (
     SourceCommand,
     checked,
@@ -94,14 +102,17 @@ def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
     if not tells_all:
         print_csv(rows, excerpt, columns)
     elif outputs.output is None:
-        _print(rows)
+        if excerpt.fields:
+            print_rows(rows, excerpt.fields, len(excerpt.fields), digits_of(excerpt))
+        else:
+            _print(rows, digits_of(excerpt))
     # if CSV goes to standard output, the findings must not mix with it
     for sentence in (*result.findings, command):
         click.echo(sentence, err=not tells_all)
     return 0
 
 
-def _print(rows: list[StepRow]) -> None:
+def _print(rows: list[StepRow], digits: int) -> None:
     """Print a table for each ladder."""
     steady = {None: "", 0: "no", 1: "yes"}
     for ladder, steps in groupby(rows, key=lambda row: row.ladder):
@@ -115,5 +126,5 @@ def _print(rows: list[StepRow]) -> None:
             }
             for row in steps
         ]
-        print_rows(shown, (CHANGED[ladder], *SHOWN), STAY)
+        print_rows(shown, (CHANGED[ladder], *SHOWN), STAY, digits)
         click.echo()

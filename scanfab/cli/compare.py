@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import scanfab
-from scanfab.cli.console import Command, draw, is_readable, print_csv, print_rows
+from scanfab.cli.console import Command, digits_of, draw, is_readable, print_csv, print_rows
 from scanfab.cli.options import (
     OF_SEVERAL,
-    check_labels,
     excerpt_of,
     options,
     tables_argument,
@@ -71,7 +70,7 @@ def compare(tables: tuple[str, ...], summary: bool, differences: bool, **chosen:
     """
     from scanfab.base.files import refuse_inputs
     from scanfab.pipeline.values import parse_variants
-    from scanfab.table.selection import choose_rows
+    from scanfab.table.selection import check_labels, choose_rows
     from scanfab.table.writing import ALL, write_rows
 
     outputs = take_output(chosen, "table")
@@ -79,8 +78,8 @@ def compare(tables: tuple[str, ...], summary: bool, differences: bool, **chosen:
         raise click.UsageError("--summary and --differences print different tables: choose one")
     if chosen["no_paper_line"] and outputs.plot is None:
         raise click.UsageError("--no-paper-line goes with --plot FILE")
-    check_labels(chosen["labels"], tables)
     with usage_errors():
+        check_labels(chosen["labels"], len(tables))
         variants = parse_variants("variants", chosen["variants"] or "abcd")
         refuse_inputs([outputs.output, outputs.plot], map(Path, tables))
     read = [(table, scanfab.read_rows(table)) for table in tables]
@@ -100,7 +99,9 @@ def compare(tables: tuple[str, ...], summary: bool, differences: bool, **chosen:
     elif is_readable() and not differences and excerpt == ALL:
         print_comparison(comparison)
     elif is_readable():
-        print_rows(shown, excerpt.fields or shown.names, 1, min(excerpt.digits, 5))
+        print_rows(
+            shown, excerpt.fields or shown.names, len(excerpt.fields) or 1, digits_of(excerpt, 5)
+        )
     else:
         print_csv(shown, excerpt, shown.columns)
     draw(outputs, rows, "table", comparison=comparison, paper_line=not chosen["no_paper_line"])

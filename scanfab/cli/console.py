@@ -244,7 +244,7 @@ def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:
 
     shown = [{**row, "total": total_error(row, "alpha_vs_axial")} for row in rows]
     # a terminal shows three digits, unless the user chose another number
-    digits = 3 if excerpt.digits == DEFAULT_DIGITS else excerpt.digits
+    digits = digits_of(excerpt)
     if excerpt.fields:
         print_rows(shown, excerpt.fields, len(excerpt.fields), digits)
     else:
@@ -253,6 +253,11 @@ def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:
         columns = [name for name in SHOWN if name not in same]
         shown = [{**row, "source": names[row["source"]]} for row in shown]
         print_rows(shown, columns, STAY - len(same), digits)
+
+
+def digits_of(excerpt: Excerpt, usual: int = 3) -> int:
+    """The digits that a terminal shows: the user's choice, else a usual number."""
+    return usual if excerpt.digits == DEFAULT_DIGITS else excerpt.digits
 
 
 def print_rows(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from scanfab.cli.options import SourceCommand, checked, in_order, open_series, options
 from scanfab.pipeline.options import MAP_OPTIONS, Output
@@ -38,7 +39,10 @@ def map(sources: tuple[str, ...], frame: int | None, **chosen: Any) -> int:
             if len(series) and (space := series[0].read().space).is_plane:
                 raise click.UsageError(f"a map needs spheres, but all grains are discs in {space}")
     if frame is not None:
-        if chosen["frames"] is not None:
+        ctx = click.get_current_context()
+        if ctx.get_parameter_source("frames") is ParameterSource.COMMANDLINE:
             raise click.UsageError("--frame and --frames choose frames in two ways: name one")
+        # --frame overrides frames of the settings file
+        ctx.set_parameter_source("frames", ParameterSource.COMMANDLINE)
         chosen["frames"] = str(frame)
     return write_table(sources, chosen, MapSettings, frame)

@@ -215,13 +215,6 @@ def tables_argument(**more: Any) -> Callable[[Function], Function]:
     return click.argument("tables", metavar="TABLE...", nargs=-1, required=True, type=a_table)
 
 
-def check_labels(labels: tuple[str, ...], tables: tuple[Any, ...]) -> None:
-    """Raise a usage error unless there is one label for each table, or none at all."""
-    if len(labels) not in (0, len(tables)):
-        expected = f"expected one per table: {len(tables)}"
-        raise click.UsageError(f"--label: {expected}, found {len(labels)}")
-
-
 def _expanded(
     ctx: click.Context, parameter: click.Parameter, sources: tuple[str, ...]
 ) -> tuple[str, ...]:

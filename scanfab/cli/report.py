@@ -10,7 +10,7 @@ import click
 
 import scanfab
 from scanfab.cli.console import Command, announce, working
-from scanfab.cli.options import OF_SEVERAL, check_labels, options, tables_argument, usage_errors
+from scanfab.cli.options import OF_SEVERAL, options, tables_argument, usage_errors
 
 
 @click.command(cls=Command)
@@ -30,10 +30,11 @@ def report(tables: tuple[Path, ...], output: Path, author: str | None, **chosen:
     come from TABLE.manifest.json beside it; without this file the report says they are unknown.
     """
     from scanfab.base.files import refuse_inputs
+    from scanfab.table.selection import check_labels
     from scanfab.viz.report.page import check_page_file
 
-    check_labels(chosen["labels"], tables)
     with usage_errors():
+        check_labels(chosen["labels"], len(tables))
         check_page_file(output)
         refuse_inputs([output], tables)
     announce()

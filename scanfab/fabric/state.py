@@ -108,7 +108,8 @@ class State:
             along = float(measured.axis @ state.stress @ measured.axis)
             less = state.space.dimension / (state.space.dimension - 1.0)
             row |= {f"stress_{part}": float(state.stress[at]) for part, at in COMPONENTS.items()}
-            row |= {"p": state.mean_stress, "q": less * (along - state.mean_stress)}
+            mean = float(np.trace(state.stress)) / state.space.dimension
+            row |= {"p": mean, "q": less * (along - mean)}
         return row | _against_stress(measured, state)
 
 

@@ -24,7 +24,7 @@ from scanfab.pipeline.tolerance import missing_work, variant_errors
 from scanfab.pipeline.values import SHAPES, Length
 from scanfab.scan.directions import direction_rule, rule_of, usual_rule
 from scanfab.table.plots import Plots
-from scanfab.table.row import Record
+from scanfab.table.row import DataclassRow
 
 LOGGER = logging.getLogger("scanfab")
 
@@ -50,7 +50,7 @@ PAPER = {"spacing": " (the paper: 0.1)", "rv": " (the paper: 0.67 to 0.7)"}
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class StepRow(Record):
+class StepRow(DataclassRow):
     """One step of a ladder for one variant; lengths in the dump's unit."""
 
     source: Annotated[str, "the series as given"]

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from scanfab.base.errors import (
-    SKIPPED,
     Note,
     PackingError,
     ReadError,
@@ -383,4 +382,4 @@ def _result(executor: Executor, job: _Job, future: Future[_Computed], skips: boo
         if not skips or not isinstance(error, PackingError | ReadError | DeadWorkersError):
             raise error from None
         text = str(error).removeprefix(f"{job}: ")
-        return _Computed(job.number, [], [Note(SKIPPED, text, kind=SkippedFrameWarning)])
+        return _Computed(job.number, [], [Note("skipped", text, kind=SkippedFrameWarning)])

@@ -11,7 +11,6 @@ from itertools import count, islice
 from typing import Any
 
 from scanfab.base.errors import (
-    SKIPPED,
     NoReferenceError,
     Note,
     PackingError,
@@ -217,7 +216,7 @@ class Frames:
         except (PackingError, ReadError) as error:
             if self.settings.on_error == "stop":
                 raise
-            tell([Note(SKIPPED, str(error), kind=SkippedFrameWarning)], f"frame {number}")
+            tell([Note("skipped", str(error), kind=SkippedFrameWarning)], f"frame {number}")
             return None
 
     def check_boundary(self, first: Sample) -> list[Note]:

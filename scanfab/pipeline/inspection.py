@@ -19,11 +19,11 @@ from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import Frames, sample_of
 from scanfab.pipeline.rv import rvs_of
 from scanfab.pipeline.settings import Settings
-from scanfab.table.row import Record
+from scanfab.table.row import DataclassRow
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class FrameReport(Record):
+class FrameReport(DataclassRow):
     """One frame as the reader sees it; lengths in the dump's unit."""
 
     source: Annotated[str, "the series as given"]

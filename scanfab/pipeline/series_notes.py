@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.errors import SKIPPED, Note, ScanfabNote, tell
+from scanfab.base.errors import Note, ScanfabNote, SkippedFrameWarning, tell
 from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray
 from scanfab.packing.bodies import Grouping, regrouped
@@ -80,14 +80,14 @@ class SeriesNotes:
         self._frames.append(number)
         for note in found:
             _, places = self._held.setdefault((note.code, note.variants), (note, []))
-            if not places or note.code == SKIPPED:
+            if not places or note.kind is SkippedFrameWarning:
                 tell([note], f"frame {number}")
             places.append(len(self._frames) - 1)
 
     def ranges(self) -> Iterator[tuple[Note, str]]:
         """The notes that hold for several frames, in short, and these frames in words."""
         for note, places in self._held.values():
-            if len(places) > 1 and note.code != SKIPPED:
+            if len(places) > 1 and note.kind is not SkippedFrameWarning:
                 # consecutive places have the same difference to their number in the list
                 runs = (
                     [self._frames[place] for _, place in run]

@@ -320,10 +320,10 @@ def _fit(x: FloatArray, y: FloatArray) -> tuple[float | None, float | None, floa
         return None, None, None
     origin = float(x @ y / (x @ x)) if np.any(x != 0) else None
     dx, dy = x - x.mean(), y - y.mean()
-    if not np.any(dx != 0):
+    if np.ptp(x) == 0:  # dx may be rounding
         return None, origin, None
     slope = float(dx @ dy / (dx @ dx))
-    r2 = float((dx @ dy) ** 2 / ((dx @ dx) * (dy @ dy))) if np.any(dy != 0) else None
+    r2 = float((dx @ dy) ** 2 / ((dx @ dx) * (dy @ dy))) if np.ptp(y) > 0 else None
     return slope, origin, r2
 
 

@@ -86,6 +86,8 @@ class SeparatedText(OwnFormat):
         rows = []
         try:
             names = next(lines, [])
+            if len({*names}) < len(names):
+                raise csv.Error("two columns have the same name")
             for line in filter(None, lines):
                 if len(line) != len(names):
                     expected = f"expected {counted(len(names), 'cell')} as in line 1"
@@ -290,7 +292,7 @@ def read_rows(path: Path | str, *, whole: bool = False) -> list[dict[str, Any]]:
     >>> rows[0]["contacts"]
     2076
     """
-    check_file(Path(path), "a table", "give - in place of its name")
+    check_file(Path(path), is_table=True)
     try:
         data = sys.stdin.buffer.read() if str(path) == "-" else Path(path).read_bytes()
     except OSError as error:

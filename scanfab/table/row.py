@@ -41,7 +41,7 @@ OFTEN_SAME = ("source", "strain", "shear_strain", "cutoff")
 MOST_COLUMNS, ENDS = 8, 5
 
 
-class Record(Mapping[str, Any]):
+class DataclassRow(Mapping[str, Any]):
     """Base class of dataclasses that are rows: their fields are the columns."""
 
     __slots__ = ()
@@ -91,7 +91,7 @@ class Row(Mapping[str, Any]):
     __slots__ = ("_values",)
     _values: dict[str, Any]
 
-    def __init__(self, **values: Any) -> None:
+    def __init__(self, /, **values: Any) -> None:
         self._values = values
 
     def __getitem__(self, name: str) -> Any:

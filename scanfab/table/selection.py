@@ -19,7 +19,7 @@ Rows = list[dict[str, Any]]
 NEEDED = ("source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_c_axial")
 NUMBERS = tuple(name for name, kind in KINDS.items() if kind in (int, float))
 # a column that only tables of maps have
-MAP = "at_surface"
+MAP = "block"
 # columns that show that a table is no fabric table, with a name for such a table
 OTHER_TABLES = {
     "alpha_vs_axial_norm": "a table of scanfab compare",
@@ -67,10 +67,7 @@ def choose_rows(
     [('new', 2.0)]
     """
     named = [(str(name), [dict(row) for row in rows]) for name, rows in tables]
-    if labels and len(labels) != len(named):
-        expected = "one name for each table, in the same order"
-        found = f"{len(labels)} for {len(named)}"
-        raise SettingsError(f"labels: expected {expected}: found {found}")
+    check_labels(labels, len(named))
     for number, (name, rows) in enumerate(named):
         check_rows(rows, name)
         if cutoff is not None:
@@ -82,6 +79,13 @@ def choose_rows(
                 row["source"] = f"{label}, {row['source']}" if several else label
         return [rows for _, rows in named]
     return _each_once(named)
+
+
+def check_labels(labels: Sequence[str] | None, tables: int) -> None:
+    """Raise SettingsError unless there is one label for each table, or none at all."""
+    if isinstance(labels, str) or len(labels or ()) not in (0, tables):
+        found = repr(labels) if isinstance(labels, str) else len(labels or ())
+        raise SettingsError(f"labels: expected one per table: {tables}, found {found}")
 
 
 def check_rows(rows: Sequence[Mapping[str, Any]], table: str = "") -> None:
@@ -106,8 +110,8 @@ def check_rows(rows: Sequence[Mapping[str, Any]], table: str = "") -> None:
         wrong += [(name, "a number") for name in numbers if not is_number(row[name])]
         if not wrong and (row["frame"] is None or row["frame"] % 1 != 0):
             wrong = [("frame", "a whole number")]
-        for name, expected in wrong:
-            found = reprlib.repr(row[name])
+        if wrong:
+            (name, expected), found = wrong[0], reprlib.repr(row[wrong[0][0]])
             raise SettingsError(f"{where}{name}: expected {expected}, found {found}")
 
 

@@ -19,6 +19,7 @@ from scanfab.table.columns import MORE_COLUMNS, table_columns
 from scanfab.table.formats import data_frame, read_rows
 from scanfab.table.plots import Plots
 from scanfab.table.row import Row, as_html, as_text
+from scanfab.table.selection import MAP
 from scanfab.table.writing import Excerpt, plain, write_rows
 
 if TYPE_CHECKING:
@@ -139,7 +140,7 @@ class Table(Sequence[Row]):
     @property
     def plot(self) -> Plots:
         """Figures of the table: ``table.plot.evolution(ax=ax)`` draws one on given Axes."""
-        return Plots(self, "map" if "block" in self.names else "table")
+        return Plots(self, "map" if MAP in self.names else "table")
 
     def select(self, **wanted: Any) -> Table:
         """

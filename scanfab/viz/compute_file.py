@@ -117,6 +117,10 @@ def compute_file(
     refuse_unknown("compute_file", options, known)
     if kind is Settings:
         options = {name: value for name, value in options.items() if name not in BLOCK_OPTIONS}
+    if vtk is not None and executor is not None:
+        raise SettingsError(
+            "vtk: files for ParaView cannot be written with `executor`: leave out one"
+        )
     with listening() as told:
         series = _opened(source, options)
         settings = kind(**options)
@@ -179,7 +183,8 @@ def vtk_folders(
         raise SettingsError("vtk: files for ParaView are of one cut-off: leave out `cutoffs`")
     for source in chain.from_iterable(one.sources for one in series):
         # the next run would take the files for dumps
-        if Path(source).resolve() == folder.resolve():
+        place = Path(source) if Path(source).is_dir() else Path(source).parent
+        if source != "-" and place.resolve() == folder.resolve():
             raise SettingsError(f"vtk: {folder} holds the dumps: name another folder")
     several = [folder / f"series-{number}" for number in range(1, len(series) + 1)]
     go_on = resumed is not None and (resumed.exists() or part_of(resumed).exists())

@@ -156,7 +156,7 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
         scene = about_window(replace(scene, cutoff=plan.cutoff))
     strains = _strains(frame.number, sample, first, settings)
     column = frame_strain_column(strains)
-    if all(value is not None and abs(value) < SAME for value in strains.values()):
+    if strains and all(value is not None and abs(value) < SAME for value in strains.values()):
         # at zero strain, the last frame tells which of the strains tells the frames apart
         for last_number, last in reversed(list(frames)):
             with suppress(PackingError, ReadError):

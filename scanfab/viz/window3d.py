@@ -187,15 +187,19 @@ def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) 
 
 def _add_lines(plotter: Any, scene: Scene) -> dict[str, str]:
     """Draw void segments as tubes; gives back names of the legend with their colours."""
-    lines = scene.lines
+    lines, names = scene.lines, dict[str, str]()
     assert lines is not None
     kept = lines.void & (lines.length >= scene.cutoff)
     thickness = 0.14 * float(scene.grains.radius[~scene.grains.boundary].mean())
-    for chosen, colour in ((kept, "black"), (lines.void & ~kept, "vermilion")):
+    for name, chosen, colour in (
+        ("void segment kept", kept, COLOURS["black"]),
+        ("dropped", lines.void & ~kept, COLOURS["vermilion"]),
+    ):
         if chosen.any():
             tubes = lines_mesh(lines.ends[chosen]).tube(radius=thickness)
-            plotter.add_mesh(tubes, color=COLOURS[colour], lighting=False)
-    return {"void segment kept": COLOURS["black"], "dropped": COLOURS["vermilion"]}
+            plotter.add_mesh(tubes, color=colour, lighting=False)
+            names[name] = colour
+    return names
 
 
 def aim(

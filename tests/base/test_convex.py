@@ -102,8 +102,14 @@ def test_a_sphere_has_a_radius_above_0(radius):
 @pytest.mark.parametrize("sizes", [(0, 1, 1), (1, 1), (1, 2, math.nan), (-1, 2, 3)])
 @pytest.mark.parametrize("shape", [box, ellipsoid])
 def test_a_box_and_an_ellipsoid_have_three_sizes_above_0(shape, sizes):
-    with pytest.raises(SettingsError, match="sizes: expected 3 lengths above 0, found"):
+    name = "edges" if shape is box else "semi_axes"
+    with pytest.raises(SettingsError, match=f"{name}: expected 3 lengths above 0, found"):
         shape(sizes)
+
+
+def test_a_cylinder_has_an_axis():
+    with pytest.raises(SettingsError, match="axis: expected a vector that is not 0"):
+        cylinder(1.0, 2.0, (0, 0, 0))
 
 
 SINE = np.sqrt(1 - (AXES @ TURN[0]) ** 2)

@@ -8,7 +8,7 @@ from typing import Annotated
 import pytest
 
 from scanfab.base.column import LENGTH, Column, NoColumnError, columns_of_fields
-from scanfab.base.errors import SKIPPED, Note, SettingsError, SkippedFrameWarning, joined, tell
+from scanfab.base.errors import Note, SettingsError, SkippedFrameWarning, joined, tell
 from scanfab.base.option import number, one_of, option, optional, options_of, takes_options, whole
 
 
@@ -99,4 +99,4 @@ def test_without_a_place_it_says_the_sentence_alone():
 
 def test_a_frame_that_was_left_out_is_a_warning_of_its_kind():
     with pytest.warns(SkippedFrameWarning, match="frame 1 skipped: dump: no grains"):
-        tell([Note(SKIPPED, "dump: no grains", kind=SkippedFrameWarning)], "frame 1")
+        tell([Note("skipped", "dump: no grains", kind=SkippedFrameWarning)], "frame 1")

@@ -66,6 +66,8 @@ def test_tables_on_a_terminal_are_not_cut(calibrate, monkeypatch, width):
     present = [title in heads[0] for title in ("time", "rule", "segments", "bias")]
     assert present == sorted(present, reverse=True)
     assert all(present) == (width == 160)
+    head = calibrate(TRIAXIAL, *QUICK, "--fields", "ladder,value").out.splitlines()[0]
+    assert head.split() == ["ladder", "value"]
 
 
 def test_with_a_file_the_words_are_the_output(calibrate, cube, tmp_path):

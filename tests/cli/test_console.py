@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+import scanfab
 from scanfab.cli.compare import print_comparison
 from scanfab.cli.console import OFTEN_SAME, SHOWN, STAY, print_table
 from scanfab.io.reader import installed_readers
@@ -148,3 +149,9 @@ def test_merged_tables_and_differences_are_shown_as_tables(ask, series, tmp_path
         assert len(lines) > 5
         assert not any("," in line for line in lines)
         assert command[0] != "merge" or max(map(len, lines)) <= 100
+    asked = ("--fields", "source,frame,variant,alpha_vs_axial", "--digits", "8")
+    head, row, *_ = ask("compare", tmp_path / "t.csv", *asked).out.splitlines()
+    assert heads(head) == ["source", "frame", "variant", "α_vs axial"]
+    assert float(row.split()[-1]) == pytest.approx(
+        scanfab.load(tmp_path / "t.csv")[0].alpha_vs_axial, rel=1e-7
+    )

@@ -5,6 +5,7 @@ import pyvista
 
 import scanfab
 from scanfab.cli.main import run
+from tests.helpers.dumps import write
 from tests.helpers.interruptions import interrupted_at_row
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--workers", "1")
@@ -42,6 +43,14 @@ def test_it_is_drawn_and_written_for_paraview(table):
     assert mesh.cell_data["alpha_vs_axial"].tolist() == pytest.approx(fabric)
     # blocks are where their rows say they are
     assert mesh.cell_centers().points[:, 0].tolist() == pytest.approx([row.x for row in rows])
+
+
+def test_a_frame_on_the_command_line_overrides_frames_of_the_settings_file(
+    series, tmp_path, monkeypatch, ask
+):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "scanfab.toml", '[compute]\nframes = "0:2"\n')
+    assert {row["frame"] for row in ask("map", series, *FAST, *GRID, "--frame", "3").rows} == {"3"}
 
 
 def test_a_run_that_was_stopped_goes_on_but_not_with_other_blocks(

@@ -82,7 +82,12 @@ def test_what_is_not_there_cannot_be_measured(periodic, options, message):
 def test_a_file_names_strains_by_step_or_frame(tmp_path, text, expected):
     frames = [frame(1.0, 1.0, step=step) for step in (0, 1000, None)]
     file = write(tmp_path / "s.csv", text)
-    found = compute(frames, strain=file, **SCAN)["strain"]
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        found = compute(frames, strain=file, **SCAN)["strain"]
+    assert any("has no row for this frame" in str(one.message) for one in told) == (
+        np.nan in expected
+    )
     np.testing.assert_array_equal(found, expected)
 
 

@@ -42,6 +42,12 @@ def test_slopes_are_those_of_least_squares():
     assert (row.peak, row.peak_strain, row.final) == (-0.05, 0.02, -0.03)
 
 
+def test_contacts_that_are_the_same_in_all_frames_give_no_slope():
+    """Their mean differs from them by rounding, which is no trend."""
+    rows = [{**row, "alpha_c_axial": 0.1} for row in curve()]
+    assert summary_of(rows[:3]).slope is None
+
+
 def test_parts_of_a_series_may_be_given_in_any_order():
     rows = curve()
     assert compare_tables([*rows[3:], *rows[:3]]).summary[0] == compare_tables(rows).summary[0]

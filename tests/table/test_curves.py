@@ -206,7 +206,7 @@ REFUSED = [
     *((OF_CUTOFFS, {"cutoff": c}, "0, 0.0008, 0.0016") for c in (8.1e-4, 1.0, -1, math.nan)),
     (curve(), {"cutoff": 1.0}, "none in this table"),
     *(
-        (curve(), {"labels": names}, f"found {len(names)} for 1")
+        (curve(), {"labels": names}, f"one per table: 1, found {len(names)}")
         for names in (["a", "b"], [*"abc"])
     ),
 ]

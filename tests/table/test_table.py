@@ -180,6 +180,9 @@ def test_a_table_with_other_columns_keeps_them(tmp_path):
     (tmp_path / "t.csv").write_text("frame,strain\n0.0,0.1\n1,no\n")
     found = [Row(frame=0.0, strain="0.1"), Row(frame=1.0, strain="no")]
     assert list(load(tmp_path / "t.csv")) == found
+    (tmp_path / "t.csv").write_text("frame,frame\n1,2\n")
+    with pytest.raises(ReadError, match="two columns have the same name"):
+        load(tmp_path / "t.csv")
     (tmp_path / "t.json").write_text('[{"frame": 1' + 400 * "0" + "}]")
     with pytest.raises(
         ReadError, match=r"t.json: frame: no column can hold values of so different kinds"

@@ -211,6 +211,7 @@ def test_what_cannot_be_resumed_names_arguments(short_series, tmp_path):
         ({"output": "table.doc"}, scanfab.SettingsError, "results can be written as .csv"),
         ({"manifest": "none/here.json"}, scanfab.SettingsError, "none"),
         ({"vtk": "v", "cutoff": "1rmin", "cutoffs": "1,2"}, scanfab.SettingsError, "one cut-off"),
+        ({"vtk": "v", "executor": object()}, scanfab.SettingsError, "cannot be written with"),
         ({"source": [3]}, scanfab.SettingsError, "expected a Series or the path of dumps"),
         ({"source": scanfab.Packing([[0, 0, 0]], 1.0)}, scanfab.SettingsError, r"save\(\)"),
     ],

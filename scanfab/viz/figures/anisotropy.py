@@ -78,7 +78,7 @@ class Evolution(Curves):
         if self.share:
             label, factor = f"{NAMES[column]} / largest", 1.0
         bars = voids and not self.turned and not self.share
-        return Quantity(column, label, factor, "" if self.turned else "total", bars)
+        return Quantity(column, label, factor, not self.turned, bars)
 
     @property
     def size(self) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -117,8 +117,8 @@ class Quantity(NamedTuple):
     column: str
     label: str
     factor: float = 1.0
-    errors: Literal["total", "column", ""] = ""
-    """Errors of the band: scan and sample together, or the column ``NAME_se``, if there is one."""
+    total: bool = False
+    """Whether the band is the error of scan and sample together, not the column ``NAME_se``."""
     bars: bool = False
     """Whether bars show the scan's part of the errors, from the column ``NAME_se``."""
     smallest: float = 1.0
@@ -126,8 +126,8 @@ class Quantity(NamedTuple):
 
     def errors_of(self, curve: Curve) -> FloatArray:
         """The standard errors of a curve, shape (F,); NaN where there is none."""
-        is_total, name = self.errors == "total", self.column
-        return curve.total_errors(name) if is_total else curve.errors(f"{name}_se")
+        name = self.column
+        return curve.total_errors(name) if self.total else curve.errors(f"{name}_se")
 
 
 class Curves(Figure):
@@ -142,6 +142,8 @@ class Curves(Figure):
     """Panels in a row at most."""
     share: ClassVar[bool] = False
     """Whether each curve is divided by its own largest absolute value."""
+    from_zero: ClassVar[bool] = True
+    """Whether each panel shows the zero."""
 
     def __init__(self, data: Table, quantities: Sequence[Quantity]) -> None:
         super().__init__(data)
@@ -206,7 +208,7 @@ class Curves(Figure):
                 axes.errorbar(x, factor * values, np.nan_to_num(bars), fmt="none", **look)
         axes.set_ylabel(quantity.label)
         low, high = axes.get_ylim()
-        if quantity.errors != "column" or low < 0 < high:
+        if self.from_zero or low < 0 < high:
             axes.axhline(0, color="0.6", lw=0.6, zorder=0)
         widen(axes, quantity.smallest)
 
@@ -261,10 +263,11 @@ class Columns(Curves):
     order = 4
     columns = ("variant", "alpha_vs_axial", "strain")
     across = 2
+    from_zero = False
 
     def __init__(self, data: Table, of: str | Sequence[str] | None = None) -> None:
         self.names = _named(data, of)
-        panels = [Quantity(one, plain(one), errors="column", smallest=1e-12) for one in self.names]
+        panels = [Quantity(one, plain(one), smallest=1e-12) for one in self.names]
         super().__init__(data, panels)
 
     @classmethod

@@ -23,8 +23,8 @@ from scanfab.viz.figures.style import FRAME_LOOKS, LABELS, WIDTH, band
 
 # Quantities with total errors are signed: zero is in the middle of their colours.
 QUANTITIES = (
-    Quantity("alpha_vs_axial", LABELS["alpha_vs_axial"], 1e3, "total"),
-    Quantity("alpha_c_axial", LABELS["alpha_c_axial"], 1e2, "total"),
+    Quantity("alpha_vs_axial", LABELS["alpha_vs_axial"], 1e3, True),
+    Quantity("alpha_c_axial", LABELS["alpha_c_axial"], 1e2, True),
     Quantity("mean_length", "mean length\n(dump's unit)"),
     Quantity("solid_fraction", "solid fraction"),
     Quantity("coordination", "coordination"),
@@ -74,6 +74,8 @@ class Map(Figure):
         if not self.quantities:
             none = f"no block of variant {self.variant} has {quantity or 'a value'}"
             raise SettingsError(f"there is nothing to draw: {none}")
+        self.is_profile = self.rows[0].get("r_outer") is not None or _is_line(self.frames[-1])
+        """Whether blocks follow one another along a line, or about a centre."""
 
     @cached_property
     def frames(self) -> list[list[Any]]:
@@ -84,14 +86,6 @@ class Map(Figure):
         drawn = [one.column for one in self.quantities]
         every = [rows for rows in found.values() if any(numbers_of(rows, name) for name in drawn)]
         return every if len(every) == 1 else [every[0], every[-1]]
-
-    @cached_property
-    def is_profile(self) -> bool:
-        """Whether blocks follow one another along a line, or about a centre."""
-        if self.rows[0].get("r_outer") is not None:
-            return True
-        number, _ = lattice_of(_middles(self.frames[-1]))
-        return int((number.max(axis=0) > 0).sum()) < 2
 
     @property
     def size(self) -> tuple[float, float]:
@@ -167,7 +161,7 @@ class Map(Figure):
             legend = SURFACE if rows is self.frames[-1] and outer.any() else None
             axes.plot(place[outer], every[outer], label=legend, zorder=0, **grey)
             axes.set(xlabel=label, ylabel=one.label)
-        if one.errors == "total":
+        if one.total:
             axes.axhline(0, color="0.6", lw=0.6, zorder=0)
 
     def _draw_plane(self, axes: Axes, one: Quantity, axis: int) -> Any:
@@ -190,7 +184,7 @@ class Map(Figure):
         x, y = places[..., across], places[..., up]
         # the colours hold for all blocks, which may have no value where another frame has some
         known = values[np.isfinite(values)] if np.isfinite(values).any() else np.zeros(1)
-        signed = one.errors == "total"
+        signed = one.total
         largest = float(np.abs(known).max()) or 1.0
         ends = (
             (-largest, largest) if signed else AutoLocator().nonsingular(known.min(), known.max())
@@ -208,6 +202,11 @@ class Map(Figure):
         # a narrow panel has no room for many digits
         axes.ticklabel_format(style="sci", scilimits=(-1, 3))
         return drawn
+
+
+def _is_line(rows: Sequence[Any]) -> bool:
+    number, _ = lattice_of(_middles(rows))
+    return int((number.max(axis=0) > 0).sum()) < 2
 
 
 def _middles(rows: Sequence[Any]) -> FloatArray:
@@ -254,6 +253,8 @@ def lattice_of(middles: FloatArray) -> tuple[IntArray, FloatArray]:
         step = rest[1] - rest[0]
         off = np.linalg.norm(np.diff(rest, axis=0) - step, axis=1) > 0.01 * np.linalg.norm(step)
         count = int(np.argmax(off)) + 1 if off.any() else len(rest)
+        if not free:
+            raise SettingsError("figure map: the blocks are no whole grid: rows are missing")
         axis = max(free, key=lambda one: abs(float(step[one])))
         free.remove(axis)
         numbers[:, axis] = np.arange(len(middles)) // stride % count

@@ -84,6 +84,7 @@ class Histogram(OnePanel):
         edges, frames = np.linspace(0, longest, 41), self.chosen(self.data.frames)
         for frame, length, look in zip(frames, self.lengths, style.FRAME_LOOKS, strict=False):
             density, _ = np.histogram(length, edges, density=True)
+            # in a later frame the smallest grain may be another one; the last cut-off is drawn
             cutoff = frame.measurement.plan.cutoff / frame.smallest
             label = f"{frame.title}:\n{100 * np.mean(length < cutoff):.0f} % dropped"
             line: dict[str, Any] = {"color": look["color"], "ls": look["ls"], "lw": 1.1}

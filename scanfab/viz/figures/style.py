@@ -88,7 +88,7 @@ STYLE: Any = {
     "lines.linewidth": 1.1,
     "lines.markersize": 3.5,
     "errorbar.capsize": 1.5,
-    # the same input gives the same bytes
+    # the same input gives the same names inside the file
     "svg.hashsalt": "scanfab",
     # whole fonts, as publishers want them
     "pdf.fonttype": 42,
@@ -116,7 +116,7 @@ def new_figure(width: float, height: float) -> Iterator[Figure]:
 
 def figure_bytes(figure: Figure, kind: str, dpi: int = DPI) -> bytes:
     """A figure as ``png``, ``svg`` or ``pdf``; no file is made."""
-    # without a date, the same input gives the same bytes
+    # no date, so that the same input gives the same figure
     date: Any = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
     drawn = BytesIO()
     figure.savefig(drawn, format=kind, dpi=dpi, metadata=date)

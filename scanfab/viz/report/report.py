@@ -24,7 +24,7 @@ from scanfab.table.compare import compare_tables
 from scanfab.table.curves import spelt_strain, strain_column
 from scanfab.table.formats import read_rows
 from scanfab.table.row import numbers_of
-from scanfab.table.selection import MAP, choose_rows
+from scanfab.table.selection import MAP, check_labels, choose_rows
 from scanfab.viz.figures.figure import make_figures
 from scanfab.viz.report import tables as words
 from scanfab.viz.report.page import Picture, check_page_file, picture_of, render_page, view_data
@@ -199,6 +199,7 @@ def read_inputs(
     ScanfabError
         If one cannot be read or is neither a fabric table nor a map, or if no table has a row.
     """
+    check_labels(labels, len(tables))
     read, of_frames = [], []
     for path in tables:
         # tables may lack the columns of source and strain

@@ -17,6 +17,7 @@ from scanfab.scan.directions import direction_rule
 from scanfab.table.curves import STRAINS, is_turned, spelt_strain, strain_column
 from scanfab.table.row import Row as TableRow
 from scanfab.table.row import groups_of, number_of, numbers_of, total_error, variant_of, with_error
+from scanfab.table.selection import MAP
 
 Row = Mapping[str, Any]
 
@@ -92,7 +93,7 @@ def overview(table: Path, rows: Sequence[Row]) -> str:
         }
         each = ", ".join(f"{number} in {variant}" for variant, number in grains.items())
         same = len(set(grains.values())) == 1
-        where = " a block" if "block" in rows[0] else ""
+        where = " a block" if MAP in rows[0] else ""
         parts.append(f"{next(iter(grains.values()))} grains{where}" if same else f"grains: {each}")
     if column is not None:
         parts.append(f"{STRAINS[column][0]} {_span(rows, column, '.3g', 100)} %")

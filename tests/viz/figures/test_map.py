@@ -50,6 +50,12 @@ def test_a_cell_that_leans_more_than_it_is_high_has_all_its_blocks():
     np.testing.assert_allclose(steps, edges / 2)
 
 
+def test_a_grid_without_one_of_its_blocks_is_refused(packing):
+    rows = [row for row in mapped(packing, grid=(3, 3, 3)) if row.block != 13]
+    with pytest.raises(scanfab.SettingsError, match="rows are missing"):
+        Map(rows)
+
+
 def test_frames_without_grains_are_not_drawn(packing):
     nothing = Packing(np.zeros((0, 3)), 1.0, contacts=np.zeros((0, 2), int), cell=packing.cell)
     for blocks in ({"grid": (2, 2, 2)}, {"slices": 2}, {"shells": 2}):

@@ -133,8 +133,10 @@ def test_maps_beside_tables_have_no_labels_and_need_their_columns(table, tmp_pat
     labels = ["--label", "sheared", "--label", "by place"]
     assert run(["report", *words, *labels, "-o", str(tmp_path / "r.html")]) == 0
     assert "sheared" in words_of((tmp_path / "r.html").read_text("utf-8"))
+    with pytest.raises(SettingsError, match="labels: expected one per table: 1, found 2"):
+        make_report(words[:1], labels=["sheared", "by place"])
     for row in rows:
-        del row["variant"], row["alpha_vs_axial"]
+        del row["variant"], row["alpha_vs_axial"], row["at_surface"]
     lack = r"map\.jsonl: the map lacks the columns variant, alpha_vs_axial"
     with pytest.raises(SettingsError, match=lack):
         make_report([table(rows, "map.jsonl")])
