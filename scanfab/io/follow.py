@@ -14,7 +14,7 @@ from typing import Any
 from scanfab.base.errors import Note, PackingError, ReadError, collected, tell, warn
 from scanfab.base.option import refuse_unknown, unusable
 from scanfab.base.spelling import counted
-from scanfab.io.families import Family, PathLike, files_in
+from scanfab.io.families import Family, PathLike, expanded, files_in, files_of
 from scanfab.io.files import Stamp, growing, stamp_of
 from scanfab.io.frame import Frame
 from scanfab.io.options import take_reading
@@ -182,6 +182,9 @@ class FollowedSeries(Series):
             problem = f"has vanished while it was followed, after {len(self._taken)} frames of it"
             raise ReadError(f"{source}: {problem}: bring it back and go on with `resume`")
         names = files_in(source) if source.is_dir() else [source]
+        if (contacts := self.reading.get("contacts", "auto")) not in ("auto", "file", "geometric"):
+            with suppress(ReadError):  # there may be none yet
+                names += [file for path in expanded(contacts) for file in files_of(Path(path))]
         quiet = [self._quiet(path) for path in names]
         looked = [(path, self._seen.get(path)) for path in names]
         if looked == self._looked:

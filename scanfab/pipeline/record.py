@@ -85,6 +85,12 @@ class Record(NamedTuple):
             settings = restored_settings(manifest["settings"])
         except SettingsError as error:
             raise SettingsError(f"{path}: {error}") from None
+        names, known = frozenset(rows[0] if rows else ()), {one.name for one in settings.columns}
+        if lost := sorted(names - known):
+            advice = "install the package that made them"
+            raise SettingsError(
+                f"{path}: nothing here makes its columns {', '.join(lost)}: {advice}"
+            )
         found = FrameRows()
         for row in rows:
             if wrong := [name for name, value in row.items() if value != value]:
@@ -93,8 +99,7 @@ class Record(NamedTuple):
             complete = row_of(settings.columns, row)
             found.setdefault((row["source"], row["frame"]), []).append(complete)
         inputs = {str(entry.get("path")): entry for entry in manifest["inputs"]}
-        columns = frozenset(rows[0] if rows else ())
-        return cls(path, settings, manifest, inputs, found, columns)
+        return cls(path, settings, manifest, inputs, found, names)
 
     def differing(self, asked: Mapping[str, Any], free: Collection[str] = ()) -> str:
         """The names of the settings that differ from others, except the ``free`` ones."""

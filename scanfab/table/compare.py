@@ -147,7 +147,7 @@ class Comparison:
 
     def __repr__(self) -> str:
         lines = [
-            f"{row.source}, variant {variant_of(row)}: "
+            f"{row.source}{', ' * bool(row.source)}variant {variant_of(row)}: "
             f"slope {with_error(row.slope, row.slope_se)}, {counted(row.frames, 'frame')}"
             for row in self.summary
         ]

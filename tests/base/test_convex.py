@@ -107,6 +107,12 @@ def test_a_box_and_an_ellipsoid_have_three_sizes_above_0(shape, sizes):
         shape(sizes)
 
 
+def test_a_box_that_fills_a_period_meets_its_image_by_rounding_only():
+    shift = np.array([0.0, 0.0, 4.0])
+    assert not box([2.0, 3.0, 4.0]).meets_itself((1 - 1e-12) * shift)
+    assert box([2.0, 3.0, 4.0]).meets_itself((1 - 1e-6) * shift)
+
+
 def test_a_cylinder_has_an_axis():
     with pytest.raises(SettingsError, match="axis: expected a vector that is not 0"):
         cylinder(1.0, 2.0, (0, 0, 0))

@@ -78,6 +78,15 @@ def test_grains_wait_for_their_contacts(folder):
     assert b",geometric," not in data
 
 
+def test_contacts_of_another_folder_may_come_after_their_grains(folder):
+    beside, steps = folder.with_name("pairs"), []
+    beside.mkdir()
+    for grains, contacts in sample_frames()[:2]:
+        steps += [*copied(folder, [grains]), partial(time.sleep, 0.8), *copied(beside, [contacts])]
+    assert is_followed(steps, "--boundary", "mask=3", "--contacts", str(beside))
+    assert b",geometric," not in Path("t.csv").read_bytes()
+
+
 def test_a_folder_with_contact_files_only_waits(folder):
     (folder / "pairs_0.txt").write_text(pairs_text(step=0))
     write_it = partial(in_halves, dump_text(cubic_rows()).encode(), folder / "dump_0.txt", 0.1)

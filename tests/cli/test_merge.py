@@ -142,6 +142,14 @@ def test_a_frame_twice_is_to_have_the_same_values(parts, whole, series, tmp_path
     assert f"has other values than in {parts[1]}: lines is {cells[14]} here" in said
 
 
+def test_columns_of_a_package_that_is_missing_here_are_not_lost(parts, refused):
+    first, *lines = Path(parts[0]).read_text().splitlines()
+    Path(parts[0]).write_text(
+        "".join(f"{one}\n" for one in (f"{first},mine", *(f"{line},1" for line in lines)))
+    )
+    assert "nothing here makes its columns mine" in refused(*parts)
+
+
 def test_unfinished_parts_are_named(parts, refused):
     part = Path(parts[1])
     manifest, lines = Path(f"{part}.manifest.json"), part.read_text().splitlines(keepends=True)

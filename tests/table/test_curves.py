@@ -9,7 +9,7 @@ import warnings
 import pytest
 
 from scanfab.base.column import columns_of_fields
-from scanfab.base.errors import ScanfabWarning, SettingsError
+from scanfab.base.errors import ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.pipeline.calibration import StepRow
 from scanfab.pipeline.inspection import FrameReport
 from scanfab.table.compare import DIFFERENCES, FRAMES, SUMMARY
@@ -135,6 +135,12 @@ OF_CUTOFFS = [
 def test_the_rows_of_one_cutoff_are_chosen_to_three_digits(asked, expected):
     (rows,) = choose_rows([("t.csv", OF_CUTOFFS)], cutoff=asked)
     assert [row["cutoff"] for row in rows] == [expected] * 5
+
+
+def test_a_table_of_one_cutoff_keeps_its_rows_and_says_so():
+    rows = [{**row, "cutoff": 0.5} for row in curve()]
+    with pytest.warns(ScanfabNote, match=r"t\.csv: its rows have the one cut-off 0\.5"):
+        assert choose_rows([("t.csv", rows)], cutoff=0.4) == [rows]
 
 
 def test_a_frame_without_grains_has_no_cutoff_and_stays_once():
