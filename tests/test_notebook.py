@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import inspect
-import pydoc
-
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
 import scanfab
-from scanfab.base.option import options_of
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.lattices import shaken_cubic
 
@@ -50,10 +46,3 @@ def test_from_a_series_to_a_slope(tmp_path):
     plt.close(figure)
     with pytest.raises(TypeError, match="did you mean 'variants'"):
         scanfab.compute(series, variant="c")
-
-
-def test_help_of_compute_shows_every_option():
-    shown = pydoc.render_doc(scanfab.compute, renderer=pydoc.plaintext)
-    for option in options_of(scanfab.Settings):
-        assert option.name in inspect.signature(scanfab.compute).parameters
-        assert option.help[:40] in shown

@@ -1,7 +1,5 @@
 """A command of scanfab as tests ask for it, and a series that most of them read."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Callable

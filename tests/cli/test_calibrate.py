@@ -1,7 +1,5 @@
 """scanfab calibrate: rows or a table, words, and a command line that runs."""
 
-from __future__ import annotations
-
 import shlex
 from dataclasses import replace
 from functools import partial

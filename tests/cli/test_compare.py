@@ -1,7 +1,5 @@
 """scanfab compare: what it writes, in every format, from tables of every format."""
 
-from __future__ import annotations
-
 import io
 import json
 import sys
@@ -13,7 +11,6 @@ import pytest
 from scanfab.table.formats import OWN_FORMATS, read_rows
 from tests.helpers.dumps import write
 from tests.helpers.tables import curve
-from tests.helpers.truth import TRIAXIAL
 
 FRAMES = (
     "source frame strain variant alpha_vs_axial alpha_c_axial "
@@ -52,16 +49,6 @@ def test_columns_are_the_same_in_every_format(tmp_path, compare, table, words, c
         output = tmp_path / f"out{suffix}"
         assert compare(given, *words, "-o", output).out == ""
         assert read_rows(output) == expected
-
-
-@pytest.mark.parametrize("suffix", SUFFIXES)
-def test_the_tables_of_compute_are_read_in_every_format(tmp_path, ask, suffix):
-    sample, output = TRIAXIAL / "triaxial-spheres-00000000.vtk.gz", tmp_path / f"table{suffix}"
-    words = ("--directions", "9", "--spacing", "1rmin", "--boundary", "mask=3", "--variants", "ac")
-    ask("compute", sample, *words, "-o", output)
-    rows = ask("compare", output).rows
-    assert [row["variant"] for row in rows] == list("ac")
-    assert {abs(float(row["alpha_vs_axial_norm"])) for row in rows} == {1.0}
 
 
 def test_several_tables_stand_side_by_side_under_their_labels(compare, table):

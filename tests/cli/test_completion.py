@@ -1,7 +1,5 @@
 """Shells complete the command line by the lines of its page."""
 
-from __future__ import annotations
-
 import os
 import re
 import select

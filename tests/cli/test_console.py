@@ -1,7 +1,5 @@
 """Tables for people: the columns that matter most always, and no head or cell is ever cut."""
 
-from __future__ import annotations
-
 import re
 
 import pytest
@@ -9,7 +7,6 @@ import pytest
 import scanfab
 from scanfab.cli.compare import print_comparison
 from scanfab.cli.console import OFTEN_SAME, SHOWN, STAY, print_table
-from scanfab.io.reader import installed_readers
 from scanfab.table.columns import table_columns
 from scanfab.table.compare import compare_tables
 from scanfab.table.row import Row
@@ -127,15 +124,6 @@ def test_a_sheared_cell_has_its_shear(lines):
     assert any(
         "shear strain" in one for one in lines(80, print_comparison, compare_tables(sheared()))
     )
-
-
-def test_formats_lists_every_reader_with_its_package_and_the_tables(ask):
-    printed = [line.split() for line in ask("formats").out.splitlines()]
-    for name, installed in installed_readers().items():
-        line = next(line for line in printed if line[:2] == ["reader", name])
-        assert installed.package in line
-        assert set(installed.plugin.extensions[:1]) <= set(line)
-    assert ["writer", "csv"] in [line[:2] for line in printed]
 
 
 def test_merged_tables_and_differences_are_shown_as_tables(ask, series, tmp_path, monkeypatch):

@@ -1,13 +1,10 @@
 """scanfab compute --cutoffs and --moment: rows for each cut-off from one pass, also resumed."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
 from scanfab import Packing, compute, direction_rule, find_contacts
 from scanfab.scan.lines import line_triads, turned_triads
-from scanfab.table.columns import COLUMNS
 from tests.helpers import naive
 from tests.helpers.interruptions import interrupted_at_row
 from tests.helpers.lattices import shaken_cubic
@@ -15,42 +12,18 @@ from tests.helpers.truth import TRIAXIAL
 
 FILES = sorted(str(path) for path in TRIAXIAL.glob("*0000000[012].vtk.gz"))
 LINES = ("--directions", "lebedev:5", "--spacing", "0.7rmin", "--boundary", "mask=3")
-# errors of the sample are those of the smaller scan, whose lines depend on the kept segments
-OF_THE_SCAN = [name for name in COLUMNS if not name.startswith(("cutoff", "alpha_vs_axial_"))]
 
 
-@pytest.fixture
-def command(ask):
-    return partial(ask, "compute", *FILES, *LINES, "--seed", "3")
-
-
-def test_row_at_a_cutoff_is_that_of_a_plain_run_with_the_same_lines(command):
-    rows = command("--cutoffs", "0:3rmin:0.5rmin", "--frames", "1").rows
-    assert [row["variant"] for row in rows] == sorted("abcd" * 7)
-    for place, plain in ((2, "1rmin"), (0, "0"), (5, "2.5rmin")):
-        expected = command("--cutoff", plain, "--frames", "1").rows
-        for one, other in zip(rows[place::7], expected, strict=True):
-            assert float(one["cutoff"]) == pytest.approx(float(other["cutoff"]))
-            for name in OF_THE_SCAN:
-                assert_same(one[name], other[name], name)
-
-
-def assert_same(one, other, name):
-    try:
-        assert float(one) == pytest.approx(float(other), rel=1e-9, abs=1e-12), name
-    except ValueError:
-        assert one == other, name
-
-
-def test_a_resumed_run_finds_the_rows_of_all_cutoffs(command, tmp_path, monkeypatch):
+def test_a_resumed_run_finds_the_rows_of_all_cutoffs(ask, tmp_path, monkeypatch):
     """Equal cut-offs too: every frame has as many rows as were asked for."""
-    words = ("--cutoffs", "1rmin,0.0005,1rmin", "--variants", "cd")
+    chosen = ("--cutoffs", "1rmin,0.0005,1rmin", "--variants", "cd", "--seed", "3")
+    words = ("compute", *FILES, *LINES, *chosen)
     whole, output = tmp_path / "whole.csv", tmp_path / "table.csv"
-    command(*words, "-o", whole)
+    ask(*words, "-o", whole)
     assert len(whole.read_text().splitlines()) == 1 + 3 * 2 * 3
     with interrupted_at_row(monkeypatch, 10):
-        command(*words, "-o", output, code=130)
-    command(*words, "-o", output, "--resume")
+        ask(*words, "-o", output, code=130)
+    ask(*words, "-o", output, "--resume")
     assert output.read_bytes() == whole.read_bytes()
 
 
@@ -73,10 +46,3 @@ def test_second_moment_is_that_of_the_slow_twin():
     assert row.gvs_xy == pytest.approx(tensor[0, 1], abs=1e-12)
     assert row.alpha_vs_axial == pytest.approx(naive.axial(tensor, (0, 0, 1)), abs=1e-12)
     assert row.mean_length == pytest.approx((rule.weights @ over) / (rule.weights @ under))
-
-
-def test_second_moment_is_longer_than_the_first(command):
-    words = ("--variants", "c", "--frames", "0")
-    first, second = (command("--moment", moment, *words).rows[0] for moment in (1, 2))
-    assert float(second["mean_length"]) > float(first["mean_length"])
-    assert second["segments"] == first["segments"]

@@ -1,4 +1,4 @@
-"""Clumps, discs, forces and sizes far apart: what cannot be is one message, or is right."""
+"""Clumps, discs, sizes far apart, and grains at one place."""
 
 import numpy as np
 import pytest
@@ -6,8 +6,6 @@ import pytest
 from scanfab import Packing, ScanfabWarning, compute, sphere
 from scanfab.pipeline.state import cut_volumes
 from tests.helpers.truth import SAMPLE_DATA
-
-FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")
 
 
 def test_that_each_sphere_is_a_grain_can_be_said(ask):
@@ -20,21 +18,6 @@ def test_that_each_sphere_is_a_grain_can_be_said(ask):
         has_clumps = "clumps" in source
         assert (single.out == given.out) != has_clumps
         assert not has_clumps or "clump" not in single.err.replace("liggghts_clumps", "")
-
-
-@pytest.mark.parametrize(
-    ("words", "code", "message"),
-    [
-        (("--with", "forces"), 1, "--with forces needs"),
-        (("--with", "state"), 0, "the contacts have no forces: all columns that need the stress"),
-        (("--rattlers", "force"), 1, "the rule --rattlers force needs the"),
-    ],
-)
-def test_forces_that_are_not_there(series, tmp_path, ask, words, code, message):
-    out = tmp_path / "table.csv"
-    answer = ask("compute", series, "--frames", "0", *FAST, *words, "-o", out, code=code)
-    assert message in answer.told
-    assert out.exists() == (code == 0)
 
 
 @pytest.mark.filterwarnings("ignore:.*no contact at all by geometry")

@@ -1,7 +1,5 @@
 """Files that cannot be written to their end: a message that names the file, and nothing is lost."""
 
-from __future__ import annotations
-
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -82,7 +82,7 @@ def test_files_named_one_by_one_are_one_series(files, tmp_path, ask):
     assert out.count("grains") <= 4
 
 
-def test_maps_in_report_and_compare(files, tmp_path, ask):
+def test_a_map_is_reported_and_not_compared(files, tmp_path, ask):
     ask("map", "g.csv", "--slices", "2", "--frame", "-1", *FAST, "-o", "m.csv", code=0)
     told = ask("compare", "m.csv", code=1).told
     assert "a table of scanfab map, which scanfab report shows" in told

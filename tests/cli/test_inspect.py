@@ -14,16 +14,6 @@ KEYS = (
 
 
 @pytest.fixture
-def series(tmp_path):
-    """Two frames in a box that is periodic along x and y; the first one has a contact file."""
-    for frame in (0, 1):
-        text = dump_text(cubic_rows(), step=10 * frame, box=((0, 4),) * 3, flags=" pp pp ff")
-        write(tmp_path / f"dump_{frame}.txt", text)
-    write(tmp_path / "pairs_0.txt", pairs_text())
-    return tmp_path
-
-
-@pytest.fixture
 def frames(ask):
     def frames(*words):
         return [json.loads(line) for line in ask("inspect", "--json", *words).out.splitlines()]
@@ -31,12 +21,17 @@ def frames(ask):
     return frames
 
 
-def test_json_is_an_object_a_line_with_what_the_reader_sees(series, frames):
-    first, second = frames(series, "--boundary", "id>=63")
+def test_json_is_an_object_a_line_with_what_the_reader_sees(tmp_path, frames):
+    """Of a box that is periodic along x and y; the first frame has a contact file."""
+    for frame in (0, 1):
+        text = dump_text(cubic_rows(), step=10 * frame, box=((0, 4),) * 3, flags=" pp pp ff")
+        write(tmp_path / f"dump_{frame}.txt", text)
+    write(tmp_path / "pairs_0.txt", pairs_text())
+    first, second = frames(tmp_path, "--boundary", "id>=63")
     assert list(first) == list(second) == KEYS.split()
     assert [(one["frame"], one["step"]) for one in (first, second)] == [(0, 0), (1, 10)]
     expected = {
-        "source": str(series), "format": "liggghts", "grains": 62, "boundary": 2, "contacts": 2,
+        "source": str(tmp_path), "format": "liggghts", "grains": 62, "boundary": 2, "contacts": 2,
         "contacts_from": "file", "cell": [[4, 0, 0], [0, 4, 0], [0, 0, 4]], "time": None,
         "periodic": [True, True, False], "warnings": [],
     }  # fmt: skip
@@ -44,13 +39,6 @@ def test_json_is_an_object_a_line_with_what_the_reader_sees(series, frames):
     assert set(first["columns"]) == {"id", "type", "x", "y", "z", "radius"}
     assert 0 < first["radius_min"] < first["radius_max"]
     assert "no contact file for step 10" in second["warnings"][0]
-
-
-def test_people_get_lines_without_colour(series, ask):
-    out = ask("inspect", series).out
-    assert out.startswith(f"{series}\n")
-    assert "geometric" in out
-    assert "\x1b" not in out
 
 
 def test_it_takes_the_options_of_compute(tmp_path, frames):

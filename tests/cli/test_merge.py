@@ -1,7 +1,5 @@
 """The parts of a job array, merged: the bytes of one run, or an error that names the part."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from functools import reduce

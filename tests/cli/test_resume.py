@@ -1,7 +1,5 @@
 """--resume: what FILE.part or a complete FILE holds is taken over, what is missing is computed."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import os
@@ -414,6 +412,8 @@ def test_series_have_references_of_their_own_and_must_be_named_again(compute, re
     assert compute("table.csv", "--reference=-1", **both) == (0, 5)
     assert read_manifest(Path("table.csv"))["settings"]["references"] == [3, 0]
     assert resumes("table.csv", 0, "--reference=-1", **both)
+    assert compute("alone.csv", "--reference=-1") == (0, 4)
+    assert read_manifest(Path("alone.csv"))["settings"]["reference"] == 3
     told = "its source few is not named now"
     assert compute("table.csv", "--reference=3", "--resume", told="settings (reference") == (2, 0)
     assert compute("t.csv", **both) == (0, 5)

@@ -1,7 +1,5 @@
 """The samples that `scanfab sample-data` copies: from a checkout, and from a wheel."""
 
-from __future__ import annotations
-
 import compileall
 import os
 import re

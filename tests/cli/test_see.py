@@ -1,7 +1,5 @@
 """--plot, --figure, --vtk, view: what is written, and what is told when it cannot be."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -13,8 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-import scanfab
-from scanfab.base.errors import ScanfabError, SettingsError
+from scanfab.base.errors import ScanfabError
 from scanfab.io.sources import read_series
 from scanfab.pipeline.strain import shear_strain
 from scanfab.table.compare import compare_tables
@@ -35,15 +32,11 @@ def table(tmp_path):
     return write(tmp_path / "t.jsonl", "".join(json.dumps(row) + "\n" for row in rows))
 
 
-def test_compute_draws_its_table_or_a_figure_of_frames(series, tmp_path, ask):
+def test_compute_draws_its_table(series, tmp_path, ask):
     table, plot, again = (tmp_path / name for name in ("t.csv", "t.svg", "again.svg"))
     ask("compute", series, *FAST, "-o", table, "--plot", plot)
     save_rows(again, read_rows(table))
     assert plot.read_bytes() == again.read_bytes()
-    plot = tmp_path / "t.png"
-    printed = ask("compute", series, *FAST, "--plot", plot, "--figure", "histogram")
-    assert plot.read_bytes().startswith(b"\x89PNG")
-    assert len(printed.rows) == 10
 
 
 def test_a_resumed_run_draws_all_frames_and_keeps_their_files(series, tmp_path, ask):
@@ -175,9 +168,8 @@ def test_a_frame_without_grains_is_shown_as_such(tmp_path, view, scenes):
 
 
 def test_a_long_path_leaves_both_ends_of_the_source_and_the_strain(tmp_path, view, scenes):
-    folder = tmp_path.joinpath(*["i" * 30] * 5)
-    folder.mkdir(parents=True)
-    dumps = folder / "shear"
+    dumps = tmp_path.joinpath(*["i" * 30] * 5, "shear")
+    dumps.parent.mkdir(parents=True)
     dumps.symlink_to(f"{ROOT}/sample_data/lammps_shear")
     view(dumps, "--frame", "5")
     ((_, _, title, _),) = scenes
@@ -229,8 +221,3 @@ def test_a_folder_of_paraview_files_is_a_series_of_its_grains(series, tmp_path, 
     out = ask("inspect", tmp_path / "vtk").out
     contacts = read_rows(tmp_path / "t.csv")[0]["contacts"]
     assert f"contacts      {contacts}" in out
-    # and no computation replaces them
-    before = {path: path.read_bytes() for path in (tmp_path / "vtk").iterdir()}
-    with pytest.raises(SettingsError, match="holds the dumps"):
-        scanfab.compute_file(tmp_path / "vtk", tmp_path / "u.csv", vtk=tmp_path / "vtk")
-    assert {path: path.read_bytes() for path in (tmp_path / "vtk").iterdir()} == before

@@ -1,7 +1,5 @@
 """Signals that come at any moment: exit code, words, and what is left behind."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Pipes, devices and sockets where a file is expected: a message, and nobody waits for ever."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal
@@ -50,13 +48,11 @@ def folder(tmp_path, monkeypatch):
     ("words", "code", "message"),
     [
         ("compute pipe", 1, "pipe: is a pipe, expected a file: to read what a program writes from"),
-        ("view pipe --screenshot x.png", 1, "is a pipe, expected a file"),
         ("compute dump.txt --contacts pip*", 1, "is a pipe, expected a file"),
         ("compute dump.txt --strain pipe", 2, "or a CSV file that exists"),
         ("compute /dev/zero", 1, "error: /dev/zero: is a device, expected a file"),
         ("compute socket", 1, "error: socket: is a socket, expected a file"),
         ("compare pipe", 1, "pipe: is a pipe, expected a table: to read what a program writes"),
-        ("report pipe -o report.html", 1, "pipe: is a pipe, expected a table"),
         ("compare /dev/zero", 1, "/dev/zero: is a device, expected a table"),
     ],
 )

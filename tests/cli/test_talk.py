@@ -1,7 +1,5 @@
 """What is said beside the result: progress, --quiet and --verbose."""
 
-from __future__ import annotations
-
 import logging
 import re
 import time

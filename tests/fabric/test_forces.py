@@ -42,7 +42,7 @@ def fabrics(normals, branch, force, axis=Z):
 
 
 def test_against_the_formula_contact_by_contact():
-    rng = np.random.default_rng(1)
+    rng, axis = np.random.default_rng(1), np.array([0.48, 0.6, 0.64])
     normals, branch = normals_of(rng, 300), rng.uniform(1, 2, 300)
     force = rng.normal(size=(300, 3)) + 3 * normals
     force_n = np.sum(force * normals, axis=1)
@@ -52,9 +52,10 @@ def test_against_the_formula_contact_by_contact():
         (force_n[:, None] * normals, force_n, 7.5),
         (tangential, force_n, 5.0),
     ]
-    for found, (vectors, size, factor) in zip(fabrics(normals, branch, force), cases, strict=True):
+    found_ones = fabrics(normals, branch, force, axis)
+    for found, (vectors, size, factor) in zip(found_ones, cases, strict=True):
         np.testing.assert_allclose(found.matrix, naive(normals, vectors, size, factor), atol=1e-13)
-        assert found.axial == pytest.approx(1.5 * found.matrix[2, 2], abs=1e-13)
+        assert found.axial == pytest.approx(1.5 * axis @ found.matrix @ axis, abs=1e-13)
         assert np.trace(found.matrix) == pytest.approx(0.0, abs=1e-13)
 
 
@@ -71,18 +72,6 @@ def test_known_harmonics_come_back_whatever_the_density_of_contacts(density):
     expected = [0.3 * 1.5, 0.5 * 1.5, 0.2 * 1.5 * 2.0]
     for one, value in zip(found, expected, strict=True):
         assert abs(one.axial - value) < max(5 * one.axial_se, 0.01)
-
-
-def test_turned_samples_have_turned_tensors_whatever_the_order_of_a_pair():
-    rng = np.random.default_rng(4)
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    normals, signs = normals_of(rng, 200), rng.choice([-1.0, 1.0], 200)[:, None]
-    force = rng.normal(size=(200, 3)) + 4 * normals
-    one = fabrics(normals, np.ones(200), force)[2]
-    two = fabrics(signs * normals @ turn.T, np.ones(200), signs * force @ turn.T, turn @ Z)[2]
-    np.testing.assert_allclose(two.matrix, turn @ one.matrix @ turn.T, atol=1e-13)
-    assert two.axial == pytest.approx(one.axial)
-    assert two.axial_se == pytest.approx(one.axial_se)
 
 
 @pytest.mark.parametrize(

@@ -60,11 +60,6 @@ def test_a_pvd_file_is_a_series_with_times(tmp_path):
         next(iter(scanfab.read_series(index))).read()
 
 
-def test_standard_input_needs_a_format(capsys):
-    assert run(["compute", "-"]) == 2
-    assert "--format" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("again", ["dumps", "./dumps/", "latest", "dum*"])
 def test_a_folder_that_is_named_twice_is_read_once(tmp_path, monkeypatch, capsys, again):
     monkeypatch.chdir(tmp_path)

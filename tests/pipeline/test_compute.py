@@ -13,9 +13,9 @@ BOX = ((0, 4),) * 3
 SHRINKING = [cubic_rows(squeeze=factor) for factor in (1.0, 0.95, 0.9, 0.85)]
 
 
-def series_of(folder, frames, names=NAMES):
+def series_of(folder, frames):
     """A file of snapshots; steps are 100 for each frame."""
-    texts = [dump_text(rows, names, step=100 * k, box=BOX) for k, rows in enumerate(frames)]
+    texts = [dump_text(rows, step=100 * k, box=BOX) for k, rows in enumerate(frames)]
     return scanfab.read_series(write(folder / "dump.txt", "".join(texts)))
 
 
@@ -29,29 +29,11 @@ def shrinking(tmp_path_factory):
     return series_of(tmp_path_factory.mktemp("series"), SHRINKING)
 
 
-@pytest.fixture(scope="module")
-def whole_table(shrinking):
-    return scanfab.compute(shrinking, **SCAN)
-
-
-@pytest.mark.parametrize("variants", ["a", "bd"])
-def test_each_variant_is_the_same_alone(shrinking, whole_table, variants):
-    everything = whole_table.select(frame=0)
-    assert [row.variant for row in everything] == ["a", "b", "c", "d"]
-    assert {row.contacts_from for row in everything} == {"geometric"}
-    alone = scanfab.compute(shrinking[0].read(), variants=variants, frames="-1", **SCAN)
-    expected = [row for row in everything if row.variant in variants]
-    assert {row.source for row in alone} == {""}
-    for name in ("grains", "rattlers", "contacts", "coordination", "gc_xx", "cutoff"):
-        assert alone[name].tolist() == [row[name] for row in expected]
-
-
 @pytest.mark.parametrize(("frames", "chosen"), [("1:3", [1, 2]), ("::-2", [1, 3])])
-def test_chosen_frames_have_the_rows_that_they_have_among_all(
-    shrinking, whole_table, frames, chosen
-):
+def test_chosen_frames_have_the_rows_that_they_have_among_all(shrinking, frames, chosen):
+    whole = scanfab.compute(shrinking, **SCAN)
     table = scanfab.compute(shrinking, frames=frames, **SCAN)
-    assert table.rows == tuple(row for row in whole_table if row.frame in chosen)
+    assert table.rows == tuple(row for row in whole if row.frame in chosen)
     assert [row.step for row in table.select(variant="a")] == [100 * k for k in chosen]
 
 
@@ -67,16 +49,6 @@ def test_no_frames_at_all_are_an_error(shrinking):
     ):
         with pytest.raises(SettingsError, match=told):
             scanfab.compute(source, frames=frames, **SCAN)
-
-
-@pytest.mark.parametrize(
-    ("part", "frames", "alone"), [(slice(1, None), "1:", "2:"), (slice(0, 3), "::-1", "0:3")]
-)
-def test_a_part_of_a_series_has_the_rows_of_its_frames(shrinking, part, frames, alone):
-    """Strain, RV and rmin as well: they are those of the first frame of the whole."""
-    own = scanfab.compute(shrinking[part], frames=frames, **SCAN)
-    assert own == scanfab.compute(shrinking, frames=alone, **SCAN)
-    assert len(own) > 0
 
 
 def test_a_part_looks_for_its_first_frame_with_grains_in_the_whole(shrinking):
@@ -114,25 +86,7 @@ def test_empty_first_frames_have_rows_without_values(tmp_path, strain):
     assert [row.alpha_vs for row in nothing] == [None] * 8
 
 
-def test_what_may_be_clumps_is_warned_of_once_and_computed(tmp_path):
-    # two grains of a column are one molecule
-    rows = [(*row, k // 2) for k, row in enumerate(cubic_rows())]
-    series = series_of(tmp_path, [rows, rows], f"{NAMES} mol")
-    with pytest.warns(ScanfabWarning, match="the column mol names") as told:
-        assert len(scanfab.compute(series, variants="a", **SCAN)) == 2
-    found = [str(one.message)[:9] for one in told if "mol" in str(one.message)]
-    assert found == ["frame 0: ", "frames 0 "]
-
-
-@pytest.mark.parametrize(
-    ("options", "told"),
-    [
-        ({"executor": 4}, "executor: expected a concurrent.futures.Executor, found 4"),
-        ({"strain": 3}, "strain: expected auto, cell, boundary, grains or a CSV file .* found 3"),
-        ({"rv": -1}, "rv: expected"),
-        ({"boundary": "radius>0"}, "no grain is left"),
-    ],
-)
-def test_options_that_cannot_be_used_are_named(options, told):
+def test_what_is_no_executor_is_named():
+    told = "executor: expected a concurrent.futures.Executor, found 4"
     with pytest.raises(SettingsError, match=told):
-        scanfab.compute(Packing([[0, 0, 0]], 1.0), **options)
+        scanfab.compute(Packing([[0, 0, 0]], 1.0), executor=4)

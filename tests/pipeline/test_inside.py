@@ -1,7 +1,5 @@
 """What other programs hold in memory is the same packing as what they write to files."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

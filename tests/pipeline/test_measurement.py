@@ -15,25 +15,15 @@ from tests.helpers.lattices import shaken_cubic
 LINES = {"directions": "lebedev:5", "spacing": 0.15}
 
 
-@pytest.fixture(scope="module")
-def packing():
-    return find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 6)))
-
-
-@pytest.fixture(scope="module")
-def table(packing):
-    return compute(packing, **LINES)
-
-
 def without(row, name):
     return np.array([getattr(row, f"{name}_without_{block}") for block in range(1, 9)])
 
 
-def test_contacts_are_left_out_by_the_octant_of_their_point(packing, table):
+def test_contacts_are_left_out_by_the_octant_of_their_point(packing):
     sample = Sample(packing, np.zeros(len(packing), bool))
     plan = make_plan(Settings(**LINES), sample)
     low, high = packing.position.min(axis=0), packing.position.max(axis=0)
-    for row in table:
+    for row in compute(packing, **LINES):
         variant = VARIANTS[row.variant]
         chosen = sample.fabric_contacts(variant, plan.window)
         center = plan.window.center if variant.in_window else (low + high) / 2
@@ -96,17 +86,13 @@ def test_cut_offs_whose_errors_are_above_the_tolerance_are_told(packing):
     assert low.alpha_vs_axial_se <= 2e-3 < high.alpha_vs_axial_se
 
 
-def measured(packing, **words):
-    sample = Sample(packing, np.zeros(len(packing), bool))
-    (found,) = measure(sample, make_plan(Settings(**words), sample))
-    return found
-
-
 def test_other_cut_offs_of_the_same_lines_are_those_of_a_scan_with_all_of_them(packing):
     """To the last bit: nothing but the cut-offs is another."""
     words = {"variants": "cd", "tolerance": 5e-3, "cutoff": 0.3}
-    again = measured(packing, **words).at_cutoffs([0.6, 0.3, 0.0])
-    whole = measured(packing, **words, cutoffs="0,0.3,0.6")
+    sample = Sample(packing, np.zeros(len(packing), bool))
+    (one,) = measure(sample, make_plan(Settings(**words), sample))
+    (whole,) = measure(sample, make_plan(Settings(**words, cutoffs="0,0.3,0.6"), sample))
+    again = one.at_cutoffs([0.6, 0.3, 0.0])
     assert again.plan.cutoffs == whole.plan.cutoffs
     assert again.plan.spacing == whole.plan.spacing
     for one, other in ((again.gaps, whole.gaps), (again.blocked, whole.blocked)):

@@ -18,7 +18,6 @@ from scanfab.pipeline.options import DECLARED, MEANINGS, OPTIONS, as_options, li
         ("name the `cell=(LX, LY, LZ)`", "name the --cell LX LY LZ"),
         ('`contacts="geometric"`', "--contacts geometric"),
         ('`boundary="type=2"`', '--boundary "type=2"'),
-        ('`contact_columns="pos id force"`', '--contact-columns "pos id force"'),
         ("`contact_tolerance=1e-4`", "--contact-tolerance 1e-4"),
         ('`columns={"x": ..., "y": "py"}`', "--columns x=...,y=py"),
         ("`output=FILE` and `labels=NAME`", "-o FILE and --label NAME"),

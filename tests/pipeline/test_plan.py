@@ -6,16 +6,9 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 
-from scanfab import Packing, ScanfabWarning, Settings, SettingsError, compute, find_contacts
+from scanfab import Packing, ScanfabWarning, Settings, SettingsError, compute
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.plan import make_plan
-from tests.helpers.lattices import shaken_cubic
-
-
-@pytest.fixture(scope="module")
-def packing():
-    """216 grains of radii about 0.5 in a cube of about 6."""
-    return find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 6)))
 
 
 def plan_of(packing, boundary=None, **options):

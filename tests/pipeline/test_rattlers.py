@@ -16,17 +16,13 @@ SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.1rmin", "variants": 
 RADIUS = 0.55
 
 
-def block_with_a_tail():
+@pytest.fixture
+def series(tmp_path):
     """A block in which all grains touch three or more, on it a tail of two, and one alone."""
     random = np.random.default_rng(1)
     block = simple_cubic(4).position + random.uniform(-0.03, 0.03, (64, 3))
-    tail = [(0.5, 0.5, 4.55), (0.5, 0.5, 5.6)]
-    return np.vstack([block, tail, [(3.5, 3.5, 5.2)]])
-
-
-@pytest.fixture
-def series(tmp_path):
-    rows = [(k, 1, *place, RADIUS) for k, place in enumerate(block_with_a_tail().tolist(), start=1)]
+    places = [*block.tolist(), (0.5, 0.5, 4.55), (0.5, 0.5, 5.6), (3.5, 3.5, 5.2)]
+    rows = [(k, 1, *place, RADIUS) for k, place in enumerate(places, start=1)]
     return scanfab.read_series(write(tmp_path / "dump.txt", dump_text(rows, box=((-1, 7),) * 3)))
 
 

@@ -1,8 +1,5 @@
 """The reference frame, from which L0, the RV, the radii and the blocks of a map come."""
 
-from __future__ import annotations
-
-import json
 import shutil
 
 import numpy as np
@@ -57,23 +54,6 @@ def test_lengths_come_from_the_reference_frame(bed, tmp_path, reference):
         usual = scanfab.compute(series, frames=-1, **SCAN)
     assert usual[1].grains == 0
     assert usual[0].cutoff == pytest.approx(whole.cutoff / 1.02**2)
-
-
-def test_a_job_array_has_the_rows_of_one_run(bed, tmp_path):
-    series, names = scanfab.read_series(bed), []
-    for job in (0, 1):
-        names.append(tmp_path / f"part_{job}.csv")
-        scanfab.compute_file(series, names[-1], reference=-1, frames=f"{job}::2", **SCAN)
-    whole = scanfab.compute(series, reference=-1, **SCAN)
-    assert scanfab.merge_tables(names) == whole
-    asked = json.loads((tmp_path / "part_0.csv.manifest.json").read_text())["settings"]
-    assert asked["reference"] == 3
-    # a longer series has another last frame
-    write(bed / "dump_400.txt", dump_text(rows_of(3), step=400, box=BOX))
-    with pytest.raises(SettingsError, match=r"other settings \(reference\)"):
-        scanfab.compute_file(
-            scanfab.read_series(bed), names[0], reference=-1, frames="0::2", resume=True, **SCAN
-        )
 
 
 @pytest.mark.parametrize(

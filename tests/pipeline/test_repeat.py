@@ -55,11 +55,11 @@ COMMANDS = [
     "dumps 'a b/*.txt' --boundary type=2 --boundary 'id>=100'",
     "d --variants cd --rv 0.65 --cutoff 0.2rmean --spacing 0.1rmin --directions lebedev:11",
     "d --rv-radius 0.0045 --rv-center 0 -1.5 2e-07 --axis 1,2,-2 --strain grains",
-    "d --rv-shape box --rv-size 1,2,3 --axis=-1,0,0 --directions 13 --cutoffs 0:1rmin:0.5rmin",
+    "d --rv-shape box --rv-size 1 2 3 --axis=-1,0,0 --directions 13 --cutoffs 0:1rmin:0.5rmin",
     "d --frames -1: --seed 7 --on-error skip --min-contacts 4 --contact-tolerance 0.0001",
     "d --rattlers recursive --frames 3 --rv 0.4,0.5 --with harmonics,forces",
-    "d --frames ::2 --tolerance 1e-3 --cutoff 0.000123456789",
-    "d --cell 1 2 3 --periodic xy --radius 0.5 --contacts geometric --format liggghts",
+    "d --frames ::2 --tolerance 1e-3 --cutoff 0.000123456789 --rv-shape cylinder --rv-size 1 2",
+    "d --cell 1 2 3 0.5 0 0.25 --periodic xy --radius 0.5 --contacts geometric --format liggghts",
     "d --columns 'radius=radius,x=x' --contact-columns 'pos id force'",
 ]
 

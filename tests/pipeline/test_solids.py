@@ -22,12 +22,6 @@ def packing(periodic=False):
     )
 
 
-def window_of(table_radius, sample):
-    """The RV of compute()."""
-    box = SurfaceBox.of(sample.packing, sample.gathered)
-    return Window(box.center, scanfab.sphere(table_radius))
-
-
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 @pytest.mark.parametrize("periodic", [False, True])
 @pytest.mark.parametrize("variants", ["abcd", "b"])
@@ -42,7 +36,8 @@ def test_a_scan_by_hand_is_that_of_compute(periodic, variants, lines):
         cutoff=CUTOFF, seed=3, **lines,
     )  # fmt: skip
     sample = Sample(one, one.columns["type"] == 2)
-    window = None if variants == "b" else window_of(2.0, sample)
+    center = SurfaceBox.of(sample.packing, sample.gathered).center
+    window = None if variants == "b" else Window(center, scanfab.sphere(2.0))
     solids = scanfab.solids_of(sample, window, variants=variants)
     if not periodic and "a" in variants:
         np.testing.assert_allclose(

@@ -79,13 +79,11 @@ def test_what_is_not_there_cannot_be_measured(periodic, options, message):
         ("\ufeff stress , step , strain \r\n 5 , 1e3 , 0.5 \r\n", [np.nan, 0.5, np.nan]),
     ],
 )
-def test_a_file_names_strains_by_step_or_frame(tmp_path, text, expected):
+def test_a_file_names_strains_by_step_or_frame(tmp_path, recwarn, text, expected):
     frames = [frame(1.0, 1.0, step=step) for step in (0, 1000, None)]
     file = write(tmp_path / "s.csv", text)
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
-        found = compute(frames, strain=file, **SCAN)["strain"]
-    assert any("has no row for this frame" in str(one.message) for one in told) == (
+    found = compute(frames, strain=file, **SCAN)["strain"]
+    assert any("has no row for this frame" in str(one.message) for one in recwarn) == (
         np.nan in expected
     )
     np.testing.assert_array_equal(found, expected)
@@ -157,12 +155,10 @@ def tilted_series(folder, tilts, edge=4.0):
 @pytest.mark.parametrize(
     ("frames", "told"), [(":", "2 and 3"), ("::-1", "2 and 3"), ("1::2", "1 and 3"), (":3", None)]
 )
-def test_a_cell_that_is_flipped_under_way_is_a_warning(tmp_path, frames, told):
+def test_a_cell_that_is_flipped_under_way_is_a_warning(tmp_path, recwarn, frames, told):
     series = tilted_series(tmp_path, [0.0, 0.2, 0.45, -0.35, -0.2])
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        compute(series, **SCAN, frames=frames, workers=2)
-    flips = {str(one.message) for one in caught if "flipped" in str(one.message)}
+    compute(series, **SCAN, frames=frames, workers=2)
+    flips = {str(one.message) for one in recwarn if "flipped" in str(one.message)}
     assert len(flips) == (told is not None)
     assert all(f"flipped between the frames {told}: " in one for one in flips)
 

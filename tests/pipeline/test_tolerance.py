@@ -17,11 +17,6 @@ def cube(**options):
 
 
 @pytest.fixture(scope="module")
-def packing():
-    return cube()
-
-
-@pytest.fixture(scope="module")
 def repeated():
     """The same grains in a cell that repeats."""
     return cube(cell=Cell([6.0] * 3))

@@ -1,7 +1,5 @@
 """Frames on a real Dask cluster of separate processes: the same rows, whatever dies."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -30,6 +30,7 @@ from scanfab.viz.figures.rose import contact_ring
 from scanfab.viz.scanned_frames import ScannedFrames
 from tests.conftest import ROOT, SAMPLE
 from tests.helpers.figures import row_of
+from tests.helpers.lattices import unit_vectors
 
 pytestmark = pytest.mark.filterwarnings("ignore:skipped:scanfab.base.errors.ScanfabNote")
 WORDS = {"boundary": "mask=3", "tolerance": 5e-4}
@@ -50,11 +51,6 @@ def scanned(computed):
 def figure_of(frames, name):
     (figure,) = make_figures(frames, "frames", name)
     return figure
-
-
-def unit_vectors(rng, *shape):
-    vectors = rng.standard_normal((*shape, 3))
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 def test_every_figure_of_the_sample_is_drawn(scanned):
