@@ -7,12 +7,13 @@ import os
 import shlex
 import subprocess
 import sys
+import time
 
 import pytest
 from click.shell_completion import ShellComplete
 
 from scanfab.cli.group import cli
-from tests.helpers.dumps import cubic_rows, dump_text
+from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.interruptions import PROGRAM
 
 FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac"]
@@ -75,3 +76,22 @@ def test_a_dash_is_standard_output_as_csv(packed, monkeypatch, ask, command):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
     assert {row["variant"] for row in ask(command, packed, *words, "-o", "-").rows} == {"c"}
     assert not os.path.exists("-")
+
+
+def test_a_dash_goes_with_columns_and_digits_and_is_compared(packed, ask, tmp_path):
+    printed = ask("compute", packed, *FAST, "--digits", "3", "-o", "-").out
+    table, names = write(tmp_path / "table.csv", printed), "variant,frame,alpha_vs_axial"
+    for row in ask("compare", table, "--fields", names, "--digits", "2", "-o", "-").rows:
+        assert list(row) == names.split(",")
+        assert float(row["alpha_vs_axial"]) == float(f"{float(row['alpha_vs_axial']):.2g}")
+
+
+@pytest.mark.parametrize("word", ["--help", "--version"])
+def test_help_and_version_are_there_at_once(word):
+    def seconds() -> float:
+        start = time.perf_counter()
+        subprocess.run([*PROGRAM, word], capture_output=True, check=True)
+        return time.perf_counter() - start
+
+    # 150 ms on a machine at rest
+    assert min(seconds() for _ in range(3)) < 0.6
