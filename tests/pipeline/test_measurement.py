@@ -65,6 +65,8 @@ def test_scatter_of_a_periodic_whole_does_not_depend_on_an_rv_beside_it():
     repeated = find_contacts(Packing(*spheres, cell=cell))
     alone, beside = (compute(repeated, tolerance=2e-4, variants=names)[0] for names in ("a", "ac"))
     assert alone.alpha_vs_axial_sample_se == pytest.approx(beside.alpha_vs_axial_sample_se, rel=0.3)
+    # contacts are left out by the same octants, those of the cell
+    assert (without(alone, "alpha_c_axial") == without(beside, "alpha_c_axial")).all()
 
 
 def test_turned_with_its_axis_the_sample_has_the_same_octants(packing):
