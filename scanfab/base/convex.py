@@ -340,8 +340,7 @@ class Convex:
         bool
         """
         # a box that fills a periodic cell overlaps its image by rounding
-        volumes, _ = self.overlap(np.array([shift, np.zeros(3)]), 1.0)
-        return bool(volumes[0] > 1e-9 * volumes[1])
+        return bool(self.overlap(shift[None], 1.0)[0][0] > 1e-9 * self.volume)
 
     def deformed(self, gradient: FloatArray) -> Convex:
         """

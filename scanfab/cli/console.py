@@ -240,16 +240,15 @@ def print_csv(
 def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:
     """Print a fabric table: the columns that the user chose, or those that fit the terminal."""
     from scanfab.table.curves import short_names
-    from scanfab.table.row import total_error
+    from scanfab.table.row import same_in_all, total_error
 
     shown = [{**row, "total": total_error(row, "alpha_vs_axial")} for row in rows]
-    # a terminal shows three digits, unless the user chose another number
     digits = digits_of(excerpt)
     if excerpt.fields:
         print_rows(shown, excerpt.fields, len(excerpt.fields), digits)
     else:
         names = short_names(row["source"] for row in shown)
-        same = {name for name in OFTEN_SAME if len({row.get(name) for row in shown}) <= 1}
+        same = same_in_all(shown, OFTEN_SAME)
         columns = [name for name in SHOWN if name not in same]
         shown = [{**row, "source": names[row["source"]]} for row in shown]
         print_rows(shown, columns, STAY - len(same), digits)

@@ -62,11 +62,17 @@ class SampleState(NamedTuple):
     """The plane of the sample if its grains are discs; there stress is a force over a length."""
 
     @property
+    def mean_stress(self) -> float:
+        """The mean stress p."""
+        assert self.stress is not None
+        return float(np.trace(self.stress)) / self.space.dimension
+
+    @property
     def direction(self) -> FloatArray | None:
         """The stress deviator over its norm, shape (3, 3); None if it is nearly isotropic."""
         if self.stress is None:
             return None
-        mean = float(np.trace(self.stress)) / self.space.dimension
+        mean = self.mean_stress
         deviator = self.stress - mean * self.space.identity
         size = float(np.linalg.norm(deviator))
         deviatoric = math.sqrt(self.space.dimension / (self.space.dimension - 1.0)) * size

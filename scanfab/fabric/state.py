@@ -108,8 +108,7 @@ class State:
             along = float(measured.axis @ state.stress @ measured.axis)
             less = state.space.dimension / (state.space.dimension - 1.0)
             row |= {f"stress_{part}": float(state.stress[at]) for part, at in COMPONENTS.items()}
-            mean = float(np.trace(state.stress)) / state.space.dimension
-            row |= {"p": mean, "q": less * (along - mean)}
+            row |= {"p": state.mean_stress, "q": less * (along - state.mean_stress)}
         return row | _against_stress(measured, state)
 
 

@@ -102,13 +102,8 @@ def select_boundary(packing: Packing, rules: Sequence[BoundaryRule]) -> BoolArra
     return np.asarray(np.any([none, *(rule.select(packing) for rule in rules)], axis=0))
 
 
-def boundary_hints(rules: Sequence[BoundaryRule], packing: Packing) -> list[Note]:
-    """A note on rules that select no particle; without rules, on what looks like a boundary."""
-    if rules:
-        if select_boundary(packing, rules).any():
-            return []
-        text = f"`boundary`: no particle has {spelt_rules(rules, packing)}"
-        return [Note("no_such_boundary", text)]
+def unnamed_boundary(packing: Packing) -> list[Note]:
+    """A note on particles that look like a boundary, in a packing for which none is named."""
     expression = enclosing_class(packing)
     if expression is None:
         return []

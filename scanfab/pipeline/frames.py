@@ -23,7 +23,7 @@ from scanfab.base.spelling import counted
 from scanfab.io.follow import FollowedSeries
 from scanfab.io.frame import Frame
 from scanfab.io.series import ENDLESS, Series
-from scanfab.packing.boundary import boundary_hints, select_boundary, spelt_rules
+from scanfab.packing.boundary import select_boundary, spelt_rules, unnamed_boundary
 from scanfab.packing.doubts import cell_doubt, doubts_of
 from scanfab.packing.packing import Packing
 from scanfab.packing.rattlers import installed_rules
@@ -292,7 +292,7 @@ def doubts_of_frame(frame: Unread, sample: Sample, settings: Settings) -> list[N
         notes = doubts_of(sample, frame.cell_is_named, frame.bodies_are_named)
         if no_cell := cell_doubt(sample, frame.carries):
             notes.append(Note("no_cell", no_cell))
-    return notes if settings.boundary else notes + boundary_hints((), sample.packing)
+    return notes if settings.boundary else notes + unnamed_boundary(sample.packing)
 
 
 def packing_of(frame: Unread) -> Packing:

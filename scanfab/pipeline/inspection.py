@@ -12,7 +12,7 @@ from scanfab.base.errors import Note, PackingError, ReadError, ScanfabNote, coll
 from scanfab.base.option import unusable
 from scanfab.io.frame import Frame
 from scanfab.io.series import Series
-from scanfab.packing.boundary import boundary_hints
+from scanfab.packing.boundary import spelt_rules, unnamed_boundary
 from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
@@ -134,13 +134,16 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
 
 def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
     """Read a frame and collect doubts, including errors that would prevent a measurement."""
+    rules = frames.settings.boundary
     with collected() as told:
         sample = sample_of(frame, frames.settings)
     tell(note for note in told if note.kind is ScanfabNote)
     doubts = [note for note in told if note.kind is not ScanfabNote]
-    doubts += (
-        boundary_hints(frames.settings.boundary, sample.packing) if len(sample.packing) else []
-    )
+    if not rules:
+        doubts += unnamed_boundary(sample.packing)
+    elif len(sample.packing) and not sample.boundary.any():
+        text = f"`boundary`: no particle has {spelt_rules(rules, sample.packing)}"
+        doubts.append(Note("no_such_boundary", text))
     try:
         refuse_impossible(sample)
     except PackingError as error:

@@ -207,10 +207,9 @@ class Job:
         assert self.output is not None
         is_table = self.output.is_file() and manifest_of(self.output).is_file()
         if self.output.is_file() and not self.resume:
-            what = (
-                f"the {'table' if is_table else 'file'} that is there will be replaced at the end"
-            )
-            note(f"{self.output}: {what} of this run{'; `resume` would go on with it' * is_table}")
+            kind, advice = ("table", "; `resume` would go on with it") if is_table else ("file", "")
+            what = f"the {kind} that is there will be replaced at the end of this run"
+            note(f"{self.output}: {what}{advice}")
         if not (self.resume and self._part.frames):
             self._part.begin(self.asked)
         known = set[Path]()

@@ -165,8 +165,10 @@ def _scan_octants(
         try:
             quick = is_quick(solids, spacing, axes)
             lines = replace(plan, rule=rule, spacing=spacing)
-            every = BLOCK_REPLICATES
-            return gap_scan(solids, lines, blocks, plan.cutoffs, every, most, quick), rule
+            sums = gap_scan(
+                solids, lines, blocks, plan.cutoffs, BLOCK_REPLICATES, most, quick=quick
+            )
+            return sums, rule
         except FollowedTooFarError:
             # only a scan can tell how far lines run through a periodic medium
             if solids.chords(2.0 * spacing) < 1.0:

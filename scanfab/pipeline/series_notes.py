@@ -149,8 +149,10 @@ class SeriesNotes:
         clearest = max(rows, key=lambda row: row["alpha_c"] / (row["alpha_c_axial_se"] or np.inf))
         axis = [clearest[f"gc_axis_{name}"] for name in "xyz"]
         near = [name for name, part in zip(AXES, axis, strict=True) if abs(part) > ALONG]
-        major = f'{near[0]}: choose `axis="{near[0]}"`' if near else spelt_place(axis)
-        if not near:
-            major += ': in simple shear `axis="X,Y,Z"` takes the direction of compression'
+        if near:
+            major = f'{near[0]}: choose `axis="{near[0]}"`'
+        else:
+            shear = 'in simple shear `axis="X,Y,Z"` takes the direction of compression'
+            major = f"{spelt_place(axis)}: {shear}"
         text = f"the loading axis is not the major axis of the contact fabric, {major}"
         yield Note("turned_axis", text, kind=ScanfabNote)

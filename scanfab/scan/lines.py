@@ -146,6 +146,8 @@ def cut_lines(
     window : Convex, optional
         Window that clips the lines: its surface bounds the first and the last segment. Without a
         window, a line runs from its first to its last solid.
+    first : int, optional
+        Number of the first line.
 
     Returns
     -------

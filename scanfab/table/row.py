@@ -221,6 +221,11 @@ def as_html(rows: Rows, names: Sequence[str]) -> str:
     )
 
 
+def same_in_all(rows: Rows, names: Iterable[str]) -> set[str]:
+    """Those of the columns that have one value in all rows, or are in none."""
+    return {name for name in names if len({row.get(name) for row in rows}) <= 1}
+
+
 def with_error(value: float | None, error: float | None, alone: str = ".3g") -> str:
     """
     A value and its standard error, to two digits of the error; a dash for a missing value.
@@ -254,7 +259,7 @@ def _lines(rows: Rows, names: Sequence[str]) -> list[list[str]]:
 
     shown = [*names[:MOST_COLUMNS], *(name for name in names[MOST_COLUMNS:] if name == "rv")]
     if any(name in names for name in ANISOTROPIES):
-        same = [name for name in OFTEN_SAME if len({row.get(name) for row in rows}) <= 1]
+        same = same_in_all(rows, OFTEN_SAME)
         shown = [name for name in SHOWN if name in names and name not in same]
     is_long = len(rows) > 2 * ENDS + 1
     at_ends = [*rows[:ENDS], *rows[-ENDS:]] if is_long else rows

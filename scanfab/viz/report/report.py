@@ -33,8 +33,6 @@ from scanfab.viz.scene import Look, look_at
 
 # A scan of so many segments takes about half a minute. Pictures that need more are made rougher.
 MOST_SEGMENTS = 3e8
-
-
 # columns without which nothing can be said of a map
 OF_MAPS = ("frame", "variant", "alpha_vs_axial")
 
