@@ -20,14 +20,13 @@ YADE = shutil.which("yade")
 OWN_PYTHON = f"python3.{sys.version_info.minor}"
 # packings of overlapping spheres, whose interactions exist after a few steps
 SCENES = """
-import random
 import numpy as np
 import scanfab
 from scanfab.testing import differences
 
 def live_and_saved(kind):
     O.reset()
-    random.seed(1)
+    generator = np.random.default_rng(1)
     if kind == "periodic":
         O.periodic = True
         O.cell.hSize = Matrix3(7, 1, 0, 0, 8, 2, 0, 0, 9)
@@ -35,7 +34,7 @@ def live_and_saved(kind):
         O.bodies.append([wall(0, axis=2), box((4, 4, 8.5), (4, 4, 0.5))])
         O.bodies.append(geom.facetBox((4, 4, 4), (4, 4, 4), wallMask=15))
     for number in range(150):
-        place = [random.uniform(-2, 9) for _ in "xyz"]
+        place = generator.uniform(-2, 9, 3).tolist()
         place[2] = 1.5 if kind == "discs" else place[2]
         O.bodies.append(sphere(place, 0.7, mask=number % 3 + 1))
     if kind != "discs":
