@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from glob import glob
 from pathlib import Path
 from typing import Any
 
@@ -43,10 +44,10 @@ def take_settings_file(ctx: click.Context, sources: Iterable[str]) -> None:
     for path in files:
         given = _read(path)
         try:
-            ctx.default_map = {KEYS[key].name: _as_typed(key, given[key]) for key in given}
+            typed = {KEYS[key].name: _as_typed(key, given[key], path.parent) for key in given}
         except SettingsError as error:
             raise click.UsageError(f"{path}: {error}") from None
-        ctx.meta[META] = path, list(given)
+        ctx.default_map, ctx.meta[META] = typed, (path, list(given))
 
 
 def as_listed(ctx: click.Context) -> dict[str, Any]:
@@ -89,14 +90,21 @@ def _read(path: Path) -> dict[str, Any]:
     return options
 
 
-def _as_typed(key: str, value: Any) -> Any:
-    """A value of the settings file as users would type it; SettingsError if it is not valid."""
+def _as_typed(key: str, value: Any, folder: Path) -> Any:
+    """
+    A value of the settings file as users would type it; SettingsError if it is not valid.
+
+    Files that an option names are looked for in the folder of the settings file first.
+    """
     option, several = KEYS[key], value if isinstance(value, list) else [value]
     for item in several:
         # bool is a subclass of int, so True would be taken for the number 1
         if isinstance(item, bool) or not isinstance(item, str | int | float):
             raise unusable(key, "numbers or text in quotes, alone or in a list", item)
-    words = [str(item) for item in several]
+    words, usual = [str(item) for item in several], option.form.split("|")
+    takes_file = usual[-1].startswith(("FILE", "PATH")) and len(words) == 1
+    if takes_file and words[0] not in usual and glob(words[0], root_dir=folder):
+        words = [str(folder / words[0])]
     typed = words if option.several else ",".join(words)
     option.parse(key, typed)
     return typed

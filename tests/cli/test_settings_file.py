@@ -1,5 +1,7 @@
 """scanfab.toml beside the dumps: any option, below the command line."""
 
+from pathlib import Path
+
 import pytest
 
 from scanfab.pipeline.record import read_manifest, repeat_command
@@ -37,6 +39,24 @@ def test_options_are_those_of_the_file_but_for_those_of_the_line(
         assert {row["directions"] for row in answer.rows} == {"13"}
         assert answer.rows[0]["grains"] == grains
         assert answer.err.count(f"note: options from {series}/scanfab.toml: directions, ") == 1
+
+
+def test_a_file_is_looked_for_beside_the_settings_file_first(
+    series, ask, monkeypatch, tmp_path_factory
+):
+    monkeypatch.chdir(tmp_path_factory.mktemp("elsewhere"))
+    write(series / "strain.csv", "frame,strain\n0,0.25\n")
+    write(series / "box.csv", "frame,lx,ly,lz\n0,4,4,4\n")
+    text = 'strain = "strain.csv"\ncell = "box.csv"\ncontacts = "geometric"\nvariants = "a"'
+    write(series / "scanfab.toml", f"[compute]\n{FAST}{text}\n")
+    write(Path("elsewhere.csv"), "frame,strain\n0,0.5\n")
+    (row,) = ask("compute", series).rows
+    # without a cell a whole has no solid fraction
+    assert row["strain"] == "0.25" and row["solid_fraction"] != ""
+    write(
+        series / "scanfab.toml", f"[compute]\n{FAST}{text.replace('strain.csv', 'elsewhere.csv')}\n"
+    )
+    assert ask("compute", series).rows[0]["strain"] == "0.5"
 
 
 @pytest.mark.parametrize(
