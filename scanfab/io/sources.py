@@ -264,7 +264,8 @@ def _choose_contacts(
         return [], "geometric"
     if contacts not in ("auto", "file"):
         return _named_contacts(contacts, options), "path"
-    own = [family for family in families if family.kind == "contacts"]
+    listed = [family for family in families if family.kind == "contacts"]
+    own = [family for family in listed if None in family.owners or family.owners & grains.stems]
     is_beside = bool(around) and not own
     if is_beside:
         families, own = sorting.contacts_beside(grains, around, options)

@@ -14,7 +14,7 @@ from scanfab.base.errors import SettingsError, UnknownFormatError
 from scanfab.cli.main import run
 from scanfab.io.reader import installed_readers, reader_for
 from tests.helpers.dumps import cubic_rows, dump_text, write
-from tests.helpers.truth import FLOOR
+from tests.helpers.truth import FLOOR, SAMPLE_DATA
 
 POSITION = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0], [1.9, 1.9, 0]])
 PAIRS = np.array([[0, 1], [1, 2], [1, 3]])
@@ -116,3 +116,14 @@ def test_the_name_of_a_file_does_not_matter(tmp_path):
     for name in ("log.txt", "deck.vtk", "notes.dump", "x.vtu", "no_ending_at_all"):
         assert reader_for(write(tmp_path / name, "hello\n")) is None
         assert reader_for(write(tmp_path / name, dump_text())).name == "liggghts"
+
+
+def test_contacts_that_convert_wrote_beside_the_dumps_belong_to_its_own_files(tmp_path):
+    for step in (30000, 60000):
+        for kind in ("dump", "contacts"):
+            name = f"{kind}_{step}.txt.gz"
+            (tmp_path / name).write_bytes((SAMPLE_DATA / "liggghts_periodic" / name).read_bytes())
+    before = scanfab.read(tmp_path).contacts.pairs
+    scanfab.convert(tmp_path, tmp_path / "x_{step}.csv")
+    for source in (tmp_path, tmp_path / "x_30000.csv"):
+        np.testing.assert_array_equal(scanfab.read(source).contacts.pairs, before)
