@@ -41,6 +41,11 @@ class NoChosenFrameError(SettingsError):
     """The series has frames, but the option ``frames`` chooses none of them."""
 
 
+def _refused(expected: str, found: object) -> SettingsError:
+    how = ": `frame.read()` is its packing" if isinstance(found, Frame) else ""
+    return SettingsError(f"expected {expected}, found {found!r}{how}")
+
+
 class _Stream:
     """Packings that come one after the other, for instance from a running simulation."""
 
@@ -57,7 +62,7 @@ class _Stream:
             if number == len(self._kept):
                 for packing in islice(self._coming, 1):
                     if not isinstance(packing, Packing):
-                        raise SettingsError(f"expected packings, found {packing!r} among them")
+                        raise _refused("packings", packing)
                     self._kept.append(packing)
             # another iterator may have kept packings meanwhile, so compare again
             if number == len(self._kept):
@@ -99,7 +104,7 @@ class Frames:
     def __init__(self, source: Source, settings: Settings) -> None:
         if isinstance(source, str) or not isinstance(source, Iterable | Packing):
             expected = "a Packing, a Series (of scanfab.read_series) or an iterable of packings"
-            raise SettingsError(f"expected {expected}, found {source!r}")
+            raise _refused(expected, source)
         self.source: Series | _Stream
         self.settings = settings
         if isinstance(source, Series):

@@ -117,7 +117,8 @@ class Job:
             self.asked["reference"] = references[0]
         else:
             self.asked["references"] = references
-        self.notes = [SeriesNotes(self.settings) for _ in self.series]
+        named = names if len(names) > 1 else [""]
+        self.notes = [SeriesNotes(self.settings, name) for name in named]
         if self.manifest_path is not None:
             check_folder(self.manifest_path)
         outputs = [*self.drawn, self.manifest_path, self.output]

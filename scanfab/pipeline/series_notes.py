@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from typing import NamedTuple
 
@@ -53,11 +53,11 @@ class SeriesNotes:
     Issues the notes on the frames of one series, which come in their order.
 
     A note is issued at the first frame that it holds for. If it holds for several frames, one more
-    line names them at the end.
+    line names them at the end. ``name`` is that of the series; it is told if it is not empty.
     """
 
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
+    def __init__(self, settings: Settings, name: str = "") -> None:
+        self.settings, self.name = settings, name
         self._frames: list[int] = []
         self._held: dict[tuple[str, tuple[str, ...]], tuple[Note, list[int]]] = {}
         """The first note of each kind, and the places of its frames among all frames."""
@@ -81,7 +81,7 @@ class SeriesNotes:
         for note in found:
             _, places = self._held.setdefault((note.code, note.variants), (note, []))
             if not places or note.kind is SkippedFrameWarning:
-                tell([note], f"frame {number}")
+                self._tell([note], f"frame {number}")
             places.append(len(self._frames) - 1)
 
     def ranges(self) -> Iterator[tuple[Note, str]]:
@@ -110,8 +110,11 @@ class SeriesNotes:
         ``reference`` is the number of the reference frame and its smallest radius.
         """
         for note, where in self.ranges():
-            tell([note], where)
-        tell(self._of_series(reference))
+            self._tell([note], where)
+        self._tell(self._of_series(reference))
+
+    def _tell(self, notes: Iterable[Note], where: str = "") -> None:
+        tell(notes, ", ".join(filter(None, [self.name, where])))
 
     def _of_series(self, reference: tuple[int, float] | None) -> Iterator[Note]:
         """Notes that only all frames together show."""

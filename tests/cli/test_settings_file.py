@@ -52,7 +52,8 @@ def test_a_file_is_looked_for_beside_the_settings_file_first(
     write(Path("elsewhere.csv"), "frame,strain\n0,0.5\n")
     (row,) = ask("compute", series).rows
     # without a cell a whole has no solid fraction
-    assert row["strain"] == "0.25" and row["solid_fraction"] != ""
+    assert row["strain"] == "0.25"
+    assert row["solid_fraction"] != ""
     write(
         series / "scanfab.toml", f"[compute]\n{FAST}{text.replace('strain.csv', 'elsewhere.csv')}\n"
     )

@@ -5,6 +5,8 @@ import json
 
 import pytest
 
+from tests.helpers.dumps import cubic_rows, dump_text, write
+
 CASES = {
     "x,y,z\n1,2,3\n": "scanfab: error: standard input: no radius",
     "x,y,z,radius\n1,2,3,nan\n": "scanfab: error: standard input: grain 0: position and radius",
@@ -48,3 +50,14 @@ def test_so_do_warnings_in_results_and_manifests(by_stdin, tmp_path):
     by_stdin(b"x,y,z,radius\n1,2,3,-4\n", *words, code=1)
     (first, *_) = json.loads((tmp_path / "out.csv.manifest.json").read_text())["warnings"]
     assert first.startswith("frame 0 skipped: standard input: grain 0: the radius")
+
+
+def test_notes_name_the_series_if_there_are_several(ask, tmp_path):
+    for name in ("loose", "dense"):
+        (tmp_path / name).mkdir()
+        write(tmp_path / name / "dump_0.txt", dump_text(cubic_rows(2)))
+    words = ("--variants", "a", "--directions", "9", "--spacing", "0.5rmin")
+    told = ask("compute", tmp_path / "loose", tmp_path / "dense", *words).err
+    for name in ("loose", "dense"):
+        assert f"note: {tmp_path / name}, frame 0, variant a: fewer than 10 grains" in told
+    assert "note: frame 0, variant a: few" in ask("compute", tmp_path / "loose", *words).err

@@ -19,6 +19,7 @@ from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
 from tests.helpers.dumps import NAMES, dump_text, write
 from tests.helpers.lattices import shaken_cubic
+from tests.helpers.truth import SAMPLE_DATA
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "cd"}
 
@@ -84,8 +85,12 @@ def test_a_stream_is_not_kept_in_memory():
 def test_what_is_no_packing_and_frames_that_do_not_exist_are_named():
     with pytest.raises(SettingsError, match=r"no frame in 7:9: .*has 4 frames, 0 to 3"):
         scanfab.compute(packings(), frames="7:9", **SCAN)
-    with pytest.raises(SettingsError, match="expected packings, found 3 among them"):
+    with pytest.raises(SettingsError, match=r"expected packings, found 3$"):
         scanfab.compute([*packings(1), 3], **SCAN)
+    series = scanfab.read_series(SAMPLE_DATA / "liggghts_periodic")
+    for source in (series[0], list(series)):
+        with pytest.raises(SettingsError, match=r"found Frame 0 .*: `frame.read\(\)` is its pack"):
+            scanfab.compute(source, **SCAN)
     for source in ("dumps/", 7):
         with pytest.raises(SettingsError, match=f"or an iterable of packings, found {source!r}"):
             scanfab.compute(source, **SCAN)
