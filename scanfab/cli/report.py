@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +16,10 @@ from scanfab.cli.options import OF_SEVERAL, options, tables_argument, usage_erro
 @tables_argument(path_type=Path)
 @options("output", callback=None, required=True, metavar="FILE.html", help="The report.")
 @click.option("--title", metavar="TEXT", help="Title (default: the sources' names).")
-@click.option(
-    "--author", metavar="TEXT", help="Author (default: your full name, if this computer knows it)."
-)
+@click.option("--author", metavar="TEXT", default="", help="Author (default: none).")
 @options("cutoff", **OF_SEVERAL)
 @options("labels")
-def report(tables: tuple[Path, ...], output: Path, author: str | None, **chosen: Any) -> int:
+def report(tables: tuple[Path, ...], output: Path, **chosen: Any) -> int:
     """
     Write a report on fabric tables: one HTML file that opens without a network.
 
@@ -38,24 +35,9 @@ def report(tables: tuple[Path, ...], output: Path, author: str | None, **chosen:
         check_page_file(output)
         refuse_inputs([output], tables)
     announce()
-    author = _full_name() if author is None else author
     with working():
-        made = scanfab.report(tables, author=author, **chosen)
+        made = scanfab.report(tables, **chosen)
     made.save(output)
     if not made.has_void_fabric:
         click.echo("scanfab: warning: no row of the tables has a void fabric", err=True)
     return 0 if made.has_void_fabric else 1
-
-
-def _full_name() -> str:
-    """The user's full name; empty if the system knows only the account name."""
-    import os
-
-    # Windows has no pwd; a container may not know the user
-    with suppress(ImportError, KeyError):
-        import pwd
-
-        user = pwd.getpwuid(os.getuid())
-        name = user.pw_gecos.split(",")[0].strip()
-        return "" if name == user.pw_name else name
-    return ""
