@@ -12,11 +12,11 @@ from scanfab.base.errors import Note, PackingError, ReadError, ScanfabNote, coll
 from scanfab.base.option import unusable
 from scanfab.io.frame import Frame
 from scanfab.io.series import Series
-from scanfab.packing.boundary import spelt_rules, unnamed_boundary
-from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
+from scanfab.packing.boundary import spelt_rules
+from scanfab.packing.doubts import cell_hint, refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
-from scanfab.pipeline.frames import Frames, sample_of
+from scanfab.pipeline.frames import Frames, doubts_of_frame, sample_of
 from scanfab.pipeline.rv import rvs_of
 from scanfab.pipeline.settings import Settings
 from scanfab.table.row import DataclassRow
@@ -137,21 +137,18 @@ def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
     rules = frames.settings.boundary
     with collected() as told:
         sample = sample_of(frame, frames.settings)
-    tell(note for note in told if note.kind is ScanfabNote)
-    doubts = [note for note in told if note.kind is not ScanfabNote]
-    if not rules:
-        doubts += unnamed_boundary(sample.packing)
-    elif len(sample.packing) and not sample.boundary.any():
+    tell(one for one in told if one.kind is ScanfabNote)
+    doubts = [one for one in told if one.kind is not ScanfabNote]
+    if rules and len(sample.packing) and not sample.boundary.any():
         text = f"`boundary`: no particle has {spelt_rules(rules, sample.packing)}"
         doubts.append(Note("no_such_boundary", text))
     try:
         refuse_impossible(sample)
     except PackingError as error:
         doubts.append(Note("impossible", str(error)))
-    doubts += doubts_of(sample, frame.cell_is_named, frame.bodies_are_named)
-    if no_cell := cell_doubt(sample, frame.carries):
-        doubts.append(Note("no_cell", no_cell))
-    elif hint := cell_hint(sample, frame.carries):
+    doubts += doubts_of_frame(frame, sample, frames.settings)
+    hint = cell_hint(sample, frame.carries)
+    if hint and all(one.code != "no_cell" for one in doubts):
         note(hint)
     return sample, [doubt.text for doubt in (*doubts, *sample.doubts_of_escaped())]
 
