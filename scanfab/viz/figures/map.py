@@ -145,7 +145,7 @@ class Map(Figure):
 
     def _draw_profile(self, axes: Axes, one: Quantity) -> None:
         """Draw the profiles of the first and the last frame."""
-        looks = FRAME_LOOKS[-len(self.frames) :]
+        looks, greys = FRAME_LOOKS[-len(self.frames) :], []
         for rows, look in zip(self.frames, looks, strict=True):
             place, label = _places(rows)
             curve, outer = Curve("", str(self.variant), place, rows), _at_surface(rows)
@@ -156,13 +156,16 @@ class Map(Figure):
             told += [f"strain {strain:.3g}" for strain in numbers_of(rows[:1], "strain")]
             line = {key: look[key] for key in ("color", "marker", "ls")}
             axes.plot(place, value, label=", ".join(told), **line)
-            # the surface takes segments from these blocks, so they must not set the scale
-            grey = {"ls": "", "marker": look["marker"], "color": "0.75", "scaley": False}
-            legend = SURFACE if rows is self.frames[-1] and outer.any() else None
-            axes.plot(place[outer], every[outer], label=legend, zorder=0, **grey)
+            greys.append((place[outer], every[outer], look["marker"]))
             axes.set(xlabel=label, ylabel=one.label)
         if one.total:
             axes.axhline(0, color="0.6", lw=0.6, zorder=0)
+        # the surface takes segments from these blocks, so they must not set the scale
+        limits = axes.get_ylim()
+        for place, every, marker in greys:
+            legend = SURFACE if len(place) and marker == looks[-1]["marker"] else None
+            axes.plot(place, every, color="0.75", marker=marker, ls="", label=legend, zorder=0)
+        axes.set_ylim(limits)
 
     def _draw_plane(self, axes: Axes, one: Quantity, axis: int) -> Any:
         """The blocks next to the middle along an axis."""

@@ -135,8 +135,13 @@ def plain(text: str) -> str:
 
 
 def widen(axes: Axes, smallest: float) -> None:
-    """Make the y axis span at least this much, so that noise does not look like a signal."""
+    """
+    Make the y axis span at least this much, so that noise does not look like a signal.
+
+    It spans a ten-thousandth of its values in any case: smaller changes are rounding.
+    """
     low, high = axes.get_ylim()
+    smallest = max(smallest, 1e-4 * abs(low), 1e-4 * abs(high))
     if high - low < smallest:
         middle = 0.5 * (low + high)
         axes.set_ylim(middle - 0.5 * smallest, middle + 0.5 * smallest)

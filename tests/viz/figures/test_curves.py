@@ -121,6 +121,9 @@ def test_noise_does_not_fill_the_panel(drawn):
     rows = [{**row, "alpha_vs_axial": 1e-6 * row["frame"]} for row in curve()]
     low, high = drawn(rows, "evolution").axes[0].get_ylim()
     assert high - low >= 1.0
+    rounded = [{**row, "p": 1e5 * (1 + 1e-13 * row["frame"])} for row in curve()]
+    low, high = drawn(rounded, "columns:p").axes[0].get_ylim()
+    assert high - low >= 1.0
 
 
 def test_names_of_sources_are_no_formulas(drawn):

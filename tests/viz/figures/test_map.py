@@ -98,3 +98,16 @@ def test_one_quantity_on_given_axes_and_blocks_at_the_surface(packing, blocks, t
     # on a page of its own, too
     with drawn_page([Map(rows, quantity="alpha_vs_axial")]) as page:
         page.canvas.draw()
+
+
+def test_blocks_at_a_surface_do_not_set_the_scale_of_a_profile(packing):
+    rows = [dict(row) for row in mapped([packing, packing], slices=4)]
+    for row in rows:
+        row |= {"alpha_vs_axial": 0.01 * row["frame"], "alpha_vs_axial_se": None}
+        if row["block"] in (0, 3):
+            row |= {"alpha_vs_axial": 5.0 - 9.0 * row["frame"], "at_surface": 1}
+    axes = Map(rows, quantity="alpha_vs_axial").on(pyplot.figure().subplots())
+    assert -1 < axes.get_ylim()[0] < 0 < 10 < axes.get_ylim()[1] < 11
+    grey = [line for line in axes.lines if line.get_color() == "0.75"]
+    assert [line.get_ydata().tolist() for line in grey] == [[5000.0] * 2, [-4000.0] * 2]
+    pyplot.close("all")
