@@ -66,7 +66,7 @@ class Note(NamedTuple):
     """One thing that a user should know."""
 
     code: str
-    """Kind of the note, for programs."""
+    """Kind of the note: a series tells the first of a kind, and names the frames of the others."""
     text: str
     """The message; it names options as Python spells them."""
     variants: tuple[str, ...] = ()

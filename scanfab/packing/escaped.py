@@ -19,8 +19,6 @@ from scanfab.packing.window import SurfaceBox
 RADII, TIMES, LONELY = 1.25, 5.0, 0.05
 # Among fewer grains none counts as far away from the others.
 FEWEST = 50
-ESCAPED = "escaped"
-"""The code of the note on escaped grains, which comes once a series."""
 # At most this share of the grains is left out, and at most so many that flew away together. More
 # grains may be a part of the sample, which the user has to decide.
 SHARE, TOGETHER = 0.01, 20
@@ -110,7 +108,8 @@ def notes_of_escaped(packing: Packing, grains: BoolArray, escaped: Escaped) -> l
             f"and octants: {wide} with them, {narrow} without; if they have flown away, {cure} "
             f"takes them out"
         )
-    return [Note(ESCAPED, f"{grain}: {escaped.gap:g} away from all others{text}")]
+    code = "too_many_escaped" if escaped.are_many else f"escaped {ids}"
+    return [Note(code, f"{grain}: {escaped.gap:g} away from all others{text}")]
 
 
 def _number(packing: Packing, rows: IntArray | list[int]) -> int:

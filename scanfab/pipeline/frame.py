@@ -20,11 +20,12 @@ from scanfab.fabric.measured import Measured
 from scanfab.fabric.registry import GROUPS, OWN_FABRICS, checked_values
 from scanfab.io.frame import Frame
 from scanfab.io.series import other_space
+from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample, Variant
 from scanfab.packing.search import near_pairs
 from scanfab.pipeline.frames import sample_of
-from scanfab.pipeline.map_rows import map_rows
+from scanfab.pipeline.map_rows import map_rows, places_of, tilings
 from scanfab.pipeline.measurement import (
     Measurement,
     blocked_sums,
@@ -126,7 +127,7 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
         **plan.strains.at(number, frame),
     }
     if not has_grains:
-        return FrameResult(source, number, frame, (), list(_empty_rows(known, plan)))
+        return FrameResult(source, number, frame, (), list(_empty_rows(known, plan, packing.cell)))
     # rows have the order of the settings; in the frame, RVs without a void fabric come last
     rvs = plan.rvs
     plan = plan.in_frame(frame)
@@ -158,12 +159,17 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
     return replace(result, notes=(*notes, *joined(doubts), *_large_errors(result.rows, plan)))
 
 
-def _empty_rows(known: Mapping[str, Any], plan: Plan) -> Iterator[Row]:
+def _empty_rows(known: Mapping[str, Any], plan: Plan, cell: Cell | None) -> Iterator[Row]:
     """The rows of a frame without grains."""
     empty, settings = {**known, "grains": 0, "rattlers": 0, "contacts": 0}, plan.settings
     for variant in plan.variants:
-        for rv, block in product(plan.rvs_of(variant), range(settings.blocks)):
-            own = {"variant": variant, RV_COLUMN.name: rv.fraction, "block": block}
+        places = [{"block": block} for block in range(settings.blocks)]
+        if plan.map_blocks is not None:
+            columns = places_of(tilings(plan, cell)[VARIANTS[variant].in_window])
+            parts = zip(*(values.tolist() for values in columns.values()), strict=True)
+            places = [dict(zip(columns, part, strict=True)) for part in parts]
+        for rv, place in product(plan.rvs_of(variant), places):
+            own = {"variant": variant, RV_COLUMN.name: rv.fraction, **place}
             yield from [row_of(settings.columns, {**empty, **own})] * len(plan.cutoffs)
 
 
@@ -180,6 +186,10 @@ def _large_errors(rows: list[Row], plan: Plan) -> Iterator[Note]:
     worst = max(rows, key=lambda row: (row.alpha_vs_axial_se or 0.0) / aim_of(row))
     error, rv = worst.alpha_vs_axial_se or 0.0, worst.get(RV_COLUMN.name)
     aim, others = aim_of(worst), plan.settings.lists_gaps or len(plan.rvs) > 1
+    # if the scan missed the tolerance at its own cut-off and RV, a note of the scan says so
+    rvs = (None, plan.rvs[0].fraction) if plan.rvs else (None,)
+    own = [row for row in rows if row.cutoff == plan.cutoff and row.get(RV_COLUMN.name) in rvs]
+    others &= all((row.alpha_vs_axial_se or 0.0) <= aim_of(row) for row in own)
     if plan.auto and others and error > aim:
         reached, tolerance = spelt_apart(error, aim)
         where = f"at the cut-off {worst.cutoff:g}{f' in the RV {rv:g}' if rv else ''}"

@@ -14,11 +14,12 @@ from scanfab.base.arrays import compressed, concatenated
 from scanfab.base.errors import Note, ScanfabNote, ScanfabWarning, joined
 from scanfab.base.space import SPACE
 from scanfab.base.spelling import counted
-from scanfab.base.typing import BoolArray, FloatArray
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.fabric.contact import axial_error, contact_fabric
 from scanfab.fabric.errors import homogeneity_of, part_errors, ratio, ratio_with_errors
 from scanfab.fabric.tensor import FabricTensor, axial, tensor_values
 from scanfab.fabric.void import BlockFabrics, block_fabrics
+from scanfab.packing.cell import Cell
 from scanfab.packing.sample import VARIANTS, Sample, Variant
 from scanfab.packing.window import Window
 from scanfab.pipeline.map_blocks import near_surface, volumes_inside
@@ -46,8 +47,6 @@ from scanfab.table.row import Row
 PART_REPLICATES, PART_AXES = range(4), 96
 # most chords of this scan; lines are set further apart to keep to it
 MOST_CHORDS = 1e9
-HOMOGENEITY = "homogeneity"
-"""Code of the note on whether the blocks of a variant scatter more than their errors."""
 # p-value below which a sample is reported as not homogeneous
 UNLIKELY = 0.01
 # degrees of freedom of the error of a block: its number of parts minus one
@@ -77,9 +76,7 @@ def map_rows(
     blocks : two Blocks
         Blocks of the whole sample and of the RV.
     """
-    assert plan.map_blocks is not None
-    whole = plan.map_blocks.of_whole(sample.packing.cell)
-    blocks = whole, whole if plan.window is None else plan.map_blocks.of_window(plan.window)
+    blocks = tilings(plan, sample.packing.cell)
     scan, aims = partial(_scan_blocks, blocks), dict.fromkeys(plan.variants, plan.settings.aim())
     rows, notes = list[Row](), list[Note]()
     for part in plan.scans():
@@ -92,6 +89,21 @@ def map_rows(
             rows += [row_of(plan.settings.columns, {**known, **row}) for row in mapped.rows()]
             notes += mapped.notes()
     return rows, joined(notes), blocks
+
+
+def tilings(plan: Plan, cell: Cell | None) -> tuple[Blocks, Blocks]:
+    """The blocks of the whole sample and of the RV in a frame with this cell."""
+    assert plan.map_blocks is not None
+    whole = plan.map_blocks.of_whole(cell)
+    return whole, whole if plan.window is None else plan.map_blocks.of_window(plan.window)
+
+
+def places_of(blocks: Blocks) -> dict[str, FloatArray | IntArray]:
+    """The columns that say where each block lies, shape (B,)."""
+    columns = {"block": np.arange(len(blocks)), **dict(zip("xyz", blocks.middles.T, strict=True))}
+    if blocks.radius:
+        columns |= {"r_inner": blocks.bounds[:-1], "r_outer": blocks.bounds[1:]}
+    return columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,8 +233,7 @@ class VariantMap:
         along = SPACE.axial((normals @ axis) ** 2)
         of_contacts = self._by_part(points, along, np.ones(len(along)))
         arrays: dict[str, Any] = {
-            "block": np.arange(len(blocks)),
-            **dict(zip("xyz", blocks.middles.T, strict=True)),
+            **places_of(blocks),
             **self.grains,
             **self.void,
             **self._solid_fraction(),
@@ -230,8 +241,6 @@ class VariantMap:
             "segments": fabrics.segments.sum(axis=0).astype(np.int64),
             "at_surface": self.at_surface.astype(np.int64),
         }
-        if blocks.radius:
-            arrays |= {"r_inner": blocks.bounds[:-1], "r_outer": blocks.bounds[1:]}
         number, tensors = blocks.of(points), fabrics.tensors.mean(axis=0)
         for block, exists in enumerate(self.exists):
             own = normals[number == block]
@@ -341,6 +350,15 @@ class VariantMap:
                 f"blocks, closer lines (`spacing`), a shorter `cutoff`, or another frame for their "
                 f"place (such as `reference=-1`)"
             )
+        solid = self.sample.counted(variant, self.window) & ~self.sample.removed(variant)
+        grains = self.sample.number(solid)
+        outside = grains - int(self.grains["grains"].sum())
+        # the corners beyond shells, and the grains of an RV that reach beyond them, are left out
+        if outside and self.window is None and not self.blocks.radius:
+            texts["outside"] = (
+                f"{outside} of {grains} grains lie outside the blocks, which are those of the "
+                f"reference frame: `reference=-1` takes the last frame"
+            )
         notes = [Note(code, text, (variant.name,)) for code, text in texts.items()]
         return iter([*notes, self._homogeneity()])
 
@@ -360,9 +378,10 @@ class VariantMap:
                 f"as their errors explain ({chance}): {result} sample"
             )
             kind = ScanfabNote if is_homogeneous else ScanfabWarning
-            return Note(HOMOGENEITY, text, (self.variant.name,), kind)
+            # each frame has its own numbers, so it is told on its own
+            return Note(text, text, (self.variant.name,), kind)
         text = "too few blocks to tell whether the sample is homogeneous"
         if self.at_surface.any():
             text += f": {inner.sum()} of {len(inner)} are neither empty nor at a surface"
             text += ' (blocks inside the RV are not: `variants="c"` with `edge="start"`)'
-        return Note(HOMOGENEITY, text, (self.variant.name,), ScanfabNote)
+        return Note("few_blocks", text, (self.variant.name,), ScanfabNote)

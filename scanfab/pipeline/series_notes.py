@@ -82,7 +82,9 @@ class SeriesNotes:
             _, places = self._held.setdefault((note.code, note.variants), (note, []))
             if not places or note.kind is SkippedFrameWarning:
                 self._tell([note], f"frame {number}")
-            places.append(len(self._frames) - 1)
+            # a frame of several cut-offs has the same note several times
+            if places[-1:] != [len(self._frames) - 1]:
+                places.append(len(self._frames) - 1)
 
     def ranges(self) -> Iterator[tuple[Note, str]]:
         """The notes that hold for several frames, in short, and these frames in words."""
@@ -151,6 +153,9 @@ class SeriesNotes:
             return
         clearest = max(rows, key=lambda row: row["alpha_c"] / (row["alpha_c_axial_se"] or np.inf))
         axis = [clearest[f"gc_axis_{name}"] for name in "xyz"]
+        if abs(np.dot(axis, self.settings.axis)) > ALONG:
+            # its minor axes differ so much that its axial part is small
+            return
         near = [name for name, part in zip(AXES, axis, strict=True) if abs(part) > ALONG]
         if near:
             major = f'{near[0]}: choose `axis="{near[0]}"`'

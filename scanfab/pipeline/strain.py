@@ -238,4 +238,5 @@ class Flips:
             f"its vectors do not correspond to those of the first frame, so shear_strain is wrong "
             f"(LAMMPS: use fix deform ... flip no)"
         )
-        return [Note("flipped_cell", text)]
+        # each flip is a note of its own
+        return [Note(text, text)]
