@@ -166,6 +166,10 @@ class FollowedSeries(Series):
                 for frame in waiting[:1]:
                     problem = f"left out, because it was incomplete at the end: {self._problem}"
                     warn(f"{frame.snapshot.path}: {problem}")
+                if not waiting and self.grains.reader is not None:
+                    # a snapshot that is cut is no frame: searched once more, its file says so
+                    with suppress(ReadError):
+                        self.grains.reader.snapshots(list(self.grains.files.values())[-1])
                 return
         self._taken.append((waiting[0], _state(waiting[0].series, waiting[0])))
         self._since = time.monotonic()

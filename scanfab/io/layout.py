@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import Columns
-from scanfab.io.files import first_bytes
+from scanfab.io.files import first_bytes, growing
 from scanfab.io.reader import Snapshot
 from scanfab.io.text import CutError, Layout, is_number, read_rows, text_of, words_of
 
@@ -184,7 +185,12 @@ class FrameFile:
     def __init__(
         self, path: Path, names: Sequence[str], optional: Sequence[str] = (), *, positive: int = 0
     ) -> None:
-        self.path, table = path, text_table(path, 0)
+        self.path, self._asked = path, (names, optional, positive)
+        self._read()
+
+    def _read(self) -> None:
+        path, (names, optional, positive) = self.path, self._asked
+        table = text_table(path, 0)
         present = table.layout.names
         self.key = "step" if "step" in present else "frame"
         """``step`` or ``frame``: the column that identifies the frame of a row."""
@@ -195,7 +201,7 @@ class FrameFile:
         columns = read_text(path, table, [self.key, *wanted], [self.key])
         blank = np.zeros(len(columns[self.key]))
         rows = np.column_stack([columns.get(name, blank) for name in (*names, *optional)])
-        self._rows: dict[int, tuple[float, ...]] = {}
+        known: dict[int, tuple[float, ...]] = {}
         pairs = zip(columns[self.key].tolist(), map(tuple, rows.tolist()), strict=True)
         for line, (number, row) in enumerate(pairs, table.layout.line):
             is_sound = np.isfinite([number, *row]).all() and number == round(number)
@@ -203,10 +209,16 @@ class FrameFile:
                 above = f" (above 0: {', '.join(names[:positive])})" if positive else ""
                 expected = f"expected a whole {self.key} and finite numbers{above}"
                 raise ReadError(f"{path}, line {line}: {expected}, found {number}, {row}")
-            if self._rows.setdefault(int(number), row) != row:
+            if known.setdefault(int(number), row) != row:
                 raise ReadError(f"{path}, line {line}: {self.key} {number} occurs twice")
+        # at once, as other threads read it
+        self._rows = known
 
     def at(self, frame: int, step: int | None) -> tuple[float, ...] | None:
         """The numbers of a frame; None if the file has no row for it."""
         number = step if self.key == "step" else frame
+        if number is not None and number not in self._rows:
+            # a running simulation may have added lines, of which the last may be incomplete
+            with suppress(ReadError), growing():
+                self._read()
         return None if number is None else self._rows.get(number)
