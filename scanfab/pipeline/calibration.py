@@ -15,6 +15,7 @@ from scanfab.base.column import LENGTH
 from scanfab.base.errors import Note, PackingError, SettingsError, tell
 from scanfab.base.spelling import counted
 from scanfab.io.options import parse_frames
+from scanfab.packing.sample import VARIANTS
 from scanfab.pipeline.frame import OTHER_CUTOFFS, compute_frame
 from scanfab.pipeline.frames import Frames, NoChosenFrameError, Source, doubts_of_frame
 from scanfab.pipeline.measurement import Measurement
@@ -264,13 +265,14 @@ class _OneFrame:
     ) -> tuple[list[StepRow], Measurement]:
         """Scan one step: its rows and its measurement. Without a value, rows take their cut-off."""
         begun = time.perf_counter()
-        plan, radius = make_plan(settings, self.first), self.sample.packing.radius
-        shadow = self.space.shadow(radius[self.sample.grains])
+        plan, sample = make_plan(settings, self.first), self.sample
+        solids = sample.solids(VARIANTS[settings.variants[0]], plan.window)
+        shadow = self.space.shadow(sample.packing.radius[solids])
         chords = self.space.lines(shadow, plan.spacing) * plan.replicates * len(plan.rule)
         if ladder in ("spacing", "directions") and chords > settings.budget:
             allowed = f"more than `max_chords` allows ({settings.budget:g})"
             raise SettingsError(f"it would cut {chords:.2g} chords from grains, {allowed}")
-        result = compute_frame(self.sample, plan, number=self.number, source=self.name)
+        result = compute_frame(sample, plan, number=self.number, source=self.name)
         seconds = time.perf_counter() - begun
         LOGGER.info("%s %s: %.2g s", ladder, "" if value is None else f"{value:g}", seconds)
         r_min = float(self.first.packing.radius[self.first.grains].min())
@@ -302,7 +304,10 @@ class _OneFrame:
         The choice uses other random lines than the final scan, whose error is reported. Otherwise
         the settings would suit just these lines, and a user would find a larger error.
         """
-        spacing = min(first_steady(spacings) or PAPER_SPACING, FIXED_SPACING)
+        # `max_chords` may have skipped the closest steps
+        has_all = any(row.value == PAPER_SPACING for row in spacings)
+        finest = PAPER_SPACING if has_all else FIXED_SPACING
+        spacing = min(first_steady(spacings) or finest, FIXED_SPACING)
         rule = rule_of(int(first_steady(directions) or len(usual_rule(self.space))), self.space)
         other_lines = replace(self.settings, tolerance=target, seed=self.settings.seed + 1)
         for _ in range(ROUNDS):

@@ -148,11 +148,15 @@ def test_the_sentences_say_what_the_rows_show(found):
 
 def test_steps_beyond_the_budget_are_left_out_with_a_word(packing):
     chords = np.pi * np.sum(packing.radius**2) * 16 / (0.2 * packing.radius.min()) ** 2
-    options = {**QUICK, "tolerance": 0.02, "max_chords": 1.05 * chords}
+    options = {"tolerance": 0.02, "rv": 0.6, "max_chords": 1.05 * chords}
     with pytest.warns(ScanfabWarning) as told:
-        few = calibrate(packing, **options)
-    assert [row.value for row in ladder(few, "spacing")] == [4, 2, 1, 0.5, 0.2]
+        few = calibrate(packing, variants="a", **options)
+        # lines in the RV cut the grains that reach into it alone
+        inner = calibrate(packing, variants="c", **options)
+    assert [row.value for row in ladder(few, "spacing", "a")] == [4, 2, 1, 0.5, 0.2]
     assert any("spacing 0.1 is skipped: it would cut" in str(one.message) for one in told)
+    assert few.options["spacing"] != "0.1rmin"
+    assert ladder(inner, "spacing")[-1].value == 0.1
 
 
 def test_one_ladder_is_drawn_on_the_axes_that_it_gets(found):
