@@ -143,16 +143,26 @@ def _docstrings(module: str) -> dict[str, dict[str, str]]:
     }
 
 
-def refuse_unknown(what: str, given: Iterable[str], known: Sequence[str]) -> None:
-    """Raise TypeError for a name that is no option; the message suggests the nearest option."""
+def refuse_unknown(
+    what: str, given: Iterable[str], known: Sequence[str], elsewhere: Sequence[Option] = ()
+) -> None:
+    """
+    Raise TypeError for a name that is no option; the message suggests the nearest option.
+
+    ``elsewhere`` are the options of ``read_series``, which a user may have given to ``compute``.
+    """
     for name in given:
         if name not in known:
             near = get_close_matches(name, known, n=1)
             hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
+            if any(option.name == name for option in elsewhere):
+                hint = "it is an option of read_series"
             raise TypeError(f"{what} has no option {name!r}: {hint}")
 
 
-def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def takes_options(
+    options: Sequence[Option], elsewhere: Sequence[Option] = ()
+) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """
     Decorate a function whose signature lists options, which is where editors look for them.
 
@@ -165,7 +175,7 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
 
         @wraps(function)
         def call(*args: P.args, **kwargs: P.kwargs) -> R:
-            refuse_unknown(function.__name__, kwargs, list(parameters))
+            refuse_unknown(function.__name__, kwargs, list(parameters), elsewhere)
             return function(*args, **kwargs)
 
         helps = {}

@@ -214,12 +214,14 @@ def _bar() -> Progress:
     """A progress bar that disappears at the end."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.table import Column
 
-    text = TextColumn("{task.description}")
+    # a long text is cut, not the time beside it
+    text = TextColumn("{task.description}", table_column=Column(ratio=1, no_wrap=True))
     columns = (SpinnerColumn(), BarColumn(20), TimeElapsedColumn(), text)
     # the bar leaves standard output alone, or rows would go to the terminal in place of their file
     console = Console(stderr=True)
-    return Progress(*columns, console=console, transient=True, redirect_stdout=False)
+    return Progress(*columns, console=console, transient=True, redirect_stdout=False, expand=True)
 
 
 def is_readable() -> bool:

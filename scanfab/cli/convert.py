@@ -21,6 +21,8 @@ def convert(sources: tuple[str, ...], out: str, to: str | None, **chosen: Any) -
     OUT is a file for one frame; for several frames it is a folder, or a file name with {step}.
     What a format cannot hold goes into companion files beside each file; scanfab reads them too.
     """
+    if out == "-":
+        raise click.UsageError("OUT is a file or a folder: nothing is written to standard output")
     reading, settings = checked(chosen, scanfab.Settings)
     series = open_one(sources, reading, "converted")
     tell_inputs([series], 1)

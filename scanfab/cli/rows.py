@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -166,13 +166,18 @@ def _write(job: Job, excerpt: Excerpt) -> None:
                 elif as_table:
                     rows = list(job.rows(advance))
                 else:
-                    print_csv(job.rows(advance), excerpt, job.settings.columns)
+                    # closed here: if the reader of a pipe ends, the last notes are still told
+                    with closing(job.rows(advance)) as rows_so_far:
+                        print_csv(rows_so_far, excerpt, job.settings.columns)
             if as_table:
                 print_table(rows, excerpt)
             if job.output is None:
                 job.save_manifests()
-    except (scanfab.ScanfabError, OSError):
-        if job.output is not None and (job.is_over or 0 < job.done < job.frames()):
+    except (scanfab.ScanfabError, OSError) as error:
+        # with the same wrong option the same command would stop again
+        is_wrong = isinstance(error, scanfab.SettingsError)
+        has_more = job.is_over or 0 < job.done < job.frames()
+        if job.output is not None and has_more and not is_wrong:
             click.echo(f"scanfab: stopped {standing()}", err=True)
         raise
 

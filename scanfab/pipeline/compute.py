@@ -23,6 +23,7 @@ from scanfab.base.errors import (
 from scanfab.base.option import options_of, takes_options, unusable
 from scanfab.base.spelling import spelt_time
 from scanfab.io.frame import Frame
+from scanfab.io.options import READING_OPTIONS
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.cluster import DaskExecutor, DeadWorkersError
 from scanfab.pipeline.frame import FrameResult, compute_frame
@@ -43,7 +44,7 @@ Observer = Callable[[FrameResult], None]
 PAUSE = 2.0
 
 
-@takes_options(options_of(Settings))
+@takes_options(options_of(Settings), READING_OPTIONS)
 def compute(
     source: Source,
     *,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -189,7 +189,7 @@ class Job:
                 self.taken_over = self.done
             yield
 
-    def rows(self, advance: Advance = lambda: None) -> Iterator[Row]:
+    def rows(self, advance: Advance = lambda: None) -> Generator[Row, None, None]:
         """The rows that are computed now; a frame is finished once its rows are taken."""
         for _, rows in self._computed(advance):
             yield from rows

@@ -22,7 +22,7 @@ from scanfab.base.option import (
 )
 from scanfab.base.space import Space
 from scanfab.base.spelling import spelt_place
-from scanfab.io.options import parse_frames
+from scanfab.io.options import READING_OPTIONS, parse_frames
 from scanfab.packing.boundary import BoundaryRule
 from scanfab.packing.rattlers import installed_rules
 from scanfab.pipeline import values
@@ -226,7 +226,7 @@ class Settings:
     def __init__(self, **options: Any) -> None:
         """Check the options as users write them, and keep what they mean."""
         declared = options_of(type(self))
-        refuse_unknown("Settings", options, [option.name for option in declared])
+        refuse_unknown("Settings", options, [one.name for one in declared], READING_OPTIONS)
         for option in declared:
             value = option.parse(option.name, options.get(option.name, option.default))
             object.__setattr__(self, option.name, value)

@@ -170,7 +170,10 @@ def parse_axis(name: str, text: str | Iterable[float] | None) -> Axis:
         return AXES[text]
     expected = "x, y, z or three numbers X,Y,Z"
     vector = numbers(expected, lambda v: len(v) == 3 and math.hypot(*v) > 0)(name, text)
-    return Axis(*(part / math.hypot(*vector) for part in vector))
+    # a unit vector stays as it is, so that the axis of a manifest gives the same numbers again
+    length = math.hypot(*vector)
+    length = 1.0 if math.isclose(length, 1.0, rel_tol=1e-15) else length
+    return Axis(*(part / length for part in vector))
 
 
 # axis of a cylinder; None stands for the loading axis

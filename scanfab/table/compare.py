@@ -199,7 +199,8 @@ def compare_tables(
         if count > 1:
             raise SettingsError(
                 f"{source}, variant {variant}: several rows for frame {frame}: choose one cut-off "
-                f"with `cutoff`, or name two runs of the same sample with `labels=NAME`"
+                f"with `cutoff` (in Python by table.select(cutoff=...)), or name two runs of the "
+                f"same sample with `labels=NAME`"
             )
     column = strain_column(rows) or "strain"
     _tell_of_strains(rows, column, strain_max)
@@ -261,11 +262,14 @@ def _tell_of_errors(summary: Iterable[Mapping[str, Any]], rows: Rows) -> None:
     without = [one for one in summary if one["slope"] is not None and one["slope_se"] is None]
     if not without:
         return
-    parts = [row.get("alpha_vs_axial_without_1") for row in rows]
+    curve = [row for row in rows if row["alpha_vs_axial"] is not None]
+    parts = {
+        name for row in curve for name in row if "_without_" in name and numbers_of([row], name)
+    }
     reason = "the noise of the scan hides the scatter of the octants"
-    if all(part is None for part in parts):
+    if not parts:
         reason = "the table has no parts of the jackknife (alpha_vs_axial_without_1 and so on)"
-    elif None in parts:
+    elif any(row.get(name) is None for row in curve for name in parts):
         reason = "some frame has no fabric without one of its octants, so it has too few grains"
     names = ", ".join(dict.fromkeys(variant_of(one) for one in without))
     note(f"slope_se is empty for variant {names}: {reason}")
