@@ -295,14 +295,14 @@ MAKERS: dict[str, Callable[[Path], list[Path]]] = {
 }  # fmt: skip
 
 
-def _made(format: str, folder: Path) -> list[Path]:
+def made(format: str, folder: Path) -> list[Path]:
     """Files of a format, made in a folder."""
     written = _written(folder, TEXTS.get(format, {}))
     return written + (MAKERS[format](folder) if format in MAKERS else [])
 
 
 SMALL = {
-    name: partial(_made, name)
+    name: partial(made, name)
     for name in ("esys", "gsd", "kratos", "lf-dem", "mercurydpm", "mfix", "musen")
 }
 """Makers of the files of each format that has few of them; the first file has grains."""
@@ -336,7 +336,7 @@ def seeds(format: str, folder: Path) -> list[Seed]:
         and path.stat().st_size < MOST_BYTES
         and _is_for(format, path)
     ]
-    return [(path.name, path.read_bytes()) for path in (*_made(format, folder), *samples)]
+    return [(path.name, path.read_bytes()) for path in (*made(format, folder), *samples)]
 
 
 def _is_for(format: str, path: Path) -> bool:

@@ -9,8 +9,6 @@ import pytest
 
 import scanfab
 from scanfab import ScanfabError, ScanfabWarning
-from scanfab.io.reader import reader_named
-from scanfab.testing import check_reader
 from tests.helpers.dumps import dump_text, refuses, write
 from tests.helpers.made.data_files import CENTRES, DIAMETERS, TITLE, data_file
 
@@ -96,13 +94,10 @@ def test_what_is_no_such_file(tmp_path, old, new, message):
     refuses(write(tmp_path / "a.data", text.replace(old, new)), message, error=ScanfabError)
 
 
-def test_cut_files_and_the_kit(tmp_path):
+def test_a_last_line_without_an_end_is_doubted(tmp_path):
     path = write(tmp_path / "a.data", data_file(velocities=False)[:-1])
     with pytest.warns(ScanfabWarning, match="the last line has no end"):
         assert len(scanfab.read(path)) == 3
-    plain = write(tmp_path / "plain.data", data_file())
-    hybrid = write(tmp_path / "hybrid.data", data_file("hybrid", behind=" 7"))
-    check_reader(reader_named("liggghts"), [plain, hybrid], tmp_path / "damaged", counts=True)
 
 
 @pytest.mark.parametrize(

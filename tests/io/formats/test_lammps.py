@@ -10,10 +10,9 @@ import pytest
 import scanfab
 from scanfab import ScanfabWarning
 from scanfab.io.formats import binary_dump as binary
-from scanfab.io.reader import reader_for, reader_named
-from scanfab.testing import check_reader
-from tests.helpers.dumps import NAMES, ROWS, binary_dump, refuses, write
-from tests.helpers.made.lammps import netcdf, yaml_text
+from scanfab.io.reader import reader_for
+from tests.helpers.dumps import NAMES, ROWS, binary_dump, refuses
+from tests.helpers.made.lammps import netcdf
 from tests.helpers.truth import OF_SHEAR, SHEAR, id_pairs, lammps_fabric, off_by
 
 FORMS = SHEAR / "forms"
@@ -128,11 +127,6 @@ def test_netcdf_that_cannot_be_read(tmp_path, monkeypatch):
     refuses(netcdf(tmp_path / "a.nc", axes=2), "coordinates was not written for all atoms", frame=0)
     monkeypatch.setattr(binary, "find_spec", lambda name: None)
     refuses(tmp_path / "a.nc", r'pip install "scanfab\[netcdf\]"')
-
-
-def test_the_kit(tmp_path):
-    files = [write(tmp_path / "a.yaml", yaml_text()), netcdf(tmp_path / "a.nc")]
-    check_reader(reader_named("lammps"), files, tmp_path / "damaged", counts=True)
 
 
 NUMBERS = {name: str(place) for place, name in enumerate(NAMES.split(), start=1)}

@@ -8,8 +8,8 @@ import pytest
 import pyvista
 
 import scanfab
-from scanfab.io.reader import reader_for, reader_named
-from scanfab.testing import check_reader, made_up_packings
+from scanfab.io.reader import reader_for
+from scanfab.testing import made_up_packings
 from tests.helpers.dumps import refuses
 from tests.helpers.made.on_dem import COMPRESSION, FORCE, IDS, POSITION, draft_1, draft_2
 
@@ -93,8 +93,3 @@ def test_what_cannot_be_read_is_told(tmp_path, reason):
     with h5py.File(path, "a") as file:
         SPOILT[reason](file["VTKHDF/PointData"])
     refuses(path, reason)
-
-
-def test_damaged_files_end_nothing(tmp_path):
-    files = [draft_1(tmp_path / "a.vtkhdf")]
-    check_reader(reader_named("on-dem"), files, tmp_path / "damaged", counts=True)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-
 import h5py
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from scanfab import ReadError, ScanfabNote
 from scanfab.io import reader as readers
 from scanfab.io.formats import musen as musen_reader
 from scanfab.io.reader import reader_named
-from scanfab.testing import check_reader
 from tests.helpers.dumps import refuses, write
 from tests.helpers.made import esys, gsd, musen
 from tests.helpers.made.kratos import MDPA
@@ -74,8 +71,6 @@ WRONG = {
         ("a.txt", "28 0 0", "28 1 1", "its periodic domain"),
     ],
 }
-# files that no cut may make a smaller sample
-COUNTED = ("a.mdpa", "a.dat", "flat.data", "run.restart", "a.gsd")
 
 
 @pytest.mark.parametrize(
@@ -88,21 +83,6 @@ def test_what_is_wrong(tmp_path, format, name, old, new, message):
     file.write_text(file.read_text().replace(old, new, 1))
     with pytest.raises(scanfab.ScanfabError, match=message):
         scanfab.read_series(path if format == "esys" else file, contacts="geometric")[0].read()
-
-
-@pytest.mark.parametrize("format", SMALL)
-def test_the_kit(tmp_path, format):
-    reader = reader_named(format)
-    (tmp_path / "damaged").mkdir()
-    paths = SMALL[format](tmp_path)
-    for path in paths if format == "esys" else []:
-        shutil.copy(path, tmp_path / "damaged")
-    grains = [path for path in paths if reader.kind(path) == "grains"]
-    contacts = [(path, grains[0]) for path in paths if reader.kind(path) == "contacts"]
-    for path in grains:
-        is_counted = path.name in COUNTED
-        check_reader(reader, [path], tmp_path / "damaged", contacts=contacts, counts=is_counted)
-        contacts = []
 
 
 @pytest.mark.parametrize("behind", ["", esys.TURNS, " 1", " 1 0.1" + esys.TURNS + " 1"])
