@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import ScanfabError, ScanfabWarning
+from scanfab import ScanfabWarning
 from tests.helpers.dumps import dump_text, refuses, write
 from tests.helpers.made.data_files import CENTRES, DIAMETERS, TITLE, data_file
 
@@ -68,30 +68,6 @@ def test_columns_can_be_named_by_their_numbers(tmp_path):
     path = write(tmp_path / "a.data", data_file(title="LIGGGHTS Description"))
     columns = {"id": 1, "radius": 3, "x": 5, "y": 6, "z": 7}
     np.testing.assert_array_equal(scanfab.read(path, columns=columns).radius, DIAMETERS)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        (LAMMPS, "LIGGGHTS Description", "expected diameters.*YADE's radii"),
-        (" 1.0 2500 0", " 1.0 0 2500", "density, found '1 1 1 0 2500.*names them"),
-        (" 1.0 2500", " 0 2500", "expected a positive diameter"),
-        ("-1 3 xlo", "90 94 xlo", "expected the centre in the box, found '1 1 1 2500"),
-        ("1 atom types", "1 atom types\n3 ellipsoids", "expected diameters.*found ellipsoids"),
-        ("Atoms\n", "Atoms # atomic\n", "found 'Atoms # atomic'"),
-        ("Atoms\n", "Masses\n", "expected .* a section Atoms"),
-        ("3 atoms", "999999999999 atoms", "counts 999999999999 atoms, found 3"),
-        ("\nVelocities", "4\n\nVelocities", "counts 3 atoms, found 4"),
-        ("-1 3 xlo", "-1 xlo", "xlo xhi.*: expected 6 numbers"),
-        ("2 1 1.0", "2 1 word", "line 12: expected a number .* found 'word'"),
-        ("2 1 1.0 2500", "2 1 1.0", "line 12: expected 7 columns, found 6"),
-        ("Atoms\n\n1 1 1.0", "Atoms # sphere\n\n1 1 nan", "position and radius must be finite"),
-    ],
-)
-def test_what_is_no_such_file(tmp_path, old, new, message):
-    text = data_file(title=LAMMPS)
-    assert old in text
-    refuses(write(tmp_path / "a.data", text.replace(old, new)), message, error=ScanfabError)
 
 
 def test_a_last_line_without_an_end_is_doubted(tmp_path):

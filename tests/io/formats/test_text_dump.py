@@ -126,38 +126,6 @@ def test_only_a_periodic_box_must_have_a_volume(tmp_path, edge):
         read(tmp_path, dump_text(box=box, flags=" ff pp ff"))
 
 
-WHOLE = [("ATOMS\n3", f"ATOMS\n{bad}", "whole number") for bad in ("", "many", "-1", "9" * 30)]
-WHOLE += [("STEP\n0", f"STEP\n{bad}", "whole number") for bad in ("", "ten", "1.5", "9" * 5000)]
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
-        *WHOLE,
-        ("ff ff ff", "zz zz zz", "BOX BOUNDS.*expected"),
-        ("ff ff ff", "pp pp", "BOX BOUNDS.*expected"),
-        ("ITEM: TIMESTEP\n0\n", "", "expected the header of a frame"),
-        ("BOX BOUNDS ff ff ff\n0 1\n", "BOX BOUNDS ff ff ff\n", "BOX BOUNDS.*expected 6 numbers"),
-        ("ITEM: TIMESTEP", TIMES.format("now") + "ITEM: TIMESTEP", "ITEM: TIME: expected 1 num"),
-        ("ATOMS\n3", "ATOMS\n9", "step 0: .*counts 9 rows, found 3: the file is incomplete"),
-        ("ATOMS\n3", "ATOMS\n2", "counts 2 rows, found 3"),
-        ("0.39", "oops", "dump, line 1[19]: .* found 'oops'"),
-        ("2 1 0.39", "2 1", "dump, line 11: expected 6 columns, found 5"),
-        ("natoms: 3", "natoms: 4", "counts 4 rows, found 3"),
-        (", -3, ]\n  -", ", ]\n  -", "line 18: expected 7 columns, found 6"),
-        ("p, f", "p, q", "expected three boundary flags"),
-        ("box:", "bax:", "expected 6 numbers"),
-        ("data:\n  - [", "", "whole number"),
-    ],
-)
-def test_what_is_wrong_with_a_dump(tmp_path, old, new, told):
-    texts = [text for text in (dump_text(), yaml_text()) if old in text]
-    assert texts
-    for text in texts:
-        with pytest.raises(ReadError, match=told):
-            read(tmp_path, text.replace(old, new, 1), format="liggghts")
-
-
 def test_a_bad_line_of_a_later_snapshot_is_counted_from_the_first(tmp_path):
     text = dump_text(step=-1) + dump_text().replace("0.58", "oops")
     with pytest.raises(ReadError, match=r"dump, line 24: .* found 'oops'"):

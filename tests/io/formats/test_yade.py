@@ -155,24 +155,3 @@ def test_attributes_have_the_names_of_the_second_line_or_are_numbered(tmp_path):
     write(path, "#format x_y_z_r_clumpId\n1\t2\t3\t0.5\t7\n")
     np.testing.assert_array_equal(scanfab.read(path).columns["clumpId"], [7])
     assert len(scanfab.read(write(path, "#format x_y_z_r\n"))) == 0
-
-
-def test_a_comment_is_a_line_of_its_own(tmp_path):
-    """A sign of a comment inside a row is damage, which must not cut the row short."""
-    path = write(tmp_path / "a.txt", "#format x_y_z_r\n  # more\n0 0 0 0.5\n3 0 1 0.2#5\n")
-    refuses(path, r"line 4: expected a number in the column r, found '0\.2#5'")
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("#format x_y_z_r\n1 2 3\n", "line 1 names 4 columns, but the rows have 3"),
-        ("#format x_y_z_r\n1 2 3 oops\n", "a.txt, line 2: .*oops"),
-        ("#format x_y_z_r\n1 2 3 1\n1 2 3\n", "a.txt, line 3: expected 4 columns"),
-        ("#format x_y_z_r\n# a comment\n0 0 0 1\n3 x 0 1\n", "a.txt, line 4: .*'x'"),
-        ("##PERIODIC:: 1 2\n1 2 3 1\n", "line 1: expected 3 numbers"),
-        ("##PERIODIC:: 1 2 0\n1 2 3 1\n", "a.txt"),
-    ],
-)
-def test_a_text_that_cannot_be_read_says_why(tmp_path, text, message):
-    refuses(write(tmp_path / "a.txt", text), message)

@@ -76,25 +76,6 @@ def test_the_small_save_in_a_tilted_cell(tmp_path):
     assert packing.contacts.pairs.tolist() == [[0, 1]]
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("</scene>", "</scen>", "cannot be read as a simulation that YADE saved"),
-        (small_save()[900:], "", "cannot be read as a simulation that YADE saved"),
-        ("<radius>0.1</radius>", "", "<px> has no <radius>"),
-        ("<radius>0.1</radius>", "<radius>nan</radius>", "must be finite"),
-        ("<id>1</id>", "<id>1.5</id>", "ids must be whole numbers"),
-        ("<id>3</id>", "<id>0</id>", "names the body 3, which is not there"),
-        ("<m00>1.0</m00>", "<m00>0.0</m00>", "span no volume"),
-    ],
-)
-def test_what_is_wrong_with_a_save(tmp_path, old, new, message):
-    text = small_save()
-    assert old in text
-    path = write(tmp_path / "a.xml", text.replace(old, new, 1))
-    refuses(path, message, error=scanfab.ScanfabError)
-
-
 def test_entities_that_grow_are_an_error(tmp_path):
     bomb = "<!DOCTYPE boost_serialization [<!ENTITY a0 'aaaaaaaaaa'>" + "".join(
         f"<!ENTITY a{n} '{f'&a{n - 1};' * 10}'>" for n in range(1, 12)

@@ -1,0 +1,128 @@
+"""What is wrong with a file is told: a damage of a sound one, or a text that cannot be right."""
+
+from __future__ import annotations
+
+import pytest
+
+import scanfab
+from tests.helpers.dumps import write
+from tests.helpers.sound_files import made
+
+TIME = "ITEM: TIME\nnow\nITEM: TIMESTEP"
+# file, what is replaced in it, by what, and words of the message
+WRONG = {
+    "esys": [
+        ("snap_t=30_0.txt", "_2.txt", "_1.txt", "each worker's file once"),
+        ("snap_t=30_0.txt", " snap_t=30_2.txt", "", "and 1 other files: it is cut"),
+        ("snap_t=30_1.txt", "2\n1 1", "9\n1 1", "30_1.txt: the header counts 9 particles"),
+        ("snap_t=30_1.txt", "2\n1 1", "1\n1 1", "30_1.txt: .* counts 1 particles, found 2"),
+        ("snap_t=30_1.txt", "0.25 4 77", "0.25 4", "30_1.txt: .* counts 2 particles, found 0"),
+        ("snap_t=30_2.txt", "1\n3.75", "x\n3.75", "30_2.txt: expected the number of particles"),
+    ],
+    "kratos": [
+        ("a.mdpa", "7  1 0.2\n", "", "no place or RADIUS for 1 nodes, such as 7"),
+        ("a.mdpa", "SphericParticle3D", "Cluster3D", "elements that are spheres"),
+        ("a.mdpa", "End Nodes", "", "incomplete"),
+        ("a.mdpa", "End SubModelPart\n", "", "incomplete"),
+        ("a.mdpa", "RADIUS", "MASS", "no grains: expected points with a radius"),
+    ],
+    "lammps": [
+        ("a.yaml", "natoms: 3", "natoms: 4", "counts 4 rows, found 3"),
+        ("a.yaml", "0.39", "oops", "a.yaml, line 19: .* found 'oops'"),
+        ("a.yaml", ", -3, ]\n  -", ", ]\n  -", "line 18: expected 7 columns, found 6"),
+        ("a.yaml", "p, f", "p, q", "expected three boundary flags"),
+        ("a.yaml", "box:", "bax:", "expected 6 numbers"),
+        ("a.yaml", "data:\n  - [", "", "whole number"),
+    ],
+    "lf-dem": [
+        ("par.dat", "# Lz 6", "# Lz", "'# Lz': expected 4 numbers"),
+        ("par.dat", "#2: radius", "#2: size", "no reader knows|expected points with a radius"),
+        ("par.dat", "0 1 0 0 2.5 9", "0 1 0 0 2.5 9 9", "line 13: expected 8 columns, found 9"),
+        ("par.dat", "#6-8:", "#0:", "line 13: expected 5 columns, found 8"),
+        ("par.dat", "# 0.0 1.0", "# 0.0 x", "above '0 1 0 0 2.5"),
+    ],
+    "liggghts": [
+        *(
+            ("one.txt", f"{key}\n{value}", f"{key}\n{bad}", "whole number")
+            for key, value, *all_bad in (
+                ("ATOMS", "3", "", "many", "-1", "9" * 30),
+                ("STEP", "0", "", "ten", "1.5", "9" * 5000),
+            )
+            for bad in all_bad
+        ),
+        ("one.txt", "ff ff ff", "zz zz zz", "BOX BOUNDS.*expected"),
+        ("one.txt", "ff ff ff", "pp pp", "BOX BOUNDS.*expected"),
+        ("one.txt", "ITEM: TIMESTEP\n0\n", "", "expected the header of a frame"),
+        ("one.txt", "ff ff ff\n0 1\n", "ff ff ff\n", "BOX BOUNDS.*expected 6 numbers"),
+        ("one.txt", "ITEM: TIMESTEP", TIME, "ITEM: TIME: expected 1 num"),
+        ("one.txt", "ATOMS\n3", "ATOMS\n9", "step 0: .*counts 9 rows, found 3: .* incomplete"),
+        ("one.txt", "ATOMS\n3", "ATOMS\n2", "counts 2 rows, found 3"),
+        ("one.txt", "0.39", "oops", "one.txt, line 11: .* found 'oops'"),
+        ("one.txt", "2 1 0.39", "2 1", "one.txt, line 11: expected 6 columns, found 5"),
+        ("plain.data", "data file", "Description", "expected diameters.*YADE's radii"),
+        ("plain.data", " 1.0 2500 0", " 1.0 0 2500", "density, found '1 1 1 0 2500.*names them"),
+        ("plain.data", " 1.0 2500", " 0 2500", "expected a positive diameter"),
+        ("plain.data", "-1 3 xlo", "90 94 xlo", "the centre in the box, found '1 1 1 2500"),
+        ("plain.data", "types", "types\n3 ellipsoids", "expected diameters.*found ellipsoids"),
+        ("plain.data", "Atoms\n", "Atoms # atomic\n", "found 'Atoms # atomic'"),
+        ("plain.data", "Atoms\n", "Masses\n", "expected .* a section Atoms"),
+        ("plain.data", "3 atoms", "99999 atoms", "counts 99999 atoms, found 3"),
+        ("plain.data", "\nVelocities", "4\n\nVelocities", "counts 3 atoms, found 4"),
+        ("plain.data", "-1 3 xlo", "-1 xlo", "xlo xhi.*: expected 6 numbers"),
+        ("plain.data", "2 1 1.0", "2 1 word", "line 12: expected a number .* found 'word'"),
+        ("plain.data", "2 1 1.0 2500", "2 1 1.0", "line 12: expected 7 columns, found 6"),
+        ("plain.data", "Atoms\n\n1 1 1.0", "Atoms # sphere\n\n1 1 nan", "must be finite"),
+    ],
+    "mercurydpm": [
+        ("run.restart", "BaseParticle id 10", "SuperQuadricParticle id 10", "spheres in 'SuperQ"),
+        ("run.restart", "Particles 3", "Particles 2", "'Particles N' with N rows"),
+        ("run.restart", "Interactions 4", "Interactions 3", "'Interactions N'"),
+        ("run.restart", "radius 0.1", "radius", "spheres in .* expected 6 numbers"),
+        ("run.restart", "particleIds 10 30", "particleIds 10 31", "names the grain 31"),
+        ("run.restart", "force -2 0.5", "force nan 0.5", "finite numbers"),
+        ("run.restart", "PeriodicBoundary", "LeesEdwardsBoundary", "a PeriodicBoundary"),
+        ("run.restart", "shift 1 0 0", "shift 0 0 0", "no volume"),
+        ("run.data", "0.29 1 1", "0.29 x 1", "run.data, line 3: expected a number in the column y"),
+    ],
+    "mfix": [
+        ("a.dat", "Version 2.0", "Version 3.0", "version 2.0 .* found 3.0"),
+        ("a.dat", "Particles:    2", "Particles:    3", "the header counts 3 particles, found 2"),
+        ("a.dat", "F  0.0017", "F  none", "Diameter: expected T, or F and a number"),
+        ("a.dat", "Density: ", "Weight: ", "T or F .* Density"),
+    ],
+    "musen": [
+        ("a.txt", "0 1 1 1 5 0.1", "0 1 1 1 5 word", "line 2: expected a number"),
+        ("a.txt", "0 1 1 1 5 0.1", "0 1 1 5 0.1", "line 2: expected 0 ID 1 TYPE 5"),
+        ("a.txt", "1 1 1 5 0.1 0.4 23", "1 1 1 5 0.1 0.4 22", "the same properties in the rows"),
+        ("a.txt", " 36 9", " 99 9", "expected properties 0 ID"),
+        ("a.txt", "28 0 0", "28 1 1", "its periodic domain"),
+    ],
+    "yade": [
+        ("save.xml", "</scene>", "</scen>", "cannot be read as a simulation that YADE saved"),
+        ("save.xml", "<radius>0.1</radius>", "", "<px> has no <radius>"),
+        ("save.xml", "<radius>0.1</radius>", "<radius>nan</radius>", "must be finite"),
+        ("save.xml", "<id>1</id>", "<id>1.5</id>", "ids must be whole numbers"),
+        ("save.xml", "<id>3</id>", "<id>0</id>", "names the body 3, which is not there"),
+        ("save.xml", "<m00>1.0</m00>", "<m00>0.0</m00>", "span no volume"),
+        ("attrs.txt", "r_attrs", "r_nothing", "line 1 names 5 columns, but the rows have 6"),
+        ("attrs.txt", "1 2 3\n", "oops 2 3\n", "attrs.txt, line 3: .*oops"),
+        ("pack.txt", "2 0 0 1 -1", "2 0 0 1", "pack.txt, line 3: expected 5 columns"),
+        # a sign of a comment inside a row is damage, which must not cut the row short
+        ("pack.txt", "2 0 0 1 -1", "2 0 0 1 -1#5", "line 3: expected a number .* found '-1#5'"),
+        ("pack.txt", "4 4 4", "4 4", "line 1: expected 3 numbers"),
+        ("pack.txt", "4 4 4", "4 4 0", "pack.txt"),
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    ("format", "name", "old", "new", "message"),
+    [(name, *case) for name, cases in WRONG.items() for case in cases],
+)
+def test_a_damage_is_told(tmp_path, format, name, old, new, message):
+    path, file = made(format, tmp_path)[0], tmp_path / name
+    text = file.read_text()
+    assert old in text
+    write(file, text.replace(old, new, 1))
+    with pytest.raises(scanfab.ScanfabError, match=message):
+        scanfab.read_series(path if format == "esys" else file, contacts="geometric")[0].read()
