@@ -83,6 +83,17 @@ def assert_same_vectors(found, expected, *, atol: float) -> None:
     )
 
 
+def assert_true_contacts(packing, truth, *, normals=None, forces=None) -> None:
+    """The pairs of a truth file; and its normals and forces, within these bounds."""
+    assert packing.contacts.source == "file"
+    assert len(packing.contacts) == len(truth)
+    assert id_pairs(packing) == true_pairs(truth)
+    if normals is not None:
+        assert_same_vectors(normals_by_pair(packing), true_vectors(truth, "n"), atol=normals)
+    if forces is not None:
+        assert_same_vectors(forces_by_pair(packing), true_vectors(truth, "f"), atol=forces)
+
+
 def lammps_fabric(packing) -> list[float]:
     """LAMMPS' compute fabric contact: 15/2 of the deviator of the mean of n n, xx to yz."""
     tensor = np.mean([np.outer(n, n) for n in packing.contacts.normal], axis=0)

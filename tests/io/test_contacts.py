@@ -7,11 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import scanfab
 from scanfab import ReadError
 from scanfab.io import GrainTable, join_ids, join_positions
 from scanfab.packing.cell import Cell
-from tests.helpers.dumps import write
 from tests.helpers.fuzzing import only_scanfabs_warnings
 
 PATH = Path("contacts.txt")
@@ -48,16 +46,6 @@ def test_an_unknown_id_may_be_a_wall():
     np.testing.assert_array_equal(joined.contacts.pairs, [[1, 2]])
     np.testing.assert_array_equal(joined.contacts.force, force[:1])
     np.testing.assert_array_equal(joined.wall_contacts, [0, 2, 1, 0])
-
-
-def test_a_contact_of_a_wall_with_an_unknown_grain_is_an_error(tmp_path):
-    """In a table, where a negative number is a wall; two walls are no contact of a grain."""
-    write(tmp_path / "a.csv", "id,x,y,z,radius\n10,0,0,0,1\n20,1.9,0,0,1\n")
-    pairs = write(tmp_path / "pairs.csv", "id1,id2\n10,20\n20,-1\n-1,-2\n")
-    assert scanfab.read(tmp_path / "a.csv", contacts=pairs).wall_contacts.tolist() == [0, 1]
-    write(pairs, "id1,id2\n10,20\n77,-1\n")
-    with pytest.raises(ReadError, match="names the grain 77"):
-        scanfab.read(tmp_path / "a.csv", contacts=pairs)
 
 
 def test_ends_of_a_line_are_grains_or_walls():

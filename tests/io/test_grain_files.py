@@ -13,7 +13,7 @@ import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote
 from scanfab.cli.main import run
 from tests.helpers.dumps import PAIRS, dump_text, local_text, pairs_text, refuses, write
-from tests.helpers.truth import SAMPLE_DATA
+from tests.helpers.truth import SAMPLE_DATA, TRIAXIAL
 
 NO_RADIUS = "id type x y z c_rad"
 
@@ -74,14 +74,13 @@ def test_points_are_named_behind_the_series_that_have_a_radius(tmp_path):
     assert contacts_of(tmp_path / "ex_dump_9.txt") == [2]
 
 
-@pytest.mark.parametrize("ending", ["csv", "tsv", "json", "jsonl"])
-def test_a_fabric_table_is_known(tmp_path, ending, capsys):
-    grid = list(product(range(4), repeat=3))
+def test_a_fabric_table_is_known(tmp_path, capsys):
     lines = {"variants": "a", "directions": 9, "spacing": 0.5, "contact_tolerance": 0.3}
-    path = tmp_path / f"fabric.{ending}"
-    scanfab.compute(scanfab.Packing(grid, 0.4), **lines).save(path)
-    assert run(["compute", str(path)]) == 1
-    assert "fabric table, not a dump: scanfab compare and scanfab report" in capsys.readouterr().err
+    table = scanfab.compute(scanfab.Packing([*product(range(4), repeat=3)], 0.4), **lines)
+    for ending in ("csv", "tsv", "json", "jsonl"):
+        table.save(path := tmp_path / f"fabric.{ending}")
+        assert run(["compute", str(path)]) == 1
+        assert "not a dump: scanfab compare and scanfab report" in capsys.readouterr().err
 
 
 def test_folders_below_are_named_where_there_is_no_dump(folder):
@@ -100,12 +99,31 @@ def test_globs_in_quotes_are_expanded(folder, capsys):
     assert "grains_*.txt: matches nothing: there is no file" in capsys.readouterr().err
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
+SPHERES, INTRS = (
+    gzip.decompress((TRIAXIAL / f"triaxial-{name}-00000000.vtk.gz").read_bytes()).decode()
+    for name in ("spheres", "intrs")
+)
+
+
+@pytest.mark.filterwarnings("ignore:skipped a-intrs", "ignore::scanfab.ScanfabNote")
 @pytest.mark.parametrize("beside", [True, False])
-def test_contacts_that_cannot_be_read_say_how_to_leave_them_alone(folder, beside):
-    write(folder / "contacts_9.txt", pairs_text([(1, 77)], step=9))
-    message = r'contacts_9.txt: no two columns.*`contacts="geometric"` ignores it'
-    refuses(folder / "dump_9.txt" if beside else folder, message)
+@pytest.mark.parametrize(
+    ("grains", "contacts", "told"),
+    [
+        (dump_text(step=9), pairs_text([(1, 77)], step=9), "no two columns"),
+        (dump_text(step=9), pairs_text(step=9)[:60], "incomplete"),
+        (SPHERES, INTRS[:300], ""),
+    ],
+    ids=["another's", "cut", "cut VTK"],
+)
+def test_contacts_that_cannot_be_read_say_how_to_leave_them_alone(
+    tmp_path, grains, contacts, told, beside
+):
+    path = write(tmp_path / "a-spheres-9.vtk", grains)
+    write(tmp_path / "a-intrs-9.vtk", contacts)
+    source = path if beside else tmp_path
+    refuses(source, rf'a-intrs-9.vtk.*{told}.*`contacts="geometric"` ignores it')
+    assert scanfab.read(source, contacts="geometric").contacts is None
 
 
 def test_what_editors_leave_is_no_frame(folder):
@@ -146,18 +164,6 @@ def test_contacts_of_another_sample_are_skipped_with_a_note(tmp_path, grains, co
     write(tmp_path / "a.contacts.csv" if grains == "a.csv" else tmp_path / "a_1.pairs", CONTACTS)
     with pytest.warns(ScanfabNote, match=r"contacts are read from .*(a.contacts.csv|a_1.pairs)"):
         assert contacts_of(path) == [1]
-
-
-@pytest.mark.filterwarnings("ignore:skipped rec-intrs")
-@pytest.mark.parametrize("beside", [True, False])
-def test_a_cut_file_that_may_be_the_contacts_is_an_error(tmp_path, beside):
-    for name in ("spheres", "intrs"):
-        file = SAMPLE_DATA / "yade_triaxial" / f"triaxial-{name}-00000000.vtk.gz"
-        text = gzip.decompress(file.read_bytes())
-        (tmp_path / f"rec-{name}-0.vtk").write_bytes(text[: 300 if name == "intrs" else None])
-    source = tmp_path / "rec-spheres-0.vtk" if beside else tmp_path
-    refuses(source, r'rec-intrs-0.vtk.*`contacts="geometric"` ignores it')
-    assert scanfab.read(source, contacts="geometric").contacts is None
 
 
 def test_a_data_file_is_no_frame_beside_dumps(folder):

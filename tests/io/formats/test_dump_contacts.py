@@ -140,15 +140,6 @@ def test_contacts_by_id_need_ids_in_the_grain_file(tmp_path):
         joined(tmp_path, pairs_text(), [row[1:] for row in ROWS], names="type x y z radius")
 
 
-@pytest.mark.filterwarnings("ignore:skipped")
-@pytest.mark.parametrize("source", [".", "dump_0.txt"])
-def test_contacts_that_are_cut_in_their_header_are_an_error(tmp_path, source):
-    write(tmp_path / "dump_0.txt", dump_text())
-    write(tmp_path / "pairs_0.txt", pairs_text()[:60])
-    refuses(tmp_path / source, r"pairs_0.txt.*incomplete.*`contacts=\"geometric\"`")
-    assert scanfab.read(tmp_path / source, contacts="geometric").contacts is None
-
-
 def on_each_grain(packing):
     """The sum of the contact forces on each grain, shape (N, 3)."""
     contacts, total = packing.contacts, np.zeros((len(packing), 3))

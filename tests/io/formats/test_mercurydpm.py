@@ -8,36 +8,19 @@ import pytest
 import scanfab
 from scanfab import ReadError, ScanfabWarning
 from tests.helpers.dumps import refuses, write
-from tests.helpers.made.lf_dem import (
-    HEAD,
-    RUN_VISCOSITY,
-    THROUGH,
-    UNSIGNED,
-    chain_texts,
-    grains_text,
-    pairs_text,
-    run_texts,
-)
-from tests.helpers.made.mercurydpm import (
-    CENTRES,
-    IDS,
-    NORMAL,
-    RADIUS,
-    TANGENT,
-    contacts_at,
-    data_frame,
-    fstat_frame,
-    restart,
-)
+from tests.helpers.made import lf_dem, mercurydpm
+from tests.helpers.made.lf_dem import HEAD, RUN_VISCOSITY, THROUGH, UNSIGNED
+from tests.helpers.made.mercurydpm import CENTRES, IDS, NORMAL, RADIUS, TANGENT
 
 
 @pytest.fixture
 def run(tmp_path):
     """Grains at three times, contacts at two of them."""
-    write(tmp_path / "run.data", "".join(map(data_frame, (0.1, 0.2, 0.3))))
+    write(tmp_path / "run.data", "".join(map(mercurydpm.data_frame, (0.1, 0.2, 0.3))))
     write(
         tmp_path / "run.fstat",
-        fstat_frame(0.1) + fstat_frame("0.3000000001", contacts_at(0.3)),
+        mercurydpm.fstat_frame(0.1)
+        + mercurydpm.fstat_frame("0.3000000001", mercurydpm.contacts_at(0.3)),
     )
     return tmp_path
 
@@ -53,7 +36,10 @@ def test_contacts_go_by_their_time_and_forces_act_on_the_second_grain(run):
     # each pair once
     assert contacts.pairs.tolist() == [[0, 1], [2, 0]]
     # pushed off the first grain, through the face as well
-    np.testing.assert_array_equal(contacts.force, [[NORMAL, -TANGENT, 0], [NORMAL, 0, -TANGENT]])
+    np.testing.assert_array_equal(
+        contacts.force,
+        [[NORMAL, -TANGENT, 0], [NORMAL, 0, -TANGENT]],
+    )
     np.testing.assert_allclose(contacts.normal, [[1, 0, 0], [1, 0, 0]])
     assert packing.wall_contacts.tolist() == [0, 0, 1]
     # the domain is not said to repeat
@@ -68,12 +54,12 @@ def test_planes_and_frames_without_grains(tmp_path):
     np.testing.assert_array_equal(packing.radius, 0.1)
     assert packing.columns["species"].tolist() == [0, 1]
     assert packing.time == 0.5
-    path = write(tmp_path / "a.data", "0 0 0 0 0 1 2 3 \n" + data_frame(1))
+    path = write(tmp_path / "a.data", "0 0 0 0 0 1 2 3 \n" + mercurydpm.data_frame(1))
     assert [len(frame.read()) for frame in scanfab.read_series(path)] == [0, 3]
 
 
 def test_a_restart_has_contacts_and_its_period(tmp_path):
-    path = write(tmp_path / "a.restart", restart())
+    path = write(tmp_path / "a.restart", mercurydpm.restart())
     packing = scanfab.read(path)
     np.testing.assert_array_equal(packing.position, CENTRES)
     np.testing.assert_array_equal(packing.radius, RADIUS)
@@ -85,7 +71,7 @@ def test_a_restart_has_contacts_and_its_period(tmp_path):
     np.testing.assert_allclose(packing.contacts.normal, [[1, 0, 0]] * 2)
     assert packing.wall_contacts.tolist() == [0, 0, 2]
     # a period of another kind can be named
-    write(path, restart().replace("PeriodicBoundary", "LeesEdwardsBoundary"))
+    write(path, mercurydpm.restart().replace("PeriodicBoundary", "LeesEdwardsBoundary"))
     assert scanfab.read(path, cell=(1, 2, 3)).cell.periodic == (True, True, True)
 
 
@@ -113,8 +99,8 @@ def test_an_old_restart(tmp_path, version, first, periods):
 
 def test_contacts_of_other_grains_and_forces_that_are_no_numbers(run):
     path = run / "run.fstat"
-    with pytest.raises(ReadError, match="names the grain 1, which is not in the grain file"):
-        scanfab.read(write(run / "a.data", data_frame(0.3, count=1)), contacts=path)
+    one = write(run / "a.data", mercurydpm.data_frame(0.3, count=1))
+    refuses(one, "names the grain 1, which is not in the grain file", contacts=path)
     path.write_text(path.read_text().replace(f" {NORMAL} ", " 1e308 ").replace(" 0.5 ", " nan "))
     with pytest.raises(scanfab.ScanfabError, match="force"):
         scanfab.read_series(run / "run.data", contacts=path, cell=(1, 2, 3))[2].read()
@@ -128,7 +114,7 @@ def test_a_last_frame_that_is_cut_is_left_out(run, ending):
     with pytest.warns(ScanfabWarning, match=r"last snapshot, number \d, is incomplete"):
         assert len(series[0].read().contacts) == 0
     assert len(series) == (2 if ending == "data" else 3)
-    refuses(write(run / "b.data", data_frame(1)[:-50]), r"the file is incomplete")
+    refuses(write(run / "b.data", mercurydpm.data_frame(1)[:-50]), r"the file is incomplete")
 
 
 def test_a_text_that_begins_with_a_number_is_no_frame(tmp_path):
@@ -146,8 +132,8 @@ def test_bounds_without_an_end_are_no_box(tmp_path):
 
 
 def test_images_above_are_shifted(tmp_path):
-    grains = write(tmp_path / "par_a.dat", grains_text())
-    pairs = write(tmp_path / "int_a.dat", pairs_text())
+    grains = write(tmp_path / "par_a.dat", lf_dem.grains_text())
+    pairs = write(tmp_path / "int_a.dat", lf_dem.pairs_text())
     series = scanfab.read_series(grains, contacts=str(pairs))
     packing = series[1].read()
     np.testing.assert_array_equal(packing.cell.vectors, [[10, 0, 0], [0, 8, 0], [1.5, 0, 6]])
@@ -171,7 +157,7 @@ def read_both(folder, texts):
 @pytest.mark.parametrize("pairs", [((0, 1), (1, 2)), ((1, 0), (2, 1)), ((1, 2), (1, 0))])
 def test_a_grain_at_rest_between_two(tmp_path, pairs):
     """Its forces add up to nothing only with the right sign of each part, on the right grain."""
-    contacts = read_both(tmp_path, chain_texts(pairs=pairs)).contacts
+    contacts = read_both(tmp_path, lf_dem.chain_texts(pairs=pairs)).contacts
     on_middle = {
         frozenset(pair): force if pair[1] == 1 else -force
         for pair, force in zip(contacts.pairs.tolist(), contacts.force, strict=True)
@@ -184,7 +170,7 @@ def test_a_grain_at_rest_between_two(tmp_path, pairs):
 
 def test_what_the_program_says_its_contacts_add_to_the_viscosity(tmp_path):
     """3 pi (r_x f_z + r_z f_x) with the force on particle 1, in its units; friction matters."""
-    packing = read_both(tmp_path, run_texts())
+    packing = read_both(tmp_path, lf_dem.run_texts())
     contacts = packing.contacts
     branch = contacts.normal * packing.radius[contacts.pairs].sum(axis=1)[:, None]
     on_first = -contacts.force
@@ -196,25 +182,25 @@ def test_signs_of_pushes(tmp_path):
     def pull(size):
         return -size
 
-    assert np.all(read_both(tmp_path, chain_texts(push=pull)).contacts.force_n < 0)
+    assert np.all(read_both(tmp_path, lf_dem.chain_texts(push=pull)).contacts.force_n < 0)
     with pytest.warns(ScanfabWarning, match="normal contact forces without sign"):
-        contacts = read_both(tmp_path, chain_texts(lubrication=UNSIGNED)).contacts
+        contacts = read_both(tmp_path, lf_dem.chain_texts(lubrication=UNSIGNED)).contacts
     assert np.all(contacts.force_n > 0)
     # a file with a pull has signs
-    texts = chain_texts(lubrication=UNSIGNED, push=pull)
+    texts = lf_dem.chain_texts(lubrication=UNSIGNED, push=pull)
     assert np.all(read_both(tmp_path, texts).contacts.force_n < 0)
     with pytest.raises(ReadError, match="finite numbers as contact forces"):
-        read_both(tmp_path, chain_texts(push=lambda size: np.inf))
+        read_both(tmp_path, lf_dem.chain_texts(push=lambda size: np.inf))
 
 
 def test_a_plane_is_not_periodic_across(tmp_path):
-    path = write(tmp_path / "par_a.dat", grains_text(HEAD.replace("Ly 8", "Ly 0")))
+    path = write(tmp_path / "par_a.dat", lf_dem.grains_text(HEAD.replace("Ly 8", "Ly 0")))
     assert scanfab.read_series(path)[0].read().cell.periodic == (True, False, True)
 
 
-@pytest.mark.parametrize("lost", [3, len(grains_text().splitlines()[-1]) + 1])
+@pytest.mark.parametrize("lost", [3, len(lf_dem.grains_text().splitlines()[-1]) + 1])
 def test_a_last_frame_of_lf_dem_that_is_cut_is_left_out(tmp_path, lost):
     """In a row, and between two."""
-    path = write(tmp_path / "par_a.dat", grains_text()[:-lost])
+    path = write(tmp_path / "par_a.dat", lf_dem.grains_text()[:-lost])
     with pytest.warns(ScanfabWarning, match="number 2, is incomplete"):
         assert len(scanfab.read_series(path)) == 1

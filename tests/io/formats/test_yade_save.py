@@ -9,21 +9,10 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
+from scanfab.base.errors import ScanfabNote, ScanfabWarning
 from scanfab.io.reader import reader_for
 from tests.helpers.dumps import refuses, small_save, write
-from tests.helpers.truth import (
-    SAMPLE_DATA,
-    YADE,
-    assert_same_vectors,
-    centres,
-    csv_rows,
-    forces_by_pair,
-    id_pairs,
-    normals_by_pair,
-    true_pairs,
-    true_vectors,
-)
+from tests.helpers.truth import SAMPLE_DATA, YADE, assert_true_contacts, centres, csv_rows
 
 PERIODIC, BOX = YADE / "periodic.xml.bz2", YADE / "formats.xml.bz2"
 
@@ -40,11 +29,7 @@ def test_spheres_and_real_contacts_are_those_that_yade_holds(path):
     cell, expected = packing.cell, centres(bodies)
     expected = expected if cell is None else cell.wrap(expected)
     np.testing.assert_array_equal(packing.position, expected)
-    assert packing.contacts.source == "file"
-    assert len(packing.contacts) == len(contacts)
-    assert id_pairs(packing) == true_pairs(contacts)
-    assert_same_vectors(normals_by_pair(packing), true_vectors(contacts, "n"), atol=1e-12)
-    assert_same_vectors(forces_by_pair(packing), true_vectors(contacts, "f"), atol=1e-12)
+    assert_true_contacts(packing, contacts, normals=1e-12, forces=1e-12)
 
 
 def test_cell_walls_step_time_and_mask():
@@ -156,8 +141,7 @@ def test_the_cell_of_another_frame_is_refused(tmp_path):
     """One file of spheres and one cell, whose number fits, but it is that of the last frame."""
     for name in ("lone-spheres-00000000.vtk.gz", "lone-periCell-00000000.vtk.gz"):
         shutil.copy(STRAINED / name, tmp_path)
-    with pytest.raises(ReadError, match=r"grains lie outside the cell of .*`cell=.FILE.csv"):
-        scanfab.read(tmp_path / "lone-spheres-00000000.vtk.gz")
+    refuses(tmp_path / "lone-spheres-00000000.vtk.gz", r"outside the cell of .*`cell=.FILE.csv")
 
 
 @pytest.mark.parametrize(
@@ -207,14 +191,14 @@ def test_cells_of_the_frames_come_from_a_csv_file(tmp_path, key):
 def test_a_frame_that_the_csv_file_does_not_name_is_an_error_that_names_it(tmp_path):
     path = tmp_path / "cells.csv"
     path.write_text("step,lx,ly,lz\n17500,1,1,1\n37500,1,1,1\n")
-    with pytest.raises(ReadError, match=r"cells.csv: has no row .* step 27500.*27500.vtu"):
-        frames("rec_spheres.*", cell=path)
+    told = r"cells.csv: has no row .* step 27500.*27500.vtu"
+    refuses(STRAINED / "rec_spheres.*", told, cell=path, frame=1)
 
 
 @pytest.mark.parametrize("file", ["after-periCell-00000002.vtk.gz", "rec_pericell.27500.vtu"])
 def test_a_cell_of_yade_is_no_file_of_the_cells_of_all_frames(file):
-    with pytest.raises(ReadError, match=f"{file}: expected the columns step or frame, and lx"):
-        frames("rec_spheres.27500*", cell=STRAINED / file)
+    told = f"{file}: expected the columns step or frame, and lx"
+    refuses(STRAINED / "rec_spheres.27500.vtu", told, cell=STRAINED / file)
 
 
 @pytest.mark.parametrize(
