@@ -37,7 +37,7 @@ RECORDED = ["ascii_intrs.30000.vtp", "zlib_intrs.30000.vtp"]
 
 @pytest.mark.parametrize("name", HEAP)
 def test_every_form_gives_the_same_grains(name):
-    packing = scanfab.read(YADE / name)
+    packing = scanfab.read(YADE / name, contacts="geometric")
     np.testing.assert_allclose(packing.radius, TRUE_BODIES["r"], rtol=SIX_DIGITS)
     np.testing.assert_allclose(packing.position, centres(TRUE_BODIES), rtol=SIX_DIGITS)
     if name in WITH_IDS:
@@ -46,7 +46,7 @@ def test_every_form_gives_the_same_grains(name):
 
 @pytest.mark.parametrize("name", IN_CELL)
 def test_the_periodic_grains_are_the_same_in_every_form(name):
-    packing = scanfab.read(YADE / name, cell=None if name == PACK else CELL)
+    packing = scanfab.read(YADE / name, contacts="geometric", cell=None if name == PACK else CELL)
     np.testing.assert_allclose(packing.radius, PERIODIC_BODIES["r"], rtol=SIX_DIGITS)
     assert truth.off_by(packing, centres(PERIODIC_BODIES)).max() < SIX_DIGITS * 0.036
     # SpherePack.save names its cell
@@ -91,13 +91,15 @@ def test_the_periodic_force_acts_on_the_second_body():
     assert np.all(np.sum(packing.contacts.force * packing.contacts.normal, axis=1) > 0)
 
 
-def test_normal_and_shear_force_add_up(tmp_path):
+def test_normal_and_shear_force_add_up_and_more_forces_than_lines_are_refused(tmp_path):
     position = [[0, 0, 0], [1.9, 0, 0]]
     spheres = yade_spheres(tmp_path / "a-spheres-0.vtk", position, [1, 1], id=[5, 6])
     both = {"normalForce": [[2, 0, 0]], "shearForce": [[0, 3, 0]]}
     lines = yade_lines(tmp_path / "a-intrs-0.vtk", [position], both, id1=[5], id2=[6])
     packing = scanfab.read(spheres, contacts=lines, format="yade")
     np.testing.assert_array_equal(packing.contacts.force, [[2, 3, 0]])
+    yade_lines(lines, [position], {"force": [[2, 0, 0]] * 2})
+    refuses(spheres, r"a-intrs-0\.vtk", error=scanfab.ScanfabError, contacts=lines)
 
 
 def test_a_contact_through_a_face_without_a_cell_asks_for_it(tmp_path):
@@ -132,7 +134,8 @@ def test_values_of_lost_contacts_are_refused_with_advice(tmp_path, name, format)
 
 
 def test_attributes_have_the_names_of_the_second_line_or_are_numbered(tmp_path):
-    assert sorted(scanfab.read(YADE / "x_y_z_r_attrs.txt").columns) == ["mask", "vx", "vy", "vz"]
+    named = scanfab.read(YADE / "x_y_z_r_attrs.txt", contacts="geometric")
+    assert sorted(named.columns) == ["mask", "vx", "vy", "vz"]
     path = write(tmp_path / "a.txt", "#format x_y_z_r_attrs\r\n1\t2\t3\t0.5\t7\t8\r\n")
     assert sorted(scanfab.read(path).columns) == ["attr1", "attr2"]
     write(path, "#format x_y_z_r_clumpId\n1\t2\t3\t0.5\t7\n")
