@@ -97,6 +97,19 @@ def write(path: Path, text: str) -> Path:
     return path
 
 
+def vtk_array(content: object = "", **words: object) -> str:
+    """A DataArray of VTK's XML; by default of packed places."""
+    words = {"type": "Float64", "NumberOfComponents": 3, "format": "binary", **words}
+    named = " ".join(f'{name}="{value}"' for name, value in words.items())
+    return f"<DataArray {named}>{content}</DataArray>"
+
+
+def vtk_xml(path: Path, piece: str, content: str, kind: str = "PolyData", more: str = "") -> Path:
+    """An XML file of VTK of one piece."""
+    head = f'<VTKFile type="{kind}" version="0.1" byte_order="LittleEndian" {more}>'
+    return write(path, f"{head}<{kind}><Piece {piece}>{content}</Piece></{kind}></VTKFile>")
+
+
 def yade_spheres(path: Path, position, radius, **scalars) -> Path:
     """What YADE's VTKExporter writes for spheres, with all digits."""
     return write(

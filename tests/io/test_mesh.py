@@ -17,7 +17,7 @@ from scanfab.base.errors import ReadError, ScanfabWarning
 from scanfab.io.files import plain
 from scanfab.io.mesh import read_mesh
 from scanfab.io.surface import SUFFIXES, read_surface
-from tests.helpers.dumps import write, yade_spheres
+from tests.helpers.dumps import vtk_array, vtk_xml, write, yade_spheres
 from tests.helpers.fuzzing import only_scanfabs_warnings
 from tests.helpers.truth import FLOOR, YADE
 from tests.helpers.windows import OF_A_BOX, corners_of_a_box
@@ -27,14 +27,6 @@ POINTS = "POINTS 2 double\n0 0 0 2 0 0\n"
 
 def legacy(path, body, dataset="POLYDATA", version="3.0"):
     return write(path, f"# vtk DataFile Version {version}\n\nASCII\nDATASET {dataset}\n{body}")
-
-
-def xml(path, piece, content, more=""):
-    return write(
-        path,
-        f'<VTKFile type="PolyData" version="0.1" byte_order="LittleEndian"{more}><PolyData>'
-        f"<Piece {piece}>{content}</Piece></PolyData></VTKFile>",
-    )
 
 
 def refuses(path, match="damaged or incomplete|its library crashed"):
@@ -178,12 +170,6 @@ def test_data_that_are_no_mesh_are_refused(tmp_path, dataset):
     refuses(write(tmp_path / "a.vtk", "hello"), "expected a VTK file with points")
 
 
-def array(content="", **words):
-    """A DataArray of the Points of one point."""
-    words = {"type": "Float64", "NumberOfComponents": "3", "format": "binary", **words}
-    return f"<DataArray {' '.join(f'{k}={v!r}' for k, v in words.items())}>{content}</DataArray>"
-
-
 def sizes(*numbers, type="<u4"):
     return base64.b64encode(np.array(numbers, type).tobytes()).decode()
 
@@ -191,39 +177,40 @@ def sizes(*numbers, type="<u4"):
 @pytest.mark.parametrize(
     "points",
     [
-        array("0 0", format="ascii"),
-        array("0 <InformationKey>1 2</InformationKey> 0", format="ascii"),
-        array("0 0 0 0", format="ascii"),
-        array("0 0 zero", format="ascii"),
-        array("0 0 0", format="ascii").replace("</DataArray>", ""),
+        vtk_array("0 0", format="ascii"),
+        vtk_array("0 <InformationKey>1 2</InformationKey> 0", format="ascii"),
+        vtk_array("0 0 0 0", format="ascii"),
+        vtk_array("0 0 zero", format="ascii"),
+        vtk_array("0 0 0", format="ascii").replace("</DataArray>", ""),
         # pytest hands the id to processes that a test starts, and 1 MB is too long for them
-        pytest.param(array("0 0 0", format="ascii") + "<DataArray " * 100_000, id="open tags"),
-        array(NumberOfComponents="9999999"),
-        array(type="Complex"),
-        array("!!!!!!!!"),
-        array(sizes(24)),
-        array(sizes(1, 2**31, 2**31, 16)),
-        array(sizes(2**32 - 1, 24, 0, 0)),
-        array(sizes(1, 24, 0, 99)),
-        array(format="appended"),
-        array(format="appended", offset="2.5"),
-        array(format="anything"),
+        pytest.param(vtk_array("0 0 0", format="ascii") + "<DataArray " * 100_000, id="open tags"),
+        vtk_array(NumberOfComponents="9999999"),
+        vtk_array(type="Complex"),
+        vtk_array("!!!!!!!!"),
+        vtk_array(sizes(24)),
+        vtk_array(sizes(1, 2**31, 2**31, 16)),
+        vtk_array(sizes(2**32 - 1, 24, 0, 0)),
+        vtk_array(sizes(1, 24, 0, 99)),
+        vtk_array(format="appended"),
+        vtk_array(format="appended", offset="2.5"),
+        vtk_array(format="anything"),
     ],
 )
 @pytest.mark.parametrize("packing", ["", *(f"vtk{name}Data" for name in ("ZLib", "LZ4", "RAR"))])
 def test_arrays_of_xml_that_are_damaged_are_refused(tmp_path, points, packing):
-    more = f' compressor="{packing}Compressor"' if packing else ""
-    refuses(xml(tmp_path / "a.vtp", 'NumberOfPoints="1"', f"<Points>{points}</Points>", more))
-    refuses(xml(tmp_path / "a.vtp", 'NumberOfPoints="many"', f"<Points>{points}</Points>", more))
+    more = f'compressor="{packing}Compressor"' if packing else ""
+    for count in ("1", "many"):
+        content = f"<Points>{points}</Points>"
+        refuses(vtk_xml(tmp_path / "a.vtp", f'NumberOfPoints="{count}"', content, more=more))
 
 
 @pytest.mark.parametrize("offset", ["1", "-2", "99999999999", "x"])
 def test_offsets_of_xml_cells_that_are_damaged_are_refused(tmp_path, offset):
     one = {"format": "ascii", "type": "Int64", "NumberOfComponents": "1"}
-    cells = array("0 1 0 1", Name="connectivity", **one)
-    cells += array(f"2 {offset}", Name="offsets", **one)
-    content = f"<Points>{array('0 0 0 2 0 0', format='ascii')}</Points><Lines>{cells}</Lines>"
-    refuses(xml(tmp_path / "a.vtp", 'NumberOfPoints="2" NumberOfLines="2"', content))
+    cells = vtk_array("0 1 0 1", Name="connectivity", **one)
+    cells += vtk_array(f"2 {offset}", Name="offsets", **one)
+    content = f"<Points>{vtk_array('0 0 0 2 0 0', format='ascii')}</Points><Lines>{cells}</Lines>"
+    refuses(vtk_xml(tmp_path / "a.vtp", 'NumberOfPoints="2" NumberOfLines="2"', content))
 
 
 @pytest.mark.parametrize("wrong", [b"0.5 0.5 0.5", b"0.\x005", b"half"])

@@ -41,25 +41,6 @@ def test_one_vtk_file_may_hold_grains_and_contacts(tmp_path, ending, vertices):
     assert scanfab.read(file, contacts="geometric").contacts is None
 
 
-def test_a_pvd_file_is_a_series_with_times(tmp_path):
-    for step in (100, 200):
-        grains_with_lines(tmp_path / f"grains_{step}.vtp")
-    pyvista.Box().cast_to_unstructured_grid().save(str(tmp_path / "box_100.vtu"))
-    index = tmp_path / "all.pvd"
-    index.write_text(
-        '<?xml version="1.0"?><VTKFile type="Collection"><Collection>'
-        '<DataSet timestep="0.5" file="grains_100.vtp"/>'
-        '<DataSet timestep="0.5" file="box_100.vtu"/>'
-        '<DataSet timestep="1.5" file="grains_200.vtp"/></Collection></VTKFile>'
-    )
-    frames = [frame.read() for frame in scanfab.read_series(index)]
-    found = [(frame.step, frame.time, len(frame)) for frame in frames]
-    assert found == [(100, 0.5, 4), (200, 1.5, 4)]
-    index.write_text('<?xml version="1.0"?><VTKFile type="Collection"><Collection><DataSet ')
-    with pytest.raises(scanfab.ReadError, match="cannot be read as a list of VTK files"):
-        next(iter(scanfab.read_series(index))).read()
-
-
 @pytest.mark.parametrize("again", ["dumps", "./dumps/", "latest", "dum*"])
 def test_a_folder_that_is_named_twice_is_read_once(tmp_path, monkeypatch, capsys, again):
     monkeypatch.chdir(tmp_path)

@@ -9,7 +9,7 @@ import pyvista
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
-from tests.helpers.dumps import refuses, write
+from tests.helpers.dumps import refuses, vtk_array, vtk_xml, write
 from tests.helpers.truth import FLOOR
 
 POSITION = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0.25], [5.6, 0.5, 0]])
@@ -30,11 +30,15 @@ def polydata(path, binary=False, cells=None, **arrays):
     return path
 
 
-def test_flat_points_get_a_third_coordinate(tmp_path):
-    cells = [("vertex", np.arange(4)[:, None])]
-    mesh = meshio.Mesh(POSITION[:, :2], cells, point_data={"radius": RADIUS})
-    mesh.write(tmp_path / "a.xdmf")
-    np.testing.assert_array_equal(scanfab.read(tmp_path / "a.xdmf").position[:, 2], 0)
+@pytest.mark.parametrize(("name", "axes"), [("a.xdmf", 2), ("a.vtu", 3)])
+def test_what_meshio_writes_is_read(tmp_path, name, axes):
+    """Flat points get a third coordinate; arrays of a vertex at each point are those of points."""
+    arrays = {"point_data": {"radius": RADIUS}, "cell_data": {"number": [np.arange(4)]}}
+    vertices = [("vertex", np.arange(4)[:, None])]
+    meshio.Mesh(POSITION[:, :axes], vertices, **arrays).write(tmp_path / name)
+    packing = scanfab.read(tmp_path / name)
+    np.testing.assert_array_equal(packing.position, POSITION * [1, 1, axes == 3])
+    np.testing.assert_array_equal(packing.columns["number"], range(4))
 
 
 def test_lines_with_ids_name_grains_by_id(tmp_path):
@@ -66,17 +70,16 @@ def test_an_index_of_other_files_beside_the_grains_is_left_out(tmp_path, name):
 
 def grid_without_cells(path, count, points="", radius=""):
     """XML as MercuryDPM writes it: a grid of points without cells, or without anything."""
-    array = '<DataArray type="{}" Name="{}" NumberOfComponents="{}" format="ascii">{}</DataArray>'
+    form = {"type": "Float32", "format": "ascii"}
     names = {"connectivity": "Int32", "offsets": "Int32", "types": "UInt8"}
-    cells = "".join(array.format(type, name, 1, "") for name, type in names.items())
-    return write(
-        path,
-        '<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian">'
-        f'<UnstructuredGrid><Piece NumberOfPoints="{count}" NumberOfCells="0">'
-        f"<PointData>{array.format('Float32', 'Radius', 1, radius)}</PointData>"
-        f"<Points>{array.format('Float32', 'Position', 3, points)}</Points><Cells>{cells}</Cells>"
-        "</Piece></UnstructuredGrid></VTKFile>",
+    flat = {"NumberOfComponents": 1, **form}
+    cells = "".join(vtk_array(**{**flat, "type": names[name]}, Name=name) for name in names)
+    content = f"<PointData>{vtk_array(radius, **flat, Name='Radius')}</PointData>"
+    content += (
+        f"<Points>{vtk_array(points, **form, Name='Position')}</Points><Cells>{cells}</Cells>"
     )
+    piece = f'NumberOfPoints="{count}" NumberOfCells="0"'
+    return vtk_xml(path, piece, content, "UnstructuredGrid")
 
 
 def test_a_grid_of_points_without_cells_is_a_cloud_and_may_be_empty(tmp_path, capfd):
@@ -87,14 +90,6 @@ def test_a_grid_of_points_without_cells_is_a_cloud_and_may_be_empty(tmp_path, ca
     text += "POINT_DATA 0\nSCALARS Radius float 1\nLOOKUP_TABLE default\n"
     assert len(scanfab.read(write(tmp_path / "a.vtk", text))) == 0
     assert capfd.readouterr() == ("", "")
-
-
-def test_arrays_of_a_vertex_at_each_point_are_those_of_the_points(tmp_path):
-    cells, more = [("vertex", np.arange(4)[:, None])], {"coordNumber": [np.arange(4)]}
-    mesh = meshio.Mesh(POSITION, cells, point_data={"radius": RADIUS}, cell_data=more)
-    mesh.write(tmp_path / "a.vtu")
-    packing = scanfab.read(tmp_path / "a.vtu")
-    np.testing.assert_array_equal(packing.columns["coordNumber"], range(4))
 
 
 @pytest.mark.parametrize(("sign", "grain"), [(1, "second"), (-1, "first")])
@@ -132,9 +127,12 @@ def cloud(path, rows, ghosts=None):
     return path
 
 
-def listing(path, kind, tag, key, names, more=""):
-    entries = "".join(f'<{tag} {key}="{name}" {more}/>' for name in names)
-    return write(path, f'<VTKFile type="{kind}"><{kind}>{entries}</{kind}></VTKFile>')
+def listing(path, kind, *entries):
+    """A list of files, each by its name or with attributes."""
+    tag, key = ("Piece", "Source") if kind.startswith("P") else ("DataSet", "file")
+    pairs = [(one, "") if isinstance(one, str) else one for one in entries]
+    rows = "".join(f'<{tag} {key}="{name}" {more}/>' for name, more in pairs)
+    return write(path, f'<VTKFile type="{kind}"><{kind}>{rows}</{kind}></VTKFile>')
 
 
 @pytest.mark.parametrize(("kind", "ending"), [("PPolyData", ".vtp"), ("PUnstructuredGrid", ".vtu")])
@@ -142,15 +140,14 @@ def test_pieces_make_one_frame_and_their_ghosts_count_once(tmp_path, kind, endin
     cloud(tmp_path / f"parts/0{ending}", [0, 1, 2], [0, 0, 1])
     cloud(tmp_path / f"parts/1{ending}", [1, 2, 3], [1, 0, 0])
     names = [f"parts/{k}{ending}" for k in range(2)]
-    path = listing(tmp_path / f"all.p{ending[1:]}", kind, "Piece", "Source", names)
-    packing = scanfab.read(path)
+    packing = scanfab.read(listing(tmp_path / f"all.p{ending[1:]}", kind, *names))
     np.testing.assert_array_equal(packing.id, range(4))
     np.testing.assert_array_equal(packing.position, POSITION)
 
 
 def test_a_piece_that_is_missing_or_damaged_is_named(tmp_path):
     cloud(tmp_path / "0.vtp", [0, 1])
-    path = listing(tmp_path / "a.pvtp", "PPolyData", "Piece", "Source", ["0.vtp", "1.vtp"])
+    path = listing(tmp_path / "a.pvtp", "PPolyData", "0.vtp", "1.vtp")
     refuses(path, r"a\.pvtp: names '1\.vtp', but there is no such file")
     data = (tmp_path / "0.vtp").read_bytes()
     (tmp_path / "1.vtp").write_bytes(data[: len(data) // 2])
@@ -163,14 +160,14 @@ def test_the_files_of_a_frame_are_its_grains_and_contacts(tmp_path):
     lines.save(tmp_path / "f/lines.vtp")
     pyvista.Plane().save(tmp_path / "f/wall.vtp")
     names = [f"f/{name}" for name in ("wall.vtp", "grains.vtu", "lines.vtp")]
-    path = listing(tmp_path / "f_7.vtm", "vtkMultiBlockDataSet", "DataSet", "file", names)
+    path = listing(tmp_path / "f_7.vtm", "vtkMultiBlockDataSet", *names)
     packing = scanfab.read(path)
     np.testing.assert_array_equal(packing.contacts.pairs, [[0, 1], [1, 2]])
     assert packing.step is None
     # a cell that the user names makes none of them less of an input
     series = scanfab.read_series(path, cell=(99.0, 99.0, 99.0))
     assert [*series.files()] == [path, *(tmp_path / name for name in names)]
-    listing(path, "vtkMultiBlockDataSet", "DataSet", "file", names[1:2] * 2)
+    listing(path, "vtkMultiBlockDataSet", *names[1:2] * 2)
     refuses(path, r"expected one file of grains.* 2 of grains and 0 of con")
 
 
@@ -186,8 +183,7 @@ def test_files_elsewhere_are_not_read(tmp_path, name, kind):
         text = f'<Xdmf><Domain><DataItem Format="HDF">{name}:/x</DataItem></Domain></Xdmf>'
         path = write(folder / "a.xdmf", text)
     else:
-        tag, key = ("Piece", "Source") if kind == "PPolyData" else ("DataSet", "file")
-        path = listing(folder / "a.pvd", kind, tag, key, [name], 'timestep="0"')
+        path = listing(folder / "a.pvd", kind, (name, 'timestep="0"'))
     with pytest.raises(
         ReadError, match=r"which is outside the folder of this file|not well-formed"
     ):
@@ -195,16 +191,22 @@ def test_files_elsewhere_are_not_read(tmp_path, name, kind):
 
 
 def test_lists_of_lists_have_no_end_and_are_refused(tmp_path):
-    path = listing(tmp_path / "a.pvtp", "PPolyData", "Piece", "Source", ["a.pvtp"])
-    refuses(path, "lists pieces itself")
-    path = listing(tmp_path / "a.vtm", "vtkMultiBlockDataSet", "DataSet", "file", ["a.vtm"])
+    refuses(listing(tmp_path / "a.pvtp", "PPolyData", "a.pvtp"), "lists pieces itself")
+    path = listing(tmp_path / "a.vtm", "vtkMultiBlockDataSet", "a.vtm")
     refuses(path, "expected one file of grains")
 
 
-def collection(path, *entries):
-    """A ``.pvd`` of files with their attributes."""
-    rows = "".join(f'<DataSet {more} file="{name}"/>' for name, more in entries)
-    return write(path, f'<VTKFile type="Collection"><Collection>{rows}</Collection></VTKFile>')
+def test_a_collection_is_a_series_with_times(tmp_path):
+    for step in (100, 200):
+        cloud(tmp_path / f"grains_{step}.vtp", [0, 1])
+    pyvista.Box().save(tmp_path / "box_100.vtp")
+    times = ("grains_100.vtp", 0.5), ("box_100.vtp", 0.5), ("grains_200.vtp", 1.5)
+    entries = [(name, f'timestep="{time}"') for name, time in times]
+    index = listing(tmp_path / "all.pvd", "Collection", *entries)
+    frames = [frame.read() for frame in scanfab.read_series(index)]
+    assert [(one.step, one.time, len(one)) for one in frames] == [(100, 0.5, 2), (200, 1.5, 2)]
+    write(index, index.read_text()[:90])
+    refuses(index, "cannot be read as a list of VTK files")
 
 
 @pytest.mark.parametrize("one", ['part="{}"', 'group="{}"', 'group="a{}" part="0"'])
@@ -217,7 +219,7 @@ def test_the_parts_of_one_time_are_one_frame(tmp_path, one):
         (name.format(step, part), f'timestep="{step / 2}" {one.format(part)}')
         for step, part in rows
     ]
-    path = collection(tmp_path / "run.pvd", *entries)
+    path = listing(tmp_path / "run.pvd", "Collection", *entries)
     series = scanfab.read_series(path)
     packings = [frame.read() for frame in series]
     assert [(one.step, one.time) for one in packings] == [(5, 2.5), (6, 3.0)]
@@ -244,12 +246,12 @@ def test_files_that_are_not_parts_of_one_frame_are_refused(tmp_path, names, more
         cloud(tmp_path / f"{name}.vtp", [0, 1])
     pyvista.PolyData(POSITION).save(tmp_path / "points.vtp")
     entries = zip((f"{name}.vtp" for name in names), more, strict=True)
-    refuses(collection(tmp_path / "run.pvd", *entries), told, error=scanfab.ScanfabError)
+    refuses(listing(tmp_path / "run.pvd", "Collection", *entries), told, error=scanfab.ScanfabError)
 
 
 @pytest.mark.parametrize("more", ["", 'group="" part="0" timestep="7"'])
 def test_a_list_of_one_file_is_a_frame(tmp_path, more):
     cloud(tmp_path / "a_3.vtp", [0, 1, 2])
-    packing = scanfab.read(collection(tmp_path / "run.pvd", ("a_3.vtp", more)))
+    packing = scanfab.read(listing(tmp_path / "run.pvd", "Collection", ("a_3.vtp", more)))
     assert (len(packing), packing.step) == (3, 3)
     assert packing.time == (7.0 if "timestep" in more else None)
