@@ -48,17 +48,12 @@ def test_a_dump_and_its_contacts_are_read_whatever_they_are_packed_with(tmp_path
     assert len(scanfab.read(path)) == 3
 
 
-@pytest.mark.parametrize(
-    ("name", "data"),
-    [
-        ("dump.txt", gzip.compress(TEXT)),
-        ("dump.txt.gz", TEXT),
-        ("dump.txt.zst", b"\x50\x2a\x4d\x18\x04\x00\x00\x00pzst" + zstd.compress(TEXT)),
-    ],
-)
-def test_packing_is_told_by_the_content(tmp_path, name, data):
-    path = tmp_path / name
-    path.write_bytes(data)
+FRAMES = b"\x50\x2a\x4d\x18\x04\x00\x00\x00pzst" + zstd.compress(TEXT)
+
+
+@pytest.mark.parametrize(("end", "data"), [("", gzip.compress(TEXT)), (".gz", TEXT), ("", FRAMES)])
+def test_packing_is_told_by_the_content(tmp_path, end, data):
+    (path := tmp_path / f"dump.txt{end}").write_bytes(data)
     assert len(scanfab.read(path)) == 3
     assert files.first_bytes(path, 9) == b"ITEM: TIM"
 
@@ -107,19 +102,16 @@ def test_only_copies_that_somebody_holds_and_the_last_few_are_kept(tmp_path):
     assert not os.path.exists(forgotten)
 
 
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (lambda path: path.write_bytes(b"\x1f\x8b" + b"nonsense" * 10), "decompressed: "),
-        (lambda path: None, "read: No such file or directory"),
-        (lambda path: path.mkdir(), "read: Is a directory"),
-    ],
-)
-def test_what_cannot_be_opened_is_an_error_that_says_why(tmp_path, make, said):
-    path = tmp_path / "dump.gz"
-    make(path)
-    with pytest.raises(ReadError, match=f"dump.gz: cannot be {said}"):
-        files.first_bytes(path)
+def test_what_cannot_be_opened_is_an_error_that_says_why(tmp_path):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "a.gz").write_bytes(b"\x1f\x8b" + b"nonsense" * 10)
+    for name, said in (
+        ("a.gz", "decompressed: "),
+        ("none", "read: No such file or directory"),
+        ("folder", "read: Is a directory"),
+    ):
+        with pytest.raises(ReadError, match=f"{name}: cannot be {said}"):
+            files.first_bytes(tmp_path / name)
 
 
 BLOCK = 1 << 20

@@ -186,23 +186,6 @@ def test_a_text_that_looks_compressed_is_not_unpacked():
 # layouts, by the first rows
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ("", "expected a table, found no row"),
-        ("x,y,z,radius\n1,2,3,4\n1,2,3\n", "line 3: expected 4 columns, found 3"),
-        ("x,y,z,radius,q\n1,2,3,4\n", "expected 5 columns, one for each name, found 4"),
-        ("x,y,z,radius\n-,m,m,m\n1,2,3,4\n", "line 2: expected a number in the column x"),
-        ("x,y,z,radius\n1,2,3,4\x01\n", "line 2: expected text, found the byte 1"),
-        ("x,y,z,radius\r1,2,3,4\r", "without a line end"),
-        ("1 " * 5000 + "\n", "at most 4096 columns, found 5000"),
-        ("x,y,z,radius\n" + "1," * 300_000 + "1\n", "line 2: expected 4 columns, found 300001"),
-    ],
-)
-def test_what_is_no_table_is_told(tmp_path, content, message):
-    refuses(write(tmp_path / "t.csv", content), message, format="table")
-
-
 def test_comments_and_skipped_lines_stand_before_the_table(tmp_path):
     path = write(tmp_path / "t.csv", "made, by, hand\n2026\n\n% x y z r\n1 2 3 4\n")
     assert scanfab.read(path, skip=2).radius.tolist() == [4]

@@ -46,6 +46,7 @@ NAMED = "id1=c_con[2],id2=c_con[4],fx=c_con[5],fy=c_con[6],fz=c_con[7]"
 APART = [*ROWS[:2], (3, 2, 0.61, 0.5, 0.5, 0.1)]
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("local", "rows", "columns", "format", "pairs", "force"),
     [
@@ -57,6 +58,7 @@ APART = [*ROWS[:2], (3, 2, 0.61, 0.5, 0.5, 0.1)]
             [(*pair, 0, -1, 0, 0, *[7] * 5, 0.5) for pair in PAIRS],
             *(ROWS, "contactArea id force history:5", None, PAIRS, [1, 0, 0]),
         ),
+        ([(*pair, 0, -1e308, 0, 0) for pair in PAIRS], ROWS, None, None, PAIRS, [1e308, 0, 0]),
         # normal and tangential parts add up
         (
             [(*pair, 0, -2, 0, 0, 0, 3, 1) for pair in PAIRS],
@@ -91,6 +93,7 @@ def test_columns_are_found_or_named(tmp_path, local, rows, columns, format, pair
 
 FLAGGED = [(*pair, 0, -1, 0, 0) for pair in PAIRS]
 ROUNDED = [(f"{one:g}", f"{two:g}", 0, -1, 0, 0) for one, two in chain(1234561)[1]]
+AT_WALLS = [(*row[2:5], 0, 0, id) for row, id in zip(ROWS, (1, 2, 9), strict=True)]
 TRIPLES = [(*pair, 1.5) for pair in PAIRS]
 TWO = "id1=c_con[1],id2=c_con[2]"
 # no ids; two choices; types; ids of other grains
@@ -108,6 +111,8 @@ WRONG += [f"{TWO},tx=c_con[3],ty=c_con[3],tz=c_con[3]"]
         *((rows, ROWS, None, "lammps", "surely ids of these grains") for rows in UNSURE),
         ([(1.5, 2), (2.5, 3)], ROWS, TWO, "lammps", "columns 1 and 2: ids must be whole"),
         ([(1, 2), (2, 77)], ROWS, TWO, "lammps", "contact 2 names the grain 77, which is not in"),
+        # contacts with walls: where they are, two numbers of the wall, and the id
+        (AT_WALLS, ROWS, None, "liggghts", "names the grain 9, which is not"),
         (FLAGGED, ROWS, "pos force", None, "id among them"),
         (FLAGGED, ROWS, "id forces", None, "or keywords, id among them"),
         (FLAGGED, ROWS, "id force torque", None, "for 6 columns; .* is for 9"),

@@ -52,13 +52,6 @@ def test_contacts_of_the_file_and_by_geometry_give_lammps_own_fabric(frames, num
     assert np.all(push > 0)
 
 
-def test_forces_are_the_sum_of_both_parts():
-    packing = scanfab.read(LAST, contacts=LAST_PAIRS, contact_columns=OF_SHEAR)
-    values = np.loadtxt(LAST_PAIRS, skiprows=9, max_rows=1)
-    row = np.flatnonzero((packing.id[packing.contacts.pairs] == values[1:3]).all(axis=1))
-    np.testing.assert_allclose(packing.contacts.force[row], [-(values[5:8] + values[8:11])])
-
-
 @pytest.mark.parametrize(
     ("contacts", "columns"),
     [

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 
 import scanfab
-from tests.helpers.dumps import write
+from tests.helpers.dumps import ROWS, dump_text, refuses, write
+from tests.helpers.fuzzing import only_scanfabs_warnings
 from tests.helpers.sound_files import made
 
 TIME = "ITEM: TIME\nnow\nITEM: TIMESTEP"
@@ -126,3 +129,48 @@ def test_a_damage_is_told(tmp_path, format, name, old, new, message):
     write(file, text.replace(old, new, 1))
     with pytest.raises(scanfab.ScanfabError, match=message):
         scanfab.read_series(path if format == "esys" else file, contacts="geometric")[0].read()
+
+
+FAR = [(1, 1e30, 0.5, 0.5, 0.1)]
+FAR_CELL = (
+    '1\nLattice="1 0 0 0 1 0 0 0 1" Origin="1e30 0 0" Properties=pos:R:3:radius:R:1\n0 0 0 1\n'
+)
+LONG = ["9" * 5000 + "x", "9" * 5000 + ".5.5", "1" * 5000 + "e"]
+TEXTS = [
+    *((f"##PERIODIC:: 1 1 {edge}\n0 0 0 1 -1\n", "must be finite numbers")
+      for edge in ("1e200", "-1e200", "inf", "nan")),
+    (dump_text(ROWS[:1]).replace("1 1 0.2 0.5 0.5 0.1", ""), "counts 1 rows, found 0"),
+    *((dump_text([(1, value, 0.5, 0.5, 0.1)], "id xs ys zs radius"), "")
+      for value in ("inf", "nan", "1e300")),
+    (dump_text([(1, 1e200, 0.5, 0.5, 0.5)], "id x y z radius"), "grain 1: .* cannot be a length"),
+    (dump_text([(1, 0.5, 0.5, 0.5, 1e200)], "id x y z radius"), "grain 1: .* cannot be a length"),
+    (dump_text(FAR, "id x y z radius", flags=" pp pp pp"), r"grain 1 lies 1e\+30 from the origin"),
+    (dump_text(box=((-1e30, 1 - 1e30), (0, 1), (0, 1)), flags=" pp pp pp"), "no volume"),
+    (FAR_CELL, r"grain 1 lies 1e\+30 from the origin"),
+    *((dump_text([(id, 1, 0.5, 0.5, 0.5, 0.1)]), "ids must be whole numbers")
+      for id in ("1e300", "nan", "inf", "0.5")),
+    # a pattern that could cut the digits anywhere tried all places: 32 s for a table of these
+    *(("id,x,y,z,radius\n" + f"1,0,{word},0,1\n" * 40, "") for word in LONG),
+]  # fmt: skip
+TABLES = [
+    ("".join(f"{k}e300 0 0 1e-300\n" for k in range(12)), "below 1e-100"),
+    ("", "expected a table, found no row"),
+    ("x,y,z,radius\n1,2,3,4\n1,2,3\n", "line 3: expected 4 columns, found 3"),
+    ("x,y,z,radius,q\n1,2,3,4\n", "expected 5 columns, one for each name, found 4"),
+    ("x,y,z,radius\n-,m,m,m\n1,2,3,4\n", "line 2: expected a number in the column x"),
+    ("x,y,z,radius\n1,2,3,4\x01\n", "line 2: expected text, found the byte 1"),
+    ("x,y,z,radius\r1,2,3,4\r", "without a line end"),
+    ("1 " * 5000 + "\n", "at most 4096 columns, found 5000"),
+    ("x,y,z,radius\n" + "1," * 300_000 + "1\n", "line 2: expected 4 columns, found 300001"),
+]
+
+
+@pytest.mark.parametrize("number", range(len(TEXTS + TABLES)))
+def test_a_text_that_cannot_be_right_is_refused_at_once(tmp_path, number):
+    """Many of these were found by fuzzing: no library warns of them."""
+    text, message = (TEXTS + TABLES)[number]
+    path, began = write(tmp_path / "a.txt", text), time.monotonic()
+    with only_scanfabs_warnings():
+        format = None if number < len(TEXTS) else "table"
+        refuses(path, rf"a\.txt.*{message}", error=scanfab.ScanfabError, format=format)
+    assert time.monotonic() - began < 5

@@ -209,19 +209,6 @@ def test_cells_of_the_frames_come_from_a_csv_file(tmp_path, key):
         np.testing.assert_array_equal(packing.cell.vectors, cell)
 
 
-def test_a_frame_that_the_csv_file_does_not_name_is_an_error_that_names_it(tmp_path):
-    path = tmp_path / "cells.csv"
-    path.write_text("step,lx,ly,lz\n17500,1,1,1\n37500,1,1,1\n")
-    told = r"cells.csv: has no row .* step 27500.*27500.vtu"
-    refuses(STRAINED / "rec_spheres.*", told, cell=path, frame=1)
-
-
-@pytest.mark.parametrize("file", ["after-periCell-00000002.vtk.gz", "rec_pericell.27500.vtu"])
-def test_a_cell_of_yade_is_no_file_of_the_cells_of_all_frames(file):
-    told = f"{file}: expected the columns step or frame, and lx"
-    refuses(STRAINED / "rec_spheres.27500.vtu", told, cell=STRAINED / file)
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -229,9 +216,15 @@ def test_a_cell_of_yade_is_no_file_of_the_cells_of_all_frames(file):
         ("frame,lx,ly,lz,xy\n0,1,1,1,0\n", "lx, ly, lz, xy, xz, yz, found"),
         ("frame,lx,ly,lz\n0,1,0,1\n", "line 2: expected .*above 0: lx, ly, lz"),
         ("frame,lx,ly,lz\n0,1,1,1\n0,1,1,2\n", "line 3: frame 0 occurs twice"),
+        ("step,lx,ly,lz\n17500,1,1,1\n37500,1,1,1\n", "no row .* step 27500.*27500.vtu"),
     ],
 )
 def test_a_csv_file_of_cells_that_is_wrong_is_an_error_that_says_where(tmp_path, text, message):
-    path = tmp_path / "cells.csv"
-    path.write_text(text)
-    refuses(STRAINED / "rec_spheres.*", f"cells.csv.*{message}", cell=path)
+    path = write(tmp_path / "cells.csv", text)
+    refuses(STRAINED / "rec_spheres.*", f"cells.csv.*{message}", cell=path, frame=1)
+
+
+@pytest.mark.parametrize("file", ["after-periCell-00000002.vtk.gz", "rec_pericell.27500.vtu"])
+def test_a_cell_of_yade_is_no_file_of_the_cells_of_all_frames(file):
+    told = f"{file}: expected the columns step or frame, and lx"
+    refuses(STRAINED / "rec_spheres.27500.vtu", told, cell=STRAINED / file)
