@@ -120,10 +120,7 @@ TEXTS: dict[str, dict[str, str | bytes]] = {
         "run.fstat": mercurydpm.fstat_frame(0.2, mercurydpm.contacts_at(0.2)),
         "run.restart": mercurydpm.restart(),
     },
-    "mfix": {
-        "a.dat": mfix.version_2(),
-        "particle_input_f_1.dat": "0.1 0.2 0.5D-1 2650 7 8\n",
-    },
+    "mfix": {"a.dat": mfix.version_2(), "particle_input_f_1.dat": "0.1 0.2 0.5D-1 2650 7 8\n"},
     "musen": {"a.txt": musen.export(*musen.ROWS)},
     "pfc": {
         "grains.csv": text(GRAINS, ",", "ball.id,ball.pos.x,ball.pos.y,ball.pos.z,ball.radius"),

@@ -30,14 +30,14 @@ def table(found, cell=None, **options):
     return grain_table(PATH, found, cell, ReadOptions(**options), ", step 5")
 
 
-@pytest.mark.parametrize(
-    ("names", "named"),
-    [
-        *[(names, {}) for names in ("x y z", "X Y Z", "xu yu zu")],
-        ("px py pz", {"x": "px", "y": "py", "z": "pz"}),
-        ("x y depth", {"z": "depth"}),
-    ],
-)
+COORDINATES = [
+    *[(names, {}) for names in ("x y z", "X Y Z", "xu yu zu")],
+    ("px py pz", {"x": "px", "y": "py", "z": "pz"}),
+    ("x y depth", {"z": "depth"}),
+]
+
+
+@pytest.mark.parametrize(("names", "named"), COORDINATES)
 def test_coordinates_are_known_by_name_or_named_by_the_user(names, named):
     grains = table(columns(names), columns=named)
     np.testing.assert_array_equal(grains.position, POSITION)

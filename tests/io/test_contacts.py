@@ -26,14 +26,14 @@ def by_places(ends, cell=None):
     return join_positions(PATH, grains(None, cell), np.array(ends, dtype=float), None)
 
 
-@pytest.mark.parametrize(
-    ("ids", "walls", "message"),
-    [
-        ([[10, 30], [77, 10], [30, 20]], False, r"contact 2 names the grain 77.*\(1 of 3.*same st"),
-        ([[77, 78]], True, "contact 1 names the grain 77"),
-        ([[77, 10]], "negative", "contact 1 names the grain 77"),
-    ],
-)
+UNKNOWN = [
+    ([[10, 30], [77, 10], [30, 20]], False, r"contact 2 names the grain 77.*\(1 of 3.*same st"),
+    ([[77, 78]], True, "contact 1 names the grain 77"),
+    ([[77, 10]], "negative", "contact 1 names the grain 77"),
+]
+
+
+@pytest.mark.parametrize(("ids", "walls", "message"), UNKNOWN)
 def test_an_unknown_id_is_an_error_that_names_it_and_asks_for_the_step(ids, walls, message):
     with pytest.raises(ReadError, match=message):
         join_ids(PATH, grains(), np.array(ids), None, walls=walls)

@@ -82,23 +82,23 @@ def test_grains_cut_behind_a_line_are_an_error_unless_the_user_says_so(tmp_path,
     assert len(scanfab.read(path)) == 39
 
 
-@pytest.mark.parametrize(
-    ("kind", "old", "new", "words"),
-    [
-        *((kind, rf"(?s)(.{{{kept}}}).*", r"\1", "") for kind, kept in CUTS),
-        ("contacts", "0,0,0,", ",0,0,", "incomplete"),
-        ("contacts", "0,0,0,", "0.5,0,0,", "whole numbers"),
-        ("contacts", "0,0,0,", "x,0,0,", "found text"),
-        ("contacts", "0,0,0,", "0,0,0,0,", "cannot be read"),
-        ("frame", ",xy,", ",xq,", "expected the line"),
-        ("frame", ",xy,", ",", "expected the line"),
-        ("frame", ",1.1,", ",,", "ax"),
-        ("frame", ",1.1,", ",soon,", "soon"),
-        ("frame", ",1.1,", ",0.0,", "no volume"),
-        ("columns", "a b", "", "incomplete"),
-        ("columns", "scanfab_id,.*\n[0-9]+", "scanfab_id,w\n7", "not those of the grains in a"),
-    ],
-)
+DAMAGES = [
+    *((kind, rf"(?s)(.{{{kept}}}).*", r"\1", "") for kind, kept in CUTS),
+    ("contacts", "0,0,0,", ",0,0,", "incomplete"),
+    ("contacts", "0,0,0,", "0.5,0,0,", "whole numbers"),
+    ("contacts", "0,0,0,", "x,0,0,", "found text"),
+    ("contacts", "0,0,0,", "0,0,0,0,", "cannot be read"),
+    ("frame", ",xy,", ",xq,", "expected the line"),
+    ("frame", ",xy,", ",", "expected the line"),
+    ("frame", ",1.1,", ",,", "ax"),
+    ("frame", ",1.1,", ",soon,", "soon"),
+    ("frame", ",1.1,", ",0.0,", "no volume"),
+    ("columns", "a b", "", "incomplete"),
+    ("columns", "scanfab_id,.*\n[0-9]+", "scanfab_id,w\n7", "not those of the grains in a"),
+]
+
+
+@pytest.mark.parametrize(("kind", "old", "new", "words"), DAMAGES)
 def test_a_companion_file_is_read_whole_or_not_at_all(tmp_path, kind, old, new, words):
     path, file = written(EVERYTHING, tmp_path, "xyz"), tmp_path / f"a.{kind}.csv"
     file.write_text(re.sub(old, new, file.read_text(), count=1))
@@ -134,15 +134,15 @@ def test_companions_of_an_earlier_packing_go_and_those_of_other_files_stay(tmp_p
     assert (tmp_path / "a.contacts.csv").read_text() == "mine\n1\n"
 
 
+NEIGHBOURS = [
+    # the number of the second run is the step of the first
+    ["run1_2.data", "run2_2.xyz", "run3_2.csv"],
+    ["a.data", "a_fine.xyz"],
+]
+
+
 @pytest.mark.parametrize("count", [0, 1, None])
-@pytest.mark.parametrize(
-    "names",
-    [
-        # the number of the second run is the step of the first
-        ["run1_2.data", "run2_2.xyz", "run3_2.csv"],
-        ["a.data", "a_fine.xyz"],
-    ],
-)
+@pytest.mark.parametrize("names", NEIGHBOURS)
 def test_each_file_finds_its_own_contacts_whatever_lies_beside(tmp_path, names, count):
     pairs = {name: np.array([[0, k]])[:count] for k, name in enumerate(names, start=1)}
     if count is None:
@@ -225,19 +225,19 @@ def test_frames_are_chosen_and_named_by_step_or_number(tmp_path):
     assert scanfab.convert(source, "/dev/null", to="csv", frames=0) == [Path("/dev/null")]
 
 
-@pytest.mark.parametrize(
-    ("source", "out", "to", "error", "reason"),
-    [
-        (PLAIN, "a.gif", None, UnknownFormatError, "expected one of .csv"),
-        (PLAIN, "a.csv", "gif", UnknownFormatError, "no writer called 'gif'"),
-        (PLAIN, "absent/a.csv", None, SettingsError, "there is no folder"),
-        (PLAIN, ".", None, SettingsError, "a folder has no format"),
-        ([3], "a.npz", None, SettingsError, "expected packings, found 3 among them"),
-        ([PLAIN] * 2, "one.vtp", None, SettingsError, r"several frames.*\{step\}.*`frames`"),
-        ([EVERYTHING] * 2, "{step}.npz", None, SettingsError, "frames 0 and 1 have the same step"),
-        ("damaged.txt", "one.vtp", None, ReadError, "damaged.txt"),
-    ],
-)
+NOT_WRITTEN = [
+    (PLAIN, "a.gif", None, UnknownFormatError, "expected one of .csv"),
+    (PLAIN, "a.csv", "gif", UnknownFormatError, "no writer called 'gif'"),
+    (PLAIN, "absent/a.csv", None, SettingsError, "there is no folder"),
+    (PLAIN, ".", None, SettingsError, "a folder has no format"),
+    ([3], "a.npz", None, SettingsError, "expected packings, found 3 among them"),
+    ([PLAIN] * 2, "one.vtp", None, SettingsError, r"several frames.*\{step\}.*`frames`"),
+    ([EVERYTHING] * 2, "{step}.npz", None, SettingsError, "frames 0 and 1 have the same step"),
+    ("damaged.txt", "one.vtp", None, ReadError, "damaged.txt"),
+]
+
+
+@pytest.mark.parametrize(("source", "out", "to", "error", "reason"), NOT_WRITTEN)
 def test_what_cannot_be_written_leaves_what_was_there(
     tmp_path, monkeypatch, source, out, to, error, reason
 ):

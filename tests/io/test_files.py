@@ -137,14 +137,14 @@ SOME_POINTS = packed(np.random.default_rng(0).uniform(size=300).tobytes())
 LONG = packed(zeros=600)
 
 
-@pytest.mark.parametrize(
-    ("count", "points", "more", "told"),
-    [
-        (100, SOME_POINTS, {"Name": "radius"}, "radius has 78643200 of 100 values"),
-        (100, SOME_POINTS, {"NumberOfComponents": 600 * BLOCK // 800}, "its library crashed"),
-        (600 * BLOCK, LONG, {}, "Points has 78643200 of|its library crashed"),
-    ],
-)
+TOO_LONG = [
+    (100, SOME_POINTS, {"Name": "radius"}, "radius has 78643200 of 100 values"),
+    (100, SOME_POINTS, {"NumberOfComponents": 600 * BLOCK // 800}, "its library crashed"),
+    (600 * BLOCK, LONG, {}, "Points has 78643200 of|its library crashed"),
+]
+
+
+@pytest.mark.parametrize(("count", "points", "more", "told"), TOO_LONG)
 def test_arrays_that_are_far_too_long_are_refused(tmp_path, count, points, more, told):
     array = vtk_array(LONG, **{"Name": "a", "NumberOfComponents": 1, **more})
     with pytest.raises(ReadError, match=told):
@@ -180,15 +180,15 @@ ROWS = b"1 0 0 0 1\n" * 300_000
 DATA = "LAMMPS data file\n\n{} atoms\n\n0 1 xlo xhi\n0 1 ylo yhi\n0 1 zlo zhi\n\nAtoms # sphere\n\n"
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "told"),
-    [
-        ("dump", DUMP.format("ATOMS id x y z radius"), "counts 99999999999 rows, found 300000"),
-        ("dump", DUMP.format("ATOMS"), "counts 99999999999 rows, found 300000"),
-        ("a.data", DATA.format(99999999999), "counts 99999999999 atoms, found 30000"),
-        ("a.data", DATA.format(3), "counts 3 atoms, found 30000"),
-    ],
-)
+MISCOUNTED = [
+    ("dump", DUMP.format("ATOMS id x y z radius"), "counts 99999999999 rows, found 300000"),
+    ("dump", DUMP.format("ATOMS"), "counts 99999999999 rows, found 300000"),
+    ("a.data", DATA.format(99999999999), "counts 99999999999 atoms, found 30000"),
+    ("a.data", DATA.format(3), "counts 3 atoms, found 30000"),
+]
+
+
+@pytest.mark.parametrize(("name", "text", "told"), MISCOUNTED)
 def test_rows_that_cannot_be_those_counted_are_not_parsed(tmp_path, monkeypatch, name, text, told):
     def parsed(*_, **__):
         raise AssertionError("rows were parsed")

@@ -17,14 +17,14 @@ def refuses(*args, match=None, **options):
         scanfab.read(*args, **options)
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "count"),
-    [
-        ("a.txt.gz", "#format x_y_z_r\n0 0 0 1\n", 1),
-        ("a.txt", "#format x_y_z_r\n  # none\n", 0),
-        ("a.txt", dump_text(box=((-1e300, 1e300), (0, 1), (0, 1))), 3),
-    ],
-)
+ODD = [
+    ("a.txt.gz", "#format x_y_z_r\n0 0 0 1\n", 1),
+    ("a.txt", "#format x_y_z_r\n  # none\n", 0),
+    ("a.txt", dump_text(box=((-1e300, 1e300), (0, 1), (0, 1))), 3),
+]
+
+
+@pytest.mark.parametrize(("name", "text", "count"), ODD)
 def test_an_odd_text_is_read(tmp_path, name, text, count):
     with only_scanfabs_warnings():
         packing = scanfab.read(write(tmp_path / name, text))

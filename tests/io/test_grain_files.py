@@ -148,15 +148,15 @@ STEPLESS = "x,y,z,radius\n0,0,0,1\n1.9,0,0,1\n"
 CONTACTS = "id1,id2\n0,1\n"
 
 
-@pytest.mark.parametrize(
-    ("grains", "contacts"),
-    [
-        ("a.csv", "b.csv"),
-        ("a.csv", "b.contacts.csv"),
-        ("a_1.csv", "b_1.contacts.csv"),
-        ("a_1.csv", "b_2.csv"),
-    ],
-)
+OTHER_SAMPLES = [
+    ("a.csv", "b.csv"),
+    ("a.csv", "b.contacts.csv"),
+    ("a_1.csv", "b_1.contacts.csv"),
+    ("a_1.csv", "b_2.csv"),
+]
+
+
+@pytest.mark.parametrize(("grains", "contacts"), OTHER_SAMPLES)
 def test_contacts_of_another_sample_are_skipped_with_a_note(tmp_path, grains, contacts):
     path = write(tmp_path / grains, STEPLESS)
     write(tmp_path / contacts, CONTACTS.replace("0,1", "5,6"))
@@ -190,26 +190,26 @@ def opened(tmp_path, names, text=None, **options):
     return scanfab.read_series(tmp_path, **options)
 
 
-@pytest.mark.parametrize(
-    ("names", "expected"),
-    [
-        (["dump_10.csv", "dump_9.csv", "dump_100.csv"], [9, 10, 100]),
-        (["dump_0010.csv", "dump_0009.csv"], [9, 10]),
-        (["dump10.csv", "dump9.csv"], [9, 10]),
-        (["dump.1000", "dump.900", "dump.10000"], [900, 1000, 10000]),
-        (["run2_dump_10.csv", "run2_dump_9.csv"], [9, 10]),
-        (["dump_10_v2.csv", "dump_9_v2.csv"], [9, 10]),
-        (["111_10k.spheres", "111_20k.spheres"], [10, 20]),
-        (["a_0000_s.17650.csv", "a_0003_s.34850.csv"], [17650, 34850]),
-        (["t1_step10.csv", "t2_step20.csv", "t3_step30.csv"], [10, 20, 30]),
-        (["dump_10.csv.gz", "dump_9.csv"], [9, 10]),
-        # of a single file nobody knows what number is the step
-        (["111_10k.spheres"], [None]),
-        (["hopper_3d_demo.csv"], [None]),
-        (["dump.csv"], [None]),
-        (["dump.bz2"], [None]),
-    ],
-)
+ORDERS = [
+    (["dump_10.csv", "dump_9.csv", "dump_100.csv"], [9, 10, 100]),
+    (["dump_0010.csv", "dump_0009.csv"], [9, 10]),
+    (["dump10.csv", "dump9.csv"], [9, 10]),
+    (["dump.1000", "dump.900", "dump.10000"], [900, 1000, 10000]),
+    (["run2_dump_10.csv", "run2_dump_9.csv"], [9, 10]),
+    (["dump_10_v2.csv", "dump_9_v2.csv"], [9, 10]),
+    (["111_10k.spheres", "111_20k.spheres"], [10, 20]),
+    (["a_0000_s.17650.csv", "a_0003_s.34850.csv"], [17650, 34850]),
+    (["t1_step10.csv", "t2_step20.csv", "t3_step30.csv"], [10, 20, 30]),
+    (["dump_10.csv.gz", "dump_9.csv"], [9, 10]),
+    # of a single file nobody knows what number is the step
+    (["111_10k.spheres"], [None]),
+    (["hopper_3d_demo.csv"], [None]),
+    (["dump.csv"], [None]),
+    (["dump.bz2"], [None]),
+]
+
+
+@pytest.mark.parametrize(("names", "expected"), ORDERS)
 def test_files_are_in_the_natural_order_of_their_steps(tmp_path, names, expected):
     assert [frame.step for frame in opened(tmp_path, names, ONE_GRAIN)] == expected
 
@@ -227,17 +227,17 @@ def test_the_names_beside_a_single_file_tell_its_step(tmp_path):
 RUNS = [f"run{k}_dump_{step}.txt" for k in (1, 2) for step in (100, 200)]
 
 
-@pytest.mark.parametrize(
-    ("names", "globs"),
-    [
-        (["a_1.txt", "b_1.txt", "a_2.txt", "b_2.txt"], ["a_*.txt", "b_*.txt"]),
-        (["a_1.txt", "a_1.dump"], ["a_1.dump", "a_1.txt"]),
-        (RUNS, ["run1_dump_*.txt", "run2_dump_*.txt"]),
-        (["run1_100.txt", "run1_200.txt", "run2_100.txt"], ["run1_*.txt", "run2_100.txt"]),
-        # a star alone would match the other series
-        (["a_1.txt", "a_2.txt", "a_b_1.txt"], ["a_[0-9]*.txt", "a_b_1.txt"]),
-    ],
-)
+SEVERAL = [
+    (["a_1.txt", "b_1.txt", "a_2.txt", "b_2.txt"], ["a_*.txt", "b_*.txt"]),
+    (["a_1.txt", "a_1.dump"], ["a_1.dump", "a_1.txt"]),
+    (RUNS, ["run1_dump_*.txt", "run2_dump_*.txt"]),
+    (["run1_100.txt", "run1_200.txt", "run2_100.txt"], ["run1_*.txt", "run2_100.txt"]),
+    # a star alone would match the other series
+    (["a_1.txt", "a_2.txt", "a_b_1.txt"], ["a_[0-9]*.txt", "a_b_1.txt"]),
+]
+
+
+@pytest.mark.parametrize(("names", "globs"), SEVERAL)
 def test_several_series_are_an_error_that_lists_their_globs(tmp_path, names, globs):
     with pytest.raises(ReadError, match="several series of grains") as told:
         opened(tmp_path, names)

@@ -142,24 +142,24 @@ GRID, CELLS_51 = (
 ONES = "CELL_TYPES 2\n1\n1\n"
 
 
-@pytest.mark.parametrize(
-    ("body", "how"),
-    [
-        (POINTS.replace("2", "9" * 5000, 1), ()),
-        (POINTS + "LINES 1 1\n7\n", ()),
-        (POINTS + "LINES 1 3\n2 0 x\n", ()),
-        (POINTS + "LINES 1 3\n2 0 10000000000\n", ()),
-        (POINTS + "POINT_DATA 2\nSCALARS radius double\nLOOKUP_TABLE default\n1\n", ()),
-        (POINTS + "POINT_DATA 2\nFIELD FieldData 1\nradius 1 1 double\n1\n", ()),
-        (POINTS + "POINT_DATA 2\n", ()),
-        ("", ()),
-        (POINTS + CELLS_51.format("0 1 2") + "0 1\n" + ONES, (GRID,)),
-        (POINTS + CELLS_51.format("0 1 2") + "0 one\n" + ONES, (GRID, "5.1")),
-        (POINTS + CELLS_51.format("0 3 2") + "0 1\n" + ONES, (GRID, "5.1")),
-        (POINTS + "CELLS 2 6\n3 0 1 1 1 0\nCELL_TYPES 2\n3 3\n", (GRID,)),
-        (POINTS + "CELLS 2 3\n1 0 0\nCELL_TYPES 2\n3 3\n", (GRID,)),
-    ],
-)
+DAMAGED_TEXTS = [
+    (POINTS.replace("2", "9" * 5000, 1), ()),
+    (POINTS + "LINES 1 1\n7\n", ()),
+    (POINTS + "LINES 1 3\n2 0 x\n", ()),
+    (POINTS + "LINES 1 3\n2 0 10000000000\n", ()),
+    (POINTS + "POINT_DATA 2\nSCALARS radius double\nLOOKUP_TABLE default\n1\n", ()),
+    (POINTS + "POINT_DATA 2\nFIELD FieldData 1\nradius 1 1 double\n1\n", ()),
+    (POINTS + "POINT_DATA 2\n", ()),
+    ("", ()),
+    (POINTS + CELLS_51.format("0 1 2") + "0 1\n" + ONES, (GRID,)),
+    (POINTS + CELLS_51.format("0 1 2") + "0 one\n" + ONES, (GRID, "5.1")),
+    (POINTS + CELLS_51.format("0 3 2") + "0 1\n" + ONES, (GRID, "5.1")),
+    (POINTS + "CELLS 2 6\n3 0 1 1 1 0\nCELL_TYPES 2\n3 3\n", (GRID,)),
+    (POINTS + "CELLS 2 3\n1 0 0\nCELL_TYPES 2\n3 3\n", (GRID,)),
+]
+
+
+@pytest.mark.parametrize(("body", "how"), DAMAGED_TEXTS)
 def test_legacy_texts_that_are_damaged_are_refused(tmp_path, body, how):
     refuses(legacy(tmp_path / "a.vtk", body, *how))
 
@@ -174,28 +174,28 @@ def sizes(*numbers, type="<u4"):
     return base64.b64encode(np.array(numbers, type).tobytes()).decode()
 
 
-@pytest.mark.parametrize(
-    "points",
-    [
-        vtk_array("0 0", format="ascii"),
-        vtk_array("0 <InformationKey>1 2</InformationKey> 0", format="ascii"),
-        vtk_array("0 0 0 0", format="ascii"),
-        vtk_array("0 0 zero", format="ascii"),
-        vtk_array("0 0 0", format="ascii").replace("</DataArray>", ""),
-        # pytest hands the id to processes that a test starts, and 1 MB is too long for them
-        pytest.param(vtk_array("0 0 0", format="ascii") + "<DataArray " * 100_000, id="open tags"),
-        vtk_array(NumberOfComponents="9999999"),
-        vtk_array(type="Complex"),
-        vtk_array("!!!!!!!!"),
-        vtk_array(sizes(24)),
-        vtk_array(sizes(1, 2**31, 2**31, 16)),
-        vtk_array(sizes(2**32 - 1, 24, 0, 0)),
-        vtk_array(sizes(1, 24, 0, 99)),
-        vtk_array(format="appended"),
-        vtk_array(format="appended", offset="2.5"),
-        vtk_array(format="anything"),
-    ],
-)
+DAMAGED_ARRAYS = [
+    vtk_array("0 0", format="ascii"),
+    vtk_array("0 <InformationKey>1 2</InformationKey> 0", format="ascii"),
+    vtk_array("0 0 0 0", format="ascii"),
+    vtk_array("0 0 zero", format="ascii"),
+    vtk_array("0 0 0", format="ascii").replace("</DataArray>", ""),
+    # pytest hands the id to processes that a test starts, and 1 MB is too long for them
+    pytest.param(vtk_array("0 0 0", format="ascii") + "<DataArray " * 100_000, id="open tags"),
+    vtk_array(NumberOfComponents="9999999"),
+    vtk_array(type="Complex"),
+    vtk_array("!!!!!!!!"),
+    vtk_array(sizes(24)),
+    vtk_array(sizes(1, 2**31, 2**31, 16)),
+    vtk_array(sizes(2**32 - 1, 24, 0, 0)),
+    vtk_array(sizes(1, 24, 0, 99)),
+    vtk_array(format="appended"),
+    vtk_array(format="appended", offset="2.5"),
+    vtk_array(format="anything"),
+]
+
+
+@pytest.mark.parametrize("points", DAMAGED_ARRAYS)
 @pytest.mark.parametrize("packing", ["", *(f"vtk{name}Data" for name in ("ZLib", "LZ4", "RAR"))])
 def test_arrays_of_xml_that_are_damaged_are_refused(tmp_path, points, packing):
     more = f'compressor="{packing}Compressor"' if packing else ""

@@ -98,31 +98,31 @@ def test_a_series_is_named_as_the_user_named_it(folder, monkeypatch):
     assert scanfab.read_series([f"dump_{step}.txt" for step in STEPS]).name == "."
 
 
-@pytest.mark.parametrize(
-    ("files", "name", "said"),
-    [
-        ({}, ".", "the folder holds no files"),
-        ({"log.txt": "hello\n"}, ".", "no reader knows this format; the command scanfab formats"),
-        ({"pairs_1.txt": pairs_text()}, ".", r"no grains: .* found contacts \(pairs_1.txt\)"),
-        ({}, "nothing", "there is no such file, folder or glob"),
-        ({}, "dump_*.txt", "matches nothing"),
-    ],
-)
+NO_GRAINS = [
+    ({}, ".", "the folder holds no files"),
+    ({"log.txt": "hello\n"}, ".", "no reader knows this format; the command scanfab formats"),
+    ({"pairs_1.txt": pairs_text()}, ".", r"no grains: .* found contacts \(pairs_1.txt\)"),
+    ({}, "nothing", "there is no such file, folder or glob"),
+    ({}, "dump_*.txt", "matches nothing"),
+]
+
+
+@pytest.mark.parametrize(("files", "name", "said"), NO_GRAINS)
 def test_a_source_without_grains_is_an_error(tmp_path, files, name, said):
     for file, text in files.items():
         write(tmp_path / file, text)
     refuses(tmp_path / name, said)
 
 
-@pytest.mark.parametrize(
-    ("named", "said"),
-    [
-        ("dump_9.txt", "expected contacts, found grains"),
-        ("nowhere.txt", "there is no such file"),
-        ("nowhere_*.txt", "matches nothing"),
-        ("pairs_10.txt", "no contact file for step 9"),
-    ],
-)
+NO_CONTACTS = [
+    ("dump_9.txt", "expected contacts, found grains"),
+    ("nowhere.txt", "there is no such file"),
+    ("nowhere_*.txt", "matches nothing"),
+    ("pairs_10.txt", "no contact file for step 9"),
+]
+
+
+@pytest.mark.parametrize(("named", "said"), NO_CONTACTS)
 def test_named_contacts_must_be_there(folder, named, said):
     refuses(folder, said, contacts=folder / named, frame=0)
 

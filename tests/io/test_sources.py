@@ -66,16 +66,20 @@ def test_a_series_may_start_with_frames_of_boundary_alone(tmp_path):
     assert np.isnan(table["alpha_vs"]).tolist() == [True, False]
 
 
-@pytest.mark.parametrize(
-    ("source", "options", "said"),
-    [
-        *(("sample_data", {name: 3}, f"{name}: expected")
-          for name in ("columns", "contacts", "contact_columns", "format")),
-        *(("nowhere", {"max_unpacked": wrong}, "max_unpacked: expected a number above 0")
-          for wrong in (0, -1, "many")),
-        *((source, {}, "source: expected the path of a folder or file") for source in ([], 3, [3])),
-    ],
-)  # fmt: skip
+OTHER_KINDS = [
+    *(
+        ("sample_data", {name: 3}, f"{name}: expected")
+        for name in ("columns", "contacts", "contact_columns", "format")
+    ),
+    *(
+        ("nowhere", {"max_unpacked": wrong}, "max_unpacked: expected a number above 0")
+        for wrong in (0, -1, "many")
+    ),
+    *((source, {}, "source: expected the path of a folder or file") for source in ([], 3, [3])),
+]
+
+
+@pytest.mark.parametrize(("source", "options", "said"), OTHER_KINDS)
 def test_a_value_of_another_kind_is_told_by_its_option(source, options, said):
     with pytest.raises(SettingsError, match=said):
         scanfab.read_series(source, **options)

@@ -79,23 +79,23 @@ def test_kinds_of_columns():
     assert [found[name].dtype.kind + str(len(found[name])) for name in "ab"] == ["i0", "f0"]
 
 
-@pytest.mark.parametrize(
-    ("last", "message"),
-    [
-        ("1,2,3", "line 20: expected 4 columns, found 3"),
-        ("1,2,3,4,5", "line 20: expected 4 columns, found 5"),
-        ("1,2,,4", "line 20: expected a number in the column c, found nothing"),
-        ("1,2,q,4", "line 20: expected a number in the column c, found 'q'"),
-        ("1,2,1_000,4", "line 20: .*'1_000'"),
-        ("1,2,0x10,4", "line 20: .*'0x10'"),
-        ("1,2,3\0,4", "line 20: .*'3.x00'"),
-        ("\n1,2,3,4", "line 20: expected 4 columns, found 0"),
-        ("# 2\n1,2,3,4", "line 20: expected 4 columns"),
-        ('"1,2,3,4', "line 20: expected 4 columns"),
-        ("1,2\r3,4,5", "line 20: expected"),
-        ("\t,2,3,4", "line 20: expected a number in the column a, found nothing"),
-    ],
-)
+WRONG_LINES = [
+    ("1,2,3", "line 20: expected 4 columns, found 3"),
+    ("1,2,3,4,5", "line 20: expected 4 columns, found 5"),
+    ("1,2,,4", "line 20: expected a number in the column c, found nothing"),
+    ("1,2,q,4", "line 20: expected a number in the column c, found 'q'"),
+    ("1,2,1_000,4", "line 20: .*'1_000'"),
+    ("1,2,0x10,4", "line 20: .*'0x10'"),
+    ("1,2,3\0,4", "line 20: .*'3.x00'"),
+    ("\n1,2,3,4", "line 20: expected 4 columns, found 0"),
+    ("# 2\n1,2,3,4", "line 20: expected 4 columns"),
+    ('"1,2,3,4', "line 20: expected 4 columns"),
+    ("1,2\r3,4,5", "line 20: expected"),
+    ("\t,2,3,4", "line 20: expected a number in the column a, found nothing"),
+]
+
+
+@pytest.mark.parametrize(("last", "message"), WRONG_LINES)
 @pytest.mark.parametrize("separator", [",", ";", " "])
 def test_what_is_wrong_is_told_with_its_line(last, message, separator):
     content = ("1,2,3,4\n" * 10 + last + "\n" + "1,2,3,4\n" * 9).replace(",", separator)

@@ -143,22 +143,16 @@ def test_frames_beyond_the_largest_strain_but_for_rounding_are_out_of_the_fit_al
 NO_STRAINS = [{**row, "strain": None} for row in curve()]
 
 
-@pytest.mark.parametrize(
-    ("rows", "largest", "frames", "kind", "message"),
-    [
-        (curve(), 5.0, 5, ScanfabWarning, "5 leaves out no frame: .* fractions .* 0 and 0.04"),
-        (curve(), 0.5, 5, ScanfabNote, "0.5 leaves out no frame: .* fractions .* 0 and 0.04"),
-        (curve(), -1, 0, ScanfabWarning, "-1 leaves 0 of 5 frames of .* between 0 and 0.04"),
-        (
-            curve(),
-            0.01,
-            2,
-            ScanfabWarning,
-            "0.01 leaves 2 of 5 .* needs 3: .* larger strain is 0.02;",
-        ),
-        (NO_STRAINS, 1.0, 0, ScanfabWarning, "no frame has a strain"),
-    ],
-)
+LARGEST = [
+    (curve(), 5.0, 5, ScanfabWarning, "5 leaves out no frame: .* fractions .* 0 and 0.04"),
+    (curve(), 0.5, 5, ScanfabNote, "0.5 leaves out no frame: .* fractions .* 0 and 0.04"),
+    (curve(), -1, 0, ScanfabWarning, "-1 leaves 0 of 5 frames of .* between 0 and 0.04"),
+    (curve(), 0.01, 2, ScanfabWarning, "0.01 leaves 2 of 5 .* needs 3: .* larger strain is 0.02;"),
+    (NO_STRAINS, 1.0, 0, ScanfabWarning, "no frame has a strain"),
+]
+
+
+@pytest.mark.parametrize(("rows", "largest", "frames", "kind", "message"), LARGEST)
 def test_a_largest_strain_that_leaves_out_nothing_or_too_much_is_told(
     rows, largest, frames, kind, message
 ):
@@ -167,19 +161,15 @@ def test_a_largest_strain_that_leaves_out_nothing_or_too_much_is_told(
         assert summary_of(rows, strain_max=largest).frames == frames
 
 
-@pytest.mark.parametrize(
-    ("rows", "options", "message"),
-    [
-        (curve(), {"strain_max": math.nan}, "strain_max: expected a number, found nan"),
-        ([*curve(), {**curve()[2], "strain": "abc"}], {}, "row 6: strain: expected a number"),
-        # rows of several cut-offs would make one curve of many
-        (
-            [*curve("two"), *curve("one"), *curve("one", "c", 2.0)],
-            {},
-            "one, variant c: several rows",
-        ),
-    ],
-)
+NOT_COMPARED = [
+    (curve(), {"strain_max": math.nan}, "strain_max: expected a number, found nan"),
+    ([*curve(), {**curve()[2], "strain": "abc"}], {}, "row 6: strain: expected a number"),
+    # rows of several cut-offs would make one curve of many
+    ([*curve("two"), *curve("one"), *curve("one", "c", 2.0)], {}, "one, variant c: several rows"),
+]
+
+
+@pytest.mark.parametrize(("rows", "options", "message"), NOT_COMPARED)
 def test_what_cannot_be_compared_is_refused(rows, options, message):
     with pytest.raises(SettingsError, match=message):
         compare_tables(rows, **options)

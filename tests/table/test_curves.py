@@ -39,33 +39,29 @@ SHEARED_TOO = [{**row, "shear_strain": row["strain"]} for row in curve("one")]
 FRAME, SHEAR = "the number of the frame is used", "shear_strain is used"
 
 
-@pytest.mark.parametrize(
-    ("rows", "column", "hint"),
-    [
-        ([*curve("one"), *curve("two", "d")], "strain", None),
-        (SMALL, "strain", None),
-        (curve("one")[2:3], "strain", None),
-        ([], None, None),
-        (changed(strain=None), None, None),
-        (
-            [*curve("one"), *changed("two", strain=None)],
-            None,
-            f"{FRAME}, because two has no axial strain: ",
-        ),
-        (
-            changed(frame=3, strain=None),
-            None,
-            f"{FRAME}, because one has no axial strain in frame 3: ",
-        ),
-        (changed(frame=3, strain=None, alpha_vs_axial=None), "strain", None),
-        (changed(strain=0.25), None, "because the axial strain of one is 0.25 in all frames: "),
-        (ROUNDED, None, "because the axial strain of one is 0.25 in all frames: "),
-        (sheared(), "shear_strain", f"{SHEAR}, because the axial strain of shear is 0 in"),
-        ([*sheared(), *curve("one")], None, FRAME),
-        ([*sheared(), *SHEARED_TOO], "shear_strain", SHEAR),
-        (changed(strain=0.25, shear_strain=0.0), None, FRAME),
-    ],
-)
+ABSCISSAS = [
+    ([*curve("one"), *curve("two", "d")], "strain", None),
+    (SMALL, "strain", None),
+    (curve("one")[2:3], "strain", None),
+    ([], None, None),
+    (changed(strain=None), None, None),
+    (
+        [*curve("one"), *changed("two", strain=None)],
+        None,
+        f"{FRAME}, because two has no axial strain: ",
+    ),
+    (changed(frame=3, strain=None), None, f"{FRAME}, because one has no axial strain in frame 3: "),
+    (changed(frame=3, strain=None, alpha_vs_axial=None), "strain", None),
+    (changed(strain=0.25), None, "because the axial strain of one is 0.25 in all frames: "),
+    (ROUNDED, None, "because the axial strain of one is 0.25 in all frames: "),
+    (sheared(), "shear_strain", f"{SHEAR}, because the axial strain of shear is 0 in"),
+    ([*sheared(), *curve("one")], None, FRAME),
+    ([*sheared(), *SHEARED_TOO], "shear_strain", SHEAR),
+    (changed(strain=0.25, shear_strain=0.0), None, FRAME),
+]
+
+
+@pytest.mark.parametrize(("rows", "column", "hint"), ABSCISSAS)
 def test_a_strain_that_all_frames_have_is_the_abscissa_and_a_hint_tells_of_any_other(
     rows, column, hint
 ):
@@ -74,18 +70,18 @@ def test_a_strain_that_all_frames_have_is_the_abscissa_and_a_hint_tells_of_any_o
     assert found is None if hint is None else re.search(hint, found)
 
 
-@pytest.mark.parametrize(
-    ("axial", "shear", "column"),
-    [
-        (0.1, 0.2, "strain"),
-        (0.0, 0.2, "shear_strain"),
-        (1e-12, 0.2, "shear_strain"),
-        (None, 0.2, "shear_strain"),
-        (0.0, 0.0, "strain"),
-        (0.0, None, "strain"),
-        (None, None, None),
-    ],
-)
+SINGLE = [
+    (0.1, 0.2, "strain"),
+    (0.0, 0.2, "shear_strain"),
+    (1e-12, 0.2, "shear_strain"),
+    (None, 0.2, "shear_strain"),
+    (0.0, 0.0, "strain"),
+    (0.0, None, "strain"),
+    (None, None, None),
+]
+
+
+@pytest.mark.parametrize(("axial", "shear", "column"), SINGLE)
 def test_a_single_frame_has_the_strain_that_is_not_zero(axial, shear, column):
     assert frame_strain_column({"strain": axial, "shear_strain": shear}) == column
 
@@ -150,14 +146,14 @@ def test_a_frame_without_grains_has_no_cutoff_and_stays_once():
     assert [row["frame"] for row in chosen] == [0, 1, 2, 3, 4]
 
 
-@pytest.mark.parametrize(
-    ("tables", "labels", "sources"),
-    [
-        ([curve(), curve()], ["coarse", "fine"], [{"coarse"}, {"fine"}]),
-        # the label of a table of several sources stands before them
-        ([[*curve("one"), *curve("two")]], ["new"], [{"new, one", "new, two"}]),
-    ],
-)
+LABELS = [
+    ([curve(), curve()], ["coarse", "fine"], [{"coarse"}, {"fine"}]),
+    # the label of a table of several sources stands before them
+    ([[*curve("one"), *curve("two")]], ["new"], [{"new, one", "new, two"}]),
+]
+
+
+@pytest.mark.parametrize(("tables", "labels", "sources"), LABELS)
 def test_labels_tell_two_runs_of_one_sample_apart(tables, labels, sources):
     chosen = choose_rows([("t.csv", rows) for rows in tables], labels=labels)
     assert [{row["source"] for row in rows} for rows in chosen] == sources

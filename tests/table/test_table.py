@@ -84,15 +84,15 @@ def test_a_column_is_an_array_and_missing_numbers_are_nan(table):
     assert len(Table([])["alpha_vs"]) == 0
 
 
-@pytest.mark.parametrize(
-    "ask",
-    [
-        lambda table: table["alpha_v"],
-        lambda table: table.select(alpha_v=1),
-        lambda table: table[0].alpha_v,
-        lambda table: table[0]["alpha_v"],
-    ],
-)
+ASKS = [
+    lambda table: table["alpha_v"],
+    lambda table: table.select(alpha_v=1),
+    lambda table: table[0].alpha_v,
+    lambda table: table[0]["alpha_v"],
+]
+
+
+@pytest.mark.parametrize("ask", ASKS)
 def test_a_column_that_does_not_exist_is_an_error_that_names_the_nearest(table, ask):
     with pytest.raises(KeyError, match=r"^there is no column 'alpha_v': did you mean alpha_vs"):
         ask(table)

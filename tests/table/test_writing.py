@@ -92,17 +92,17 @@ def test_columns_come_in_the_order_in_which_they_are_named(tmp_path, suffix):
     assert list(row.items()) == [("alpha_vs", 0.12), ("frame", 3), ("variant", "c")]
 
 
-@pytest.mark.parametrize(
-    ("fields", "digits", "message"),
-    [
-        ("alpha_v", 17, "there is no column 'alpha_v': did you mean alpha_vs?"),
-        ("", 17, "there is no column ''"),
-        ("frame,frame", 17, "the column frame is listed more than once"),
-        (3, 17, "fields: expected names of columns, found 3"),
-        ([], 17, r"fields: expected names of columns, found \[\]"),
-        *((None, digits, f"expected a number from 1 to 17, found {digits!r}") for digits in DIGITS),
-    ],
-)
+REFUSED = [
+    ("alpha_v", 17, "there is no column 'alpha_v': did you mean alpha_vs?"),
+    ("", 17, "there is no column ''"),
+    ("frame,frame", 17, "the column frame is listed more than once"),
+    (3, 17, "fields: expected names of columns, found 3"),
+    ([], 17, r"fields: expected names of columns, found \[\]"),
+    *((None, digits, f"expected a number from 1 to 17, found {digits!r}") for digits in DIGITS),
+]
+
+
+@pytest.mark.parametrize(("fields", "digits", "message"), REFUSED)
 def test_columns_and_digits_that_do_not_exist_are_refused(fields, digits, message):
     with pytest.raises(SettingsError, match=message):
         Excerpt.make(table_columns(), fields, digits)
@@ -161,22 +161,22 @@ def test_the_content_tells_the_format(tmp_path, text):
     assert type(first["frame"]) is int
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (None, "cannot be read: No such file"),
-        (b"", "expected a table, found an empty file"),
-        (b"a,b\n1,2\n\n1\n", "line 4: expected 2 cells as in line 1, found 1: is"),
-        (b"a,b\n1,2,3\n", "line 2: expected 2 cells as in line 1, found 3"),
-        (b'{"a": 1}\n{"a": \n', "cannot be read as JSON"),
-        (b"[{]", "cannot be read as JSON"),
-        (b"[1, 2]", "expected JSON objects, one for each row"),
-        (b"[" * 100_000, "cannot be read as JSON"),
-        (b'[{"a": ' + b"9" * 5000 + b"}]", "cannot be read as JSON"),
-        (b"\xff\xfe\x00\x01", "expected text in UTF-8 or Parquet, found other bytes"),
-        (b"PAR1 and nothing else", "cannot be read as Parquet"),
-    ],
-)
+BROKEN = [
+    (None, "cannot be read: No such file"),
+    (b"", "expected a table, found an empty file"),
+    (b"a,b\n1,2\n\n1\n", "line 4: expected 2 cells as in line 1, found 1: is"),
+    (b"a,b\n1,2,3\n", "line 2: expected 2 cells as in line 1, found 3"),
+    (b'{"a": 1}\n{"a": \n', "cannot be read as JSON"),
+    (b"[{]", "cannot be read as JSON"),
+    (b"[1, 2]", "expected JSON objects, one for each row"),
+    (b"[" * 100_000, "cannot be read as JSON"),
+    (b'[{"a": ' + b"9" * 5000 + b"}]", "cannot be read as JSON"),
+    (b"\xff\xfe\x00\x01", "expected text in UTF-8 or Parquet, found other bytes"),
+    (b"PAR1 and nothing else", "cannot be read as Parquet"),
+]
+
+
+@pytest.mark.parametrize(("content", "message"), BROKEN)
 def test_a_broken_table_is_named(tmp_path, content, message):
     path = tmp_path / "table.dat"
     if content is not None:

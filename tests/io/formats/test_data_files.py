@@ -15,17 +15,17 @@ from tests.helpers.made.data_files import CENTRES, DIAMETERS, TITLE, data_file
 LAMMPS = "LAMMPS data file via write_data, version 2 Aug 2023, timestep = 12"
 
 
-@pytest.mark.parametrize(
-    ("order", "behind", "style", "title", "name"),
-    [
-        ("plain", "", "", TITLE, "liggghts"),
-        ("plain", " 0 -1 2", "", "LAMMPS data file", "lammps"),
-        ("plain", "", " # granular", "mine", "lammps"),
-        ("hybrid", " 7", "", TITLE, "liggghts"),
-        ("hybrid", "", " # hybrid", LAMMPS, "lammps"),
-        ("hybrid", " 7 0 0 1", "", TITLE, "liggghts"),
-    ],
-)
+ORDERS = [
+    ("plain", "", "", TITLE, "liggghts"),
+    ("plain", " 0 -1 2", "", "LAMMPS data file", "lammps"),
+    ("plain", "", " # granular", "mine", "lammps"),
+    ("hybrid", " 7", "", TITLE, "liggghts"),
+    ("hybrid", "", " # hybrid", LAMMPS, "lammps"),
+    ("hybrid", " 7 0 0 1", "", TITLE, "liggghts"),
+]
+
+
+@pytest.mark.parametrize(("order", "behind", "style", "title", "name"), ORDERS)
 def test_every_order_gives_the_same_grains(tmp_path, order, behind, style, title, name):
     text = data_file(order, behind=behind, style=style, title=title)
     path = write(tmp_path / "grains.spl", text)
@@ -46,13 +46,13 @@ BOX = "-1 3 xlo xhi\n0 2 ylo yhi\n0 2 zlo zhi"
 VECTORS = "4 0.5 0 avec\n0 2 0 bvec\n0 0 2 cvec\n-1 0 0 abc origin"
 
 
-@pytest.mark.parametrize(
-    ("box", "vectors"),
-    [
-        (f"{BOX}\n0.5 0 0.25 xy xz yz", [[4, 0, 0], [0.5, 2, 0], [0, 0.25, 2]]),
-        (VECTORS, [[4, 0.5, 0], [0, 2, 0], [0, 0, 2]]),
-    ],
-)
+BOXES = [
+    (f"{BOX}\n0.5 0 0.25 xy xz yz", [[4, 0, 0], [0.5, 2, 0], [0, 0.25, 2]]),
+    (VECTORS, [[4, 0.5, 0], [0, 2, 0], [0, 0, 2]]),
+]
+
+
+@pytest.mark.parametrize(("box", "vectors"), BOXES)
 def test_boxes_of_lammps(tmp_path, box, vectors):
     text = data_file(title=LAMMPS, style=" # sphere", behind=" 0 0 0").replace(BOX, box)
     cell = scanfab.read(write(tmp_path / "a.data", text)).cell
@@ -76,13 +76,13 @@ def test_a_last_line_without_an_end_is_doubted(tmp_path):
         assert len(scanfab.read(path)) == 3
 
 
-@pytest.mark.parametrize(
-    "data",
-    [
-        struct.pack("<ii", 0, 42) + b"Version LIGGGHTS-PUBLIC 3.8.0, compiled ...\0" + bytes(99),
-        b"LammpS RestartT\0" + struct.pack("<ii", 1, 2) + bytes(99),
-    ],
-)
+RESTARTS = [
+    struct.pack("<ii", 0, 42) + b"Version LIGGGHTS-PUBLIC 3.8.0, compiled ...\0" + bytes(99),
+    b"LammpS RestartT\0" + struct.pack("<ii", 1, 2) + bytes(99),
+]
+
+
+@pytest.mark.parametrize("data", RESTARTS)
 def test_a_binary_restart_is_named_with_what_to_write(tmp_path, data):
     path = tmp_path / "restart.1000"
     path.write_bytes(data)

@@ -46,39 +46,39 @@ NAMED = "id1=c_con[2],id2=c_con[4],fx=c_con[5],fy=c_con[6],fz=c_con[7]"
 APART = [*ROWS[:2], (3, 2, 0.61, 0.5, 0.5, 0.1)]
 
 
+RIGHT = [
+    # pairs that are listed twice are one contact
+    ([(1, 2, 0), (2, 1, 0), (2, 3, 0), (1, 2, 0)], ROWS, None, None, PAIRS, None),
+    # the force stands behind the flag, on the first grain; history has any number of values
+    ([(*pair, 0, -1, 0, 0) for pair in PAIRS], ROWS, None, None, PAIRS, [1, 0, 0]),
+    (
+        [(*pair, 0, -1, 0, 0, *[7] * 5, 0.5) for pair in PAIRS],
+        *(ROWS, "contactArea id force history:5", None, PAIRS, [1, 0, 0]),
+    ),
+    ([(*pair, 0, -1e308, 0, 0) for pair in PAIRS], ROWS, None, None, PAIRS, [1e308, 0, 0]),
+    # normal and tangential parts add up
+    (
+        [(*pair, 0, -2, 0, 0, 0, 3, 1) for pair in PAIRS],
+        *(ROWS, "id force_normal force_tangential", None, PAIRS, [2, -3, -1]),
+    ),
+    ([(*pair, 0, -2, 0, 0) for pair in PAIRS], ROWS, "id force_normal", None, PAIRS, None),
+    # columns of any compute: a number, both ids apart, the force; no periodic flag
+    ([(0.5, a, 7, b, -1.5, 0, 2) for a, b in PAIRS], ROWS, NAMED, None, PAIRS, [1.5, 0, -2]),
+    # of pairs within a cut-off those are left that overlap, or have a force
+    (PAIRS, APART, "id1=c_con[1],id2=c_con[2]", None, PAIRS[:1], None),
+    (
+        [(1, 2, 0.5), (2, 3, 0.0), (1, 3, 0.0)],
+        *(ROWS, "id1=c_con[1],id2=c_con[2],fx=c_con[3],fy=c_con[3],fz=c_con[3]", "lammps"),
+        *(PAIRS[:1], [-0.5] * 3),
+    ),
+    # %g writes a million as 1e+06, and loses nothing of short ids
+    ([(*pair, 0) for pair in chain(1234560)[1]], chain(1234560)[0], None, None, None, None),
+    ([("1e+06", 3, 0)], [(1000000, *ROWS[0][1:]), (3, *ROWS[1][1:])], None, None, None, None),
+]
+
+
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(
-    ("local", "rows", "columns", "format", "pairs", "force"),
-    [
-        # pairs that are listed twice are one contact
-        ([(1, 2, 0), (2, 1, 0), (2, 3, 0), (1, 2, 0)], ROWS, None, None, PAIRS, None),
-        # the force stands behind the flag, on the first grain; history has any number of values
-        ([(*pair, 0, -1, 0, 0) for pair in PAIRS], ROWS, None, None, PAIRS, [1, 0, 0]),
-        (
-            [(*pair, 0, -1, 0, 0, *[7] * 5, 0.5) for pair in PAIRS],
-            *(ROWS, "contactArea id force history:5", None, PAIRS, [1, 0, 0]),
-        ),
-        ([(*pair, 0, -1e308, 0, 0) for pair in PAIRS], ROWS, None, None, PAIRS, [1e308, 0, 0]),
-        # normal and tangential parts add up
-        (
-            [(*pair, 0, -2, 0, 0, 0, 3, 1) for pair in PAIRS],
-            *(ROWS, "id force_normal force_tangential", None, PAIRS, [2, -3, -1]),
-        ),
-        ([(*pair, 0, -2, 0, 0) for pair in PAIRS], ROWS, "id force_normal", None, PAIRS, None),
-        # columns of any compute: a number, both ids apart, the force; no periodic flag
-        ([(0.5, a, 7, b, -1.5, 0, 2) for a, b in PAIRS], ROWS, NAMED, None, PAIRS, [1.5, 0, -2]),
-        # of pairs within a cut-off those are left that overlap, or have a force
-        (PAIRS, APART, "id1=c_con[1],id2=c_con[2]", None, PAIRS[:1], None),
-        (
-            [(1, 2, 0.5), (2, 3, 0.0), (1, 3, 0.0)],
-            *(ROWS, "id1=c_con[1],id2=c_con[2],fx=c_con[3],fy=c_con[3],fz=c_con[3]", "lammps"),
-            *(PAIRS[:1], [-0.5] * 3),
-        ),
-        # %g writes a million as 1e+06, and loses nothing of short ids
-        ([(*pair, 0) for pair in chain(1234560)[1]], chain(1234560)[0], None, None, None, None),
-        ([("1e+06", 3, 0)], [(1000000, *ROWS[0][1:]), (3, *ROWS[1][1:])], None, None, None, None),
-    ],
-)
+@pytest.mark.parametrize(("local", "rows", "columns", "format", "pairs", "force"), RIGHT)
 def test_columns_are_found_or_named(tmp_path, local, rows, columns, format, pairs, force):
     packing = joined(tmp_path, local_text(local), rows, columns, format)
     expected = [tuple(sorted((int(float(one)), int(float(two))))) for one, two, *_ in local]
@@ -102,28 +102,28 @@ WRONG = ["id1=c_con[1]", f"{TWO},fx=c_con[3]", f"{TWO},size=c_con[3]", "id1=,id2
 WRONG += [f"{TWO},tx=c_con[3],ty=c_con[3],tz=c_con[3]"]
 
 
-@pytest.mark.parametrize(
-    ("local", "rows", "columns", "format", "told"),
-    [
-        ([(1, 2, 0), (2, 3, 0), (3, 4, 0), (4, 99, 0)], chain(0)[0], None, "liggghts", "grain 99"),
-        ([(101, 102, 0), (102, 103, 0)], ROWS, None, "liggghts", "surely ids of these"),
-        ([(1, 2, 0, 2, 3, 0), (2, 3, 0, 1, 2, 0)], ROWS, None, "liggghts", "no two columns"),
-        *((rows, ROWS, None, "lammps", "surely ids of these grains") for rows in UNSURE),
-        ([(1.5, 2), (2.5, 3)], ROWS, TWO, "lammps", "columns 1 and 2: ids must be whole"),
-        ([(1, 2), (2, 77)], ROWS, TWO, "lammps", "contact 2 names the grain 77, which is not in"),
-        # contacts with walls: where they are, two numbers of the wall, and the id
-        (AT_WALLS, ROWS, None, "liggghts", "names the grain 9, which is not"),
-        (FLAGGED, ROWS, "pos force", None, "id among them"),
-        (FLAGGED, ROWS, "id forces", None, "or keywords, id among them"),
-        (FLAGGED, ROWS, "id force torque", None, "for 6 columns; .* is for 9"),
-        (FLAGGED, ROWS, "id1=c_con[2],id2=c_con[9]", None, r"c_con\[9\].*; the columns are c_con"),
-        (FLAGGED, ROWS, "id1=c_con[1],id2=c_con[1]", None, "named twice"),
-        (ROUNDED, chain(1234561)[0], None, "liggghts", r"rounded to six digits.*%\.0f"),
-        # each rounded id is that of another grain
-        (ROUNDED, chain(1234560, 0.01)[0], "id force", None, r"rounded to six digits.*%\.0f"),
-        *((TRIPLES, ROWS, columns, None, "expected id1=NAME,id2=NAME") for columns in WRONG),
-    ],
-)
+REFUSED = [
+    ([(1, 2, 0), (2, 3, 0), (3, 4, 0), (4, 99, 0)], chain(0)[0], None, "liggghts", "grain 99"),
+    ([(101, 102, 0), (102, 103, 0)], ROWS, None, "liggghts", "surely ids of these"),
+    ([(1, 2, 0, 2, 3, 0), (2, 3, 0, 1, 2, 0)], ROWS, None, "liggghts", "no two columns"),
+    *((rows, ROWS, None, "lammps", "surely ids of these grains") for rows in UNSURE),
+    ([(1.5, 2), (2.5, 3)], ROWS, TWO, "lammps", "columns 1 and 2: ids must be whole"),
+    ([(1, 2), (2, 77)], ROWS, TWO, "lammps", "contact 2 names the grain 77, which is not in"),
+    # contacts with walls: where they are, two numbers of the wall, and the id
+    (AT_WALLS, ROWS, None, "liggghts", "names the grain 9, which is not"),
+    (FLAGGED, ROWS, "pos force", None, "id among them"),
+    (FLAGGED, ROWS, "id forces", None, "or keywords, id among them"),
+    (FLAGGED, ROWS, "id force torque", None, "for 6 columns; .* is for 9"),
+    (FLAGGED, ROWS, "id1=c_con[2],id2=c_con[9]", None, r"c_con\[9\].*; the columns are c_con"),
+    (FLAGGED, ROWS, "id1=c_con[1],id2=c_con[1]", None, "named twice"),
+    (ROUNDED, chain(1234561)[0], None, "liggghts", r"rounded to six digits.*%\.0f"),
+    # each rounded id is that of another grain
+    (ROUNDED, chain(1234560, 0.01)[0], "id force", None, r"rounded to six digits.*%\.0f"),
+    *((TRIPLES, ROWS, columns, None, "expected id1=NAME,id2=NAME") for columns in WRONG),
+]
+
+
+@pytest.mark.parametrize(("local", "rows", "columns", "format", "told"), REFUSED)
 def test_contacts_that_cannot_be_right_are_refused(tmp_path, local, rows, columns, format, told):
     for name in ("liggghts", "lammps") if format is None else (format,):
         with pytest.raises(ReadError, match=told):
@@ -209,14 +209,14 @@ def test_of_walls_whose_columns_are_not_proved_the_force_is_not_known(tmp_path):
     assert packing.wall_contacts.sum() == 2 * len(values)
 
 
-@pytest.mark.parametrize(
-    ("grains", "options"),
-    [
-        (CELL / "dump_30000.txt.gz", {"contacts": CELL / "contacts_30000.txt.gz"}),
-        (SHEAR / "shear.0.lammpstrj.gz", {"contacts": SHEAR_PAIRS, "contact_columns": OF_SHEAR}),
-        (YADE / "periodic.xml.bz2", {}),
-    ],
-)
+AT_REST = [
+    (CELL / "dump_30000.txt.gz", {"contacts": CELL / "contacts_30000.txt.gz"}),
+    (SHEAR / "shear.0.lammpstrj.gz", {"contacts": SHEAR_PAIRS, "contact_columns": OF_SHEAR}),
+    (YADE / "periodic.xml.bz2", {}),
+]
+
+
+@pytest.mark.parametrize(("grains", "options"), AT_REST)
 def test_grains_at_rest_in_periodic_cells_are_in_equilibrium(grains, options):
     packing = scanfab.read(grains, **options)
     crossing = np.any(packing.contacts.image != 0, axis=1)

@@ -52,15 +52,15 @@ def test_contacts_of_the_file_and_by_geometry_give_lammps_own_fabric(frames, num
     assert np.all(push > 0)
 
 
-@pytest.mark.parametrize(
-    ("contacts", "columns"),
-    [
-        (LAST_PAIRS, None),
-        # pairs that do not touch are left out
-        (FORMS / "wide.local.gz", None),
-        (FORMS / "wide.local.gz", "id1=c_wideids[1],id2=c_wideids[2]"),
-    ],
-)
+UNNAMED = [
+    (LAST_PAIRS, None),
+    # pairs that do not touch are left out
+    (FORMS / "wide.local.gz", None),
+    (FORMS / "wide.local.gz", "id1=c_wideids[1],id2=c_wideids[2]"),
+]
+
+
+@pytest.mark.parametrize(("contacts", "columns"), UNNAMED)
 def test_ids_are_found_without_being_named_and_forces_are_not(contacts, columns):
     named = scanfab.read(LAST, contacts=LAST_PAIRS, contact_columns=OF_SHEAR)
     packing = scanfab.read(LAST, contacts=contacts, contact_columns=columns)
@@ -131,14 +131,14 @@ def written(tmp_path, data):
     return path
 
 
+LAYOUTS = [
+    ({"names": NAMES, "time": 0.25}, "lammps", [{}]),
+    ({}, "liggghts", [{"columns": NUMBERS}, {"columns": NUMBERS, "format": "lammps"}]),
+]
+
+
 @pytest.mark.parametrize("blocks", [1, 3, 5])
-@pytest.mark.parametrize(
-    ("more", "format", "options"),
-    [
-        ({"names": NAMES, "time": 0.25}, "lammps", [{}]),
-        ({}, "liggghts", [{"columns": NUMBERS}, {"columns": NUMBERS, "format": "lammps"}]),
-    ],
-)
+@pytest.mark.parametrize(("more", "format", "options"), LAYOUTS)
 def test_both_layouts_hold_the_grains(tmp_path, blocks, more, format, options):
     path = written(tmp_path, binary_dump(step=7, blocks=blocks, **more))
     for one in options:
@@ -175,18 +175,18 @@ def test_snapshots_are_frames_and_an_incomplete_last_one_is_left_out(tmp_path):
 ONE, BLOCK = binary_dump(names=NAMES), struct.pack("<i", 18)
 
 
-@pytest.mark.parametrize(
-    ("data", "told"),
-    [
-        (binary_dump(), r'the 6 columns have no names.*`columns="id=1,x=3'),
-        (ONE[:-1], "incomplete"),
-        (ONE[:200], "incomplete"),
-        (ONE.replace(struct.pack("<q", 3), struct.pack("<q", 4), 1), "4 rows are not 18 numbers"),
-        *(
-            (ONE.replace(BLOCK, struct.pack("<i", size), 1), "incomplete")
-            for size in (17, -18, 2**31 - 1)
-        ),
-    ],
-)
+WRONG = [
+    (binary_dump(), r'the 6 columns have no names.*`columns="id=1,x=3'),
+    (ONE[:-1], "incomplete"),
+    (ONE[:200], "incomplete"),
+    (ONE.replace(struct.pack("<q", 3), struct.pack("<q", 4), 1), "4 rows are not 18 numbers"),
+    *(
+        (ONE.replace(BLOCK, struct.pack("<i", size), 1), "incomplete")
+        for size in (17, -18, 2**31 - 1)
+    ),
+]
+
+
+@pytest.mark.parametrize(("data", "told"), WRONG)
 def test_what_cannot_be_read_is_told(tmp_path, data, told):
     refuses(written(tmp_path, data), rf"dump.bin.*{told}")

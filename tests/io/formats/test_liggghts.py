@@ -41,15 +41,15 @@ def assert_true_grains(packing, folder, digits=SIX_DIGITS):
     assert truth.off_by(packing, expected).max() < digits * 0.04
 
 
-@pytest.mark.parametrize(
-    ("folder", "name", "options"),
-    [
-        *((FLOOR, name, {}) for name in TEXT),
-        *((FLOOR, name, {"periodic": "xy"}) for name in VTK),
-        (FLOOR, "atom_30000.vtu", FLOOR_CELL),
-        *((PERIODIC, name, {"periodic": "xyz"}) for name in OTHERS),
-    ],
-)
+FORMS = [
+    *((FLOOR, name, {}) for name in TEXT),
+    *((FLOOR, name, {"periodic": "xy"}) for name in VTK),
+    (FLOOR, "atom_30000.vtu", FLOOR_CELL),
+    *((PERIODIC, name, {"periodic": "xyz"}) for name in OTHERS),
+]
+
+
+@pytest.mark.parametrize(("folder", "name", "options"), FORMS)
 def test_every_form_gives_the_same_grains(folder, name, options):
     packing = scanfab.read(folder / name, **options)
     # VTK files have no step, and single ones none by their names
@@ -111,16 +111,16 @@ NO_GRAINS = ["mesh_30000.vtk", "decomposition_30000.vtk", "grains_boundingBox_30
 NO_GRAINS += ["grains_binary_boundingBox_30000.vtk", "grains_boundingBox_30000.vtr"]
 
 
-@pytest.mark.parametrize(
-    ("name", "told"),
-    [
-        *((name, "no grains: expected points with a radius") for name in NO_GRAINS),
-        ("mesh_30000.stl", "no reader knows this format"),
-        ("binary_30000.bin", "the 6 columns have no names: number them"),
-        ("pairs_id_force.txt", r"no grains.*found contacts \(pairs_id_force.txt\)"),
-        ("noradius.txt", r"noradius.txt, step 30000: no radius.*`columns.*`radius`"),
-    ],
-)
+WITHOUT_GRAINS = [
+    *((name, "no grains: expected points with a radius") for name in NO_GRAINS),
+    ("mesh_30000.stl", "no reader knows this format"),
+    ("binary_30000.bin", "the 6 columns have no names: number them"),
+    ("pairs_id_force.txt", r"no grains.*found contacts \(pairs_id_force.txt\)"),
+    ("noradius.txt", r"noradius.txt, step 30000: no radius.*`columns.*`radius`"),
+]
+
+
+@pytest.mark.parametrize(("name", "told"), WITHOUT_GRAINS)
 def test_files_without_grains_are_told(name, told):
     refuses(FLOOR / name, told)
 

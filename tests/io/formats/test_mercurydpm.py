@@ -36,10 +36,7 @@ def test_contacts_go_by_their_time_and_forces_act_on_the_second_grain(run):
     # each pair once
     assert contacts.pairs.tolist() == [[0, 1], [2, 0]]
     # pushed off the first grain, through the face as well
-    np.testing.assert_array_equal(
-        contacts.force,
-        [[NORMAL, -TANGENT, 0], [NORMAL, 0, -TANGENT]],
-    )
+    np.testing.assert_array_equal(contacts.force, [[NORMAL, -TANGENT, 0], [NORMAL, 0, -TANGENT]])
     np.testing.assert_allclose(contacts.normal, [[1, 0, 0], [1, 0, 0]])
     assert packing.wall_contacts.tolist() == [0, 0, 1]
     # the domain is not said to repeat
@@ -75,13 +72,13 @@ def test_a_restart_has_contacts_and_its_period(tmp_path):
     assert scanfab.read(path, cell=(1, 2, 3)).cell.periodic == (True, True, True)
 
 
-@pytest.mark.parametrize(
-    ("version", "first", "periods"),
-    [
-        (2, "", "WallsPeriodic 1\nnormal 0 1 0 pos_left 0.5 pos_right 2.5 shift 0 2 0"),
-        (3, "TSP BP ", "Boundaries 1\nPeriodicBoundary normal 0 1 0 position_left 0.5 shift 0 2 0"),
-    ],
-)
+VERSIONS = [
+    (2, "", "WallsPeriodic 1\nnormal 0 1 0 pos_left 0.5 pos_right 2.5 shift 0 2 0"),
+    (3, "TSP BP ", "Boundaries 1\nPeriodicBoundary normal 0 1 0 position_left 0.5 shift 0 2 0"),
+]
+
+
+@pytest.mark.parametrize(("version", "first", "periods"), VERSIONS)
 def test_an_old_restart(tmp_path, version, first, periods):
     rows = "".join(f"{first}{x} {y} {z} 9 9 9 {RADIUS} 0 0 0\n" for x, y, z in CENTRES)
     text = (

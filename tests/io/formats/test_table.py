@@ -48,16 +48,16 @@ def assert_right(packing):
 # columns without names
 
 
+READ_BY_RULE = [
+    ("x y z radius", (POSITION, RADIUS)),
+    ("id x y z radius", (ID, POSITION, RADIUS)),
+    ("x y z radius clump", (POSITION, RADIUS, np.full(64, -1))),
+    ("x y z radius clump", (POSITION, RADIUS, np.arange(64) // 2)),
+]
+
+
 @pytest.mark.parametrize("loose", [1.0, 3.0])
-@pytest.mark.parametrize(
-    ("told", "columns"),
-    [
-        ("x y z radius", (POSITION, RADIUS)),
-        ("id x y z radius", (ID, POSITION, RADIUS)),
-        ("x y z radius clump", (POSITION, RADIUS, np.full(64, -1))),
-        ("x y z radius clump", (POSITION, RADIUS, np.arange(64) // 2)),
-    ],
-)
+@pytest.mark.parametrize(("told", "columns"), READ_BY_RULE)
 def test_a_table_without_names_is_read_by_a_rule_that_is_told(tmp_path, columns, told, loose):
     """Also loose packings, with any ending."""
     columns = [loose * one if one is POSITION else one for one in columns]
@@ -72,19 +72,19 @@ def test_a_table_without_names_is_read_by_a_rule_that_is_told(tmp_path, columns,
         np.testing.assert_array_equal(packing.columns["clump"], columns[-1])
 
 
-@pytest.mark.parametrize(
-    ("reason", "columns"),
-    [
-        ("inside one another", (POSITION, 2 * RADIUS)),
-        ("inside one another", (ID, POSITION, 2 * RADIUS)),
-        ("not be positive", (POSITION, -RADIUS)),
-        ("two frames", (np.tile(POSITION, (2, 1)), np.tile(RADIUS, 2))),
-        ("not be whole", (POSITION, RADIUS, RADIUS)),
-        ("looks like ids", (ID, POSITION)),
-        ("the 6 columns have no names .expected four or five", (POSITION, RADIUS, ID, ID)),
-        ("3 columns", (POSITION,)),
-    ],
-)
+ASKED = [
+    ("inside one another", (POSITION, 2 * RADIUS)),
+    ("inside one another", (ID, POSITION, 2 * RADIUS)),
+    ("not be positive", (POSITION, -RADIUS)),
+    ("two frames", (np.tile(POSITION, (2, 1)), np.tile(RADIUS, 2))),
+    ("not be whole", (POSITION, RADIUS, RADIUS)),
+    ("looks like ids", (ID, POSITION)),
+    ("the 6 columns have no names .expected four or five", (POSITION, RADIUS, ID, ID)),
+    ("3 columns", (POSITION,)),
+]
+
+
+@pytest.mark.parametrize(("reason", "columns"), ASKED)
 def test_a_table_without_names_that_cannot_be_so_is_asked(tmp_path, columns, reason):
     path = rows(tmp_path / "grains.txt", *columns)
     for options in ({}, {"format": "table"}):
@@ -111,17 +111,17 @@ def test_users_say_what_columns_are_in_a_text_of_any_ending(tmp_path, capsys):
 # names
 
 
-@pytest.mark.parametrize(
-    "names",
-    [
-        "x y z radius",
-        "X Y Z r",
-        "pos_x pos_y pos_z Radius",
-        "Points:0 Points:1 Points:2 radii",
-        "x[m] y[m] z[m] radius[m]",
-        "x(\xb5m) y(\u03bcm) z(\xb5m) r(\u03bcm)",  # two letters for micro
-    ],
-)
+USUAL_NAMES = [
+    "x y z radius",
+    "X Y Z r",
+    "pos_x pos_y pos_z Radius",
+    "Points:0 Points:1 Points:2 radii",
+    "x[m] y[m] z[m] radius[m]",
+    "x(\xb5m) y(\u03bcm) z(\xb5m) r(\u03bcm)",  # two letters for micro
+]
+
+
+@pytest.mark.parametrize("names", USUAL_NAMES)
 def test_usual_names(tmp_path, names):
     packing = read(rows(tmp_path / "g.csv", POSITION, RADIUS, ID, names=[*names.split(), "kept"]))
     assert_right(packing)
@@ -131,14 +131,14 @@ def test_usual_names(tmp_path, names):
 ROWS = "0,0,0,0.5,7\n1,0,0,0.5,7\n"
 
 
-@pytest.mark.parametrize(
-    ("names", "columns", "told"),
-    [
-        ("", {"x": 2, "y": "2", "z": 4, "radius": 5}, "'2' is named twice .*, as x and as y"),
-        ("x,y,z,r,e\n", {"radius": "r", "age": "r"}, "'r' is named twice in .*, as radius and"),
-        ("x,y,z,r,X\n", {}, r"several columns may be x: 'x' \(column 1\), .*column 5"),
-    ],
-)
+TWICE = [
+    ("", {"x": 2, "y": "2", "z": 4, "radius": 5}, "'2' is named twice .*, as x and as y"),
+    ("x,y,z,r,e\n", {"radius": "r", "age": "r"}, "'r' is named twice in .*, as radius and"),
+    ("x,y,z,r,X\n", {}, r"several columns may be x: 'x' \(column 1\), .*column 5"),
+]
+
+
+@pytest.mark.parametrize(("names", "columns", "told"), TWICE)
 def test_a_column_that_stands_or_serves_twice_is_named(tmp_path, names, columns, told):
     path = write(tmp_path / "g.csv", names + ROWS)
     refuses(path, told, columns=columns)

@@ -21,19 +21,19 @@ def read(tmp_path, text, **options):
     return scanfab.read(write(tmp_path / "dump", text), **options)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        dump_text(separator="   ", end="  \n"),
-        dump_text(separator="\t", end="\n"),
-        dump_text(rows=[(f"   {row[0]}", *row[1:]) for row in ROWS]),
-        dump_text(after="ITEM: LABEL\nGRAINS\n"),
-        dump_text(before=TIMES.format(0.5)).replace("\n", "\r\n"),
-        dump_text(WORDS, "id type element x y z r"),
-        dump_text(flags="", names=NAMES.replace("id", "tag")),
-        yaml_text(0),
-    ],
-)
+SPELLINGS = [
+    dump_text(separator="   ", end="  \n"),
+    dump_text(separator="\t", end="\n"),
+    dump_text(rows=[(f"   {row[0]}", *row[1:]) for row in ROWS]),
+    dump_text(after="ITEM: LABEL\nGRAINS\n"),
+    dump_text(before=TIMES.format(0.5)).replace("\n", "\r\n"),
+    dump_text(WORDS, "id type element x y z r"),
+    dump_text(flags="", names=NAMES.replace("id", "tag")),
+    yaml_text(0),
+]
+
+
+@pytest.mark.parametrize("text", SPELLINGS)
 def test_grains_are_those_of_the_file(tmp_path, text):
     packing, rows = read(tmp_path, text), np.array(ROWS)
     assert (packing.step, packing.id.tolist()) == (0, rows[:, 0].tolist())

@@ -232,15 +232,15 @@ def test_the_parts_of_one_time_are_one_frame(tmp_path, one):
     np.testing.assert_array_equal(alone.read().id, packings[1].id)
 
 
-@pytest.mark.parametrize(
-    ("names", "more", "told"),
-    [
-        (("a", "b"), ('timestep="5"', 'timestep="5"'), r"a\.vtp and b\.vtp have the same timestep"),
-        (("a", "b"), ('group="g"', 'group="g"'), r"a\.vtp and b\.vtp have the same timestep"),
-        (("a", "b"), ('part="0"', 'part="1"'), r"ids|twice"),
-        (("a", "points"), ('part="0"', 'part="1"'), r"points without a radius \(points\.vtp"),
-    ],
-)
+NO_PARTS = [
+    (("a", "b"), ('timestep="5"', 'timestep="5"'), r"a\.vtp and b\.vtp have the same timestep"),
+    (("a", "b"), ('group="g"', 'group="g"'), r"a\.vtp and b\.vtp have the same timestep"),
+    (("a", "b"), ('part="0"', 'part="1"'), r"ids|twice"),
+    (("a", "points"), ('part="0"', 'part="1"'), r"points without a radius \(points\.vtp"),
+]
+
+
+@pytest.mark.parametrize(("names", "more", "told"), NO_PARTS)
 def test_files_that_are_not_parts_of_one_frame_are_refused(tmp_path, names, more, told):
     for name in "ab":
         cloud(tmp_path / f"{name}.vtp", [0, 1])

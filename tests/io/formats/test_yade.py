@@ -55,14 +55,14 @@ def test_the_periodic_grains_are_the_same_in_every_form(name):
     assert name != PACK or np.all(packing.columns["clumpId"] == -1)
 
 
-@pytest.mark.parametrize(
-    ("grains", "contacts"),
-    [
-        *itertools.product(WITH_IDS, EXPORTED + RECORDED),
-        (HEAP[0], EXPORTED[0]),
-        *itertools.product(IN_CELL, [PERIODIC_INTRS]),
-    ],
-)
+JOINED = [
+    *itertools.product(WITH_IDS, EXPORTED + RECORDED),
+    (HEAP[0], EXPORTED[0]),
+    *itertools.product(IN_CELL, [PERIODIC_INTRS]),
+]
+
+
+@pytest.mark.parametrize(("grains", "contacts"), JOINED)
 def test_every_form_gives_the_same_contacts_by_ids_or_places_and_walls(grains, contacts):
     """Across the faces of the cell as well, where normals are true if the images are."""
     bodies, pairs, count, cell, walls = TRUE_BODIES, TRUE_CONTACTS, 271, None, 107
@@ -108,16 +108,16 @@ def test_a_contact_through_a_face_without_a_cell_asks_for_it(tmp_path):
     refuses(spheres, "name its cell", error=scanfab.PackingError, contacts=YADE / PERIODIC_INTRS)
 
 
-@pytest.mark.parametrize(
-    ("name", "reader", "kind"),
-    [
-        ("ascii_boxes.30000.vtu", "vtk", "other"),
-        ("zlib_facets.30000.vtu", "vtk", "other"),
-        (HEAP[1], "yade", "grains"),
-        (PACK, "yade", "grains"),
-        *((name, "yade", "contacts") for name in EXPORTED[1:] + RECORDED),
-    ],
-)
+KINDS = [
+    ("ascii_boxes.30000.vtu", "vtk", "other"),
+    ("zlib_facets.30000.vtu", "vtk", "other"),
+    (HEAP[1], "yade", "grains"),
+    (PACK, "yade", "grains"),
+    *((name, "yade", "contacts") for name in EXPORTED[1:] + RECORDED),
+]
+
+
+@pytest.mark.parametrize(("name", "reader", "kind"), KINDS)
 def test_what_a_file_holds(name, reader, kind):
     found = reader_for(YADE / name)
     assert (found.name, found.kind(YADE / name)) == (reader, kind)

@@ -99,14 +99,14 @@ def normal_forces(packing):
     return dict(zip(pairs, packing.contacts.force_n.tolist(), strict=True))
 
 
-@pytest.mark.parametrize(
-    ("grains", "contacts", "rtol"),
-    [
-        ("zlib_spheres.30000.vtu", "ascii_intrs.30000.vtp", 1e-6),
-        ("zlib_spheres.30000.vtu", "zlib_intrs.30000.vtp", 1e-6),
-        ("id-spheres-00000000.vtk.gz", "id-intrs-00000000.vtk.gz", 1e-5),
-    ],
-)
+NORMAL_FORCES = [
+    ("zlib_spheres.30000.vtu", "ascii_intrs.30000.vtp", 1e-6),
+    ("zlib_spheres.30000.vtu", "zlib_intrs.30000.vtp", 1e-6),
+    ("id-spheres-00000000.vtk.gz", "id-intrs-00000000.vtk.gz", 1e-5),
+]
+
+
+@pytest.mark.parametrize(("grains", "contacts", "rtol"), NORMAL_FORCES)
 def test_vtk_files_of_yade_have_the_normal_force(grains, contacts, rtol):
     packing = scanfab.read(YADE / grains, contacts=YADE / contacts)
     assert packing.contacts.force is None
@@ -163,14 +163,14 @@ def test_the_cell_of_another_frame_is_refused(tmp_path):
     refuses(tmp_path / "lone-spheres-00000000.vtk.gz", r"outside the cell of .*`cell=.FILE.csv")
 
 
-@pytest.mark.parametrize(
-    ("spheres", "own", "saved"),
-    [
-        ("saved_spheres.27500.vtu", "saved_spheres.27500.vtu", "saved_27500.xml.bz2"),
-        # the exporter counts its files: their numbers are no steps
-        ("after-spheres-00000001.vtk.gz", "x-spheres-00017500.vtk.gz", "x_17500.xml.bz2"),
-    ],
-)
+OTHER_STEPS = [
+    ("saved_spheres.27500.vtu", "saved_spheres.27500.vtu", "saved_27500.xml.bz2"),
+    # the exporter counts its files: their numbers are no steps
+    ("after-spheres-00000001.vtk.gz", "x-spheres-00017500.vtk.gz", "x_17500.xml.bz2"),
+]
+
+
+@pytest.mark.parametrize(("spheres", "own", "saved"), OTHER_STEPS)
 def test_a_saved_state_of_another_step_is_not_taken(tmp_path, spheres, own, saved):
     shutil.copy(STRAINED / spheres, tmp_path / own)
     shutil.copy(STRAINED / "saved_17500.xml.bz2", tmp_path / saved)
@@ -209,16 +209,16 @@ def test_cells_of_the_frames_come_from_a_csv_file(tmp_path, key):
         np.testing.assert_array_equal(packing.cell.vectors, cell)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("step,lx,ly\n0,1,1\n", "expected .*step or frame, and lx, ly, lz.*found step, lx"),
-        ("frame,lx,ly,lz,xy\n0,1,1,1,0\n", "lx, ly, lz, xy, xz, yz, found"),
-        ("frame,lx,ly,lz\n0,1,0,1\n", "line 2: expected .*above 0: lx, ly, lz"),
-        ("frame,lx,ly,lz\n0,1,1,1\n0,1,1,2\n", "line 3: frame 0 occurs twice"),
-        ("step,lx,ly,lz\n17500,1,1,1\n37500,1,1,1\n", "no row .* step 27500.*27500.vtu"),
-    ],
-)
+WRONG_CELLS = [
+    ("step,lx,ly\n0,1,1\n", "expected .*step or frame, and lx, ly, lz.*found step, lx"),
+    ("frame,lx,ly,lz,xy\n0,1,1,1,0\n", "lx, ly, lz, xy, xz, yz, found"),
+    ("frame,lx,ly,lz\n0,1,0,1\n", "line 2: expected .*above 0: lx, ly, lz"),
+    ("frame,lx,ly,lz\n0,1,1,1\n0,1,1,2\n", "line 3: frame 0 occurs twice"),
+    ("step,lx,ly,lz\n17500,1,1,1\n37500,1,1,1\n", "no row .* step 27500.*27500.vtu"),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), WRONG_CELLS)
 def test_a_csv_file_of_cells_that_is_wrong_is_an_error_that_says_where(tmp_path, text, message):
     path = write(tmp_path / "cells.csv", text)
     refuses(STRAINED / "rec_spheres.*", f"cells.csv.*{message}", cell=path, frame=1)
