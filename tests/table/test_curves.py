@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import warnings
 
 import pytest
 
@@ -12,16 +11,8 @@ from scanfab.base.column import columns_of_fields
 from scanfab.base.errors import ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.pipeline.calibration import StepRow
 from scanfab.pipeline.inspection import FrameReport
+from scanfab.table import curves
 from scanfab.table.compare import DIFFERENCES, FRAMES, SUMMARY
-from scanfab.table.curves import (
-    curves_of,
-    frame_strain_column,
-    is_turned,
-    short_names,
-    spelt_strain,
-    strain_column,
-    why_not_strain,
-)
 from scanfab.table.row import number_of
 from scanfab.table.selection import choose_rows
 from tests.helpers.tables import curve, sheared
@@ -45,11 +36,7 @@ ABSCISSAS = [
     (curve("one")[2:3], "strain", None),
     ([], None, None),
     (changed(strain=None), None, None),
-    (
-        [*curve("one"), *changed("two", strain=None)],
-        None,
-        f"{FRAME}, because two has no axial strain: ",
-    ),
+    ([*curve("one"), *changed("two", strain=None)], None, f"{FRAME}, because two has no axial st"),
     (changed(frame=3, strain=None), None, f"{FRAME}, because one has no axial strain in frame 3: "),
     (changed(frame=3, strain=None, alpha_vs_axial=None), "strain", None),
     (changed(strain=0.25), None, "because the axial strain of one is 0.25 in all frames: "),
@@ -65,56 +52,48 @@ ABSCISSAS = [
 def test_a_strain_that_all_frames_have_is_the_abscissa_and_a_hint_tells_of_any_other(
     rows, column, hint
 ):
-    assert strain_column(rows) == column
-    found = why_not_strain(rows)
+    assert curves.strain_column(rows) == column
+    found = curves.why_not_strain(rows)
     assert found is None if hint is None else re.search(hint, found)
 
 
-SINGLE = [
-    (0.1, 0.2, "strain"),
-    (0.0, 0.2, "shear_strain"),
-    (1e-12, 0.2, "shear_strain"),
-    (None, 0.2, "shear_strain"),
-    (0.0, 0.0, "strain"),
-    (0.0, None, "strain"),
-    (None, None, None),
-]
-
-
-@pytest.mark.parametrize(("axial", "shear", "column"), SINGLE)
-def test_a_single_frame_has_the_strain_that_is_not_zero(axial, shear, column):
-    assert frame_strain_column({"strain": axial, "shear_strain": shear}) == column
+def test_a_single_frame_has_the_strain_that_is_not_zero():
+    for axial, shear, column in (
+        (0.1, 0.2, "strain"),
+        *((axial, 0.2, "shear_strain") for axial in (0.0, 1e-12, None)),
+        *((0.0, shear, "strain") for shear in (0.0, None)),
+        (None, None, None),
+    ):
+        assert curves.frame_strain_column({"strain": axial, "shear_strain": shear}) == column
 
 
 def test_a_strain_is_spelt_for_titles():
     row = {"strain": 0.1234567, "shear_strain": None}
-    assert spelt_strain(row, "strain") == "axial strain 12.3 %"
-    assert spelt_strain(row, "strain", symbol=True) == r"$\varepsilon_a$ = 12.3 %"
-    assert spelt_strain(row, "shear_strain") == spelt_strain(row, None) == ""
+    assert curves.spelt_strain(row, "strain") == "axial strain 12.3 %"
+    assert curves.spelt_strain(row, "strain", symbol=True) == r"$\varepsilon_a$ = 12.3 %"
+    assert curves.spelt_strain(row, "shear_strain") == curves.spelt_strain(row, None) == ""
 
 
-@pytest.mark.parametrize(
-    ("sources", "names"),
-    [(("runs/dense", "runs/loose"), ["dense", "loose"]), (("one/x", "two/x"), ["one/x", "two/x"])],
-)
-def test_sources_are_called_by_the_last_part_of_their_path(sources, names):
-    rows = [row for source in sources for row in curve(source)]
-    assert [one.source for one in curves_of(rows)] == names
+@pytest.mark.parametrize("names", [["dense", "loose"], ["one/x", "two/x"]])
+def test_sources_are_called_by_the_last_part_of_their_path(names):
+    rows = [row for name in names for row in curve(f"runs/{name}")]
+    assert [one.source for one in curves.curves_of(rows)] == names
 
 
 @pytest.mark.parametrize(("axial", "turned"), [(0.9, False), (0.4, True)])
 def test_the_most_certain_frame_tells_whether_the_axes_are_turned(axial, turned):
     rows = [{**row, "alpha_c_axial": axial * row["alpha_c"]} for row in sheared()]
     rows[0].update(alpha_c=1.0, alpha_c_axial=0.0, alpha_c_axial_se=1.0)
-    assert is_turned(rows) == turned
-    assert is_turned(curve()) is False
+    assert curves.is_turned(rows) == turned
+    assert curves.is_turned(curve()) is False
 
 
 def test_long_names_are_cut_in_the_middle_and_stay_different():
     names = [f"{'a' * 60}{end}" for end in "xy"]
-    assert short_names(names) == {name: f"{'a' * 14}...{'a' * 13}{name[-1]}" for name in names}
+    short = [f"{'a' * 14}...{'a' * 13}{end}" for end in "xy"]
+    assert [*curves.short_names(names).items()] == [*zip(names, short, strict=True)]
     alike = [f"{'a' * 30}{end}{'b' * 30}" for end in "xy"]
-    assert len(set(short_names(alike).values())) == 2
+    assert len(set(curves.short_names(alike).values())) == 2
 
 
 CUTOFFS = (0.0, 0.00080000001, 0.0016)
@@ -125,25 +104,21 @@ OF_CUTOFFS = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("asked", "expected"), [(0.0, 0.0), (0.0008, 0.00080000001), (0.00160001, 0.0016)]
-)
-def test_the_rows_of_one_cutoff_are_chosen_to_three_digits(asked, expected):
-    (rows,) = choose_rows([("t.csv", OF_CUTOFFS)], cutoff=asked)
-    assert [row["cutoff"] for row in rows] == [expected] * 5
+@pytest.mark.parametrize("asked", [0.0, 0.0008, 0.00160001])
+def test_the_rows_of_one_cutoff_are_chosen_to_three_digits(asked):
+    """A frame without grains has no cut-off, and stays once."""
+    empty = {"cutoff": None, "alpha_vs_axial": None}
+    rows = [{**row, **empty} if row["frame"] == 0 else row for row in OF_CUTOFFS]
+    (chosen,) = choose_rows([("t.csv", rows)], cutoff=asked)
+    cutoffs = [row["cutoff"] for row in chosen[1:]]
+    assert cutoffs == [pytest.approx(asked, rel=1e-3)] * 4
+    assert [row["frame"] for row in chosen] == [0, 1, 2, 3, 4]
 
 
 def test_a_table_of_one_cutoff_keeps_its_rows_and_says_so():
     rows = [{**row, "cutoff": 0.5} for row in curve()]
     with pytest.warns(ScanfabNote, match=r"t\.csv: its rows have the one cut-off 0\.5"):
         assert choose_rows([("t.csv", rows)], cutoff=0.4) == [rows]
-
-
-def test_a_frame_without_grains_has_no_cutoff_and_stays_once():
-    empty = {"cutoff": None, "alpha_vs_axial": None}
-    rows = [{**row, **empty} if row["frame"] == 0 else row for row in OF_CUTOFFS]
-    (chosen,) = choose_rows([("t.csv", rows)], cutoff=0.0016)
-    assert [row["frame"] for row in chosen] == [0, 1, 2, 3, 4]
 
 
 LABELS = [
@@ -168,10 +143,9 @@ def test_rows_that_are_there_already_count_once_with_one_warning(source):
     assert text == f"2.csv: rows of {source} that 1.csv also holds are used once"
 
 
+@pytest.mark.filterwarnings("error")
 def test_other_results_of_the_same_source_are_not_dropped():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        first, second = choose_rows([("1.csv", curve()), ("2.csv", curve(factor=2.0))])
+    first, second = choose_rows([("1.csv", curve()), ("2.csv", curve(factor=2.0))])
     assert len(first) == len(second) == 5
 
 
@@ -194,23 +168,15 @@ def test_a_value_of_another_kind_is_named_by_table_row_and_column(column, value,
 
 
 OTHERS = [(FRAMES, "a table"), (SUMMARY, "the summary"), (DIFFERENCES, "the differences")]
+OTHERS += [(columns_of_fields(kind), "no column strain") for kind in (StepRow, FrameReport)]
 REFUSED = [
     *(([dict.fromkeys(one.name for one in columns)], {}, name) for columns, name in OTHERS),
-    ([dict.fromkeys(one.name for one in columns_of_fields(StepRow))], {}, "no column strain"),
-    ([dict.fromkeys(one.name for one in columns_of_fields(FrameReport))], {}, "no column strain"),
     ([{f"column_{k}": k for k in range(100)}], {}, "no column source"),
     ([*curve(), {"source": "one"}], {}, "row 6: there is no column frame"),
-    (
-        [{k: v for k, v in curve()[0].items() if k != "alpha_c_axial"}],
-        {},
-        "there is no column alpha_c_axial",
-    ),
+    ([dict.fromkeys(curve()[0].keys() - {"alpha_c_axial"})], {}, "no column alpha_c_axial"),
     *((OF_CUTOFFS, {"cutoff": c}, "0, 0.0008, 0.0016") for c in (8.1e-4, 1.0, -1, math.nan)),
     (curve(), {"cutoff": 1.0}, "none in this table"),
-    *(
-        (curve(), {"labels": names}, f"one per table: 1, found {len(names)}")
-        for names in (["a", "b"], [*"abc"])
-    ),
+    (curve(), {"labels": ["a", "b"]}, "one per table: 1, found 2"),
 ]
 
 
