@@ -222,3 +222,10 @@ def refuses(source, told: str, *, error: type[ScanfabError] = ReadError, **optio
     """Reading a file or series ends in an error with these words."""
     with pytest.raises(error, match=told):
         scanfab.read(source, **options)
+
+
+def holds(found: object, **expected: object) -> None:
+    """Each attribute of an object, or column of a packing, has this value, to the last bit."""
+    for name, value in expected.items():
+        own = getattr(found, name) if hasattr(found, name) else found.columns[name]
+        np.testing.assert_array_equal(own, value, err_msg=name)

@@ -12,7 +12,7 @@ from scanfab import ReadError, SettingsError
 from scanfab.io import ReadOptions, grain_table
 from scanfab.io.writer import installed_writers
 from scanfab.packing.cell import Cell
-from tests.helpers.dumps import NAMES, dump_text, write
+from tests.helpers.dumps import NAMES, dump_text, holds, write
 from tests.helpers.truth import SAMPLE_DATA
 
 PATH = Path("dump.txt")
@@ -40,9 +40,7 @@ COORDINATES = [
 @pytest.mark.parametrize(("names", "named"), COORDINATES)
 def test_coordinates_are_known_by_name_or_named_by_the_user(names, named):
     grains = table(columns(names), columns=named)
-    np.testing.assert_array_equal(grains.position, POSITION)
-    np.testing.assert_array_equal(grains.radius, RADIUS)
-    assert (grains.columns, grains.id) == ({}, None)
+    holds(grains, position=POSITION, radius=RADIUS, columns={}, id=None)
 
 
 @pytest.mark.parametrize("names", ["xs ys zs", "xsu ysu zsu"])
@@ -53,7 +51,7 @@ def test_scaled_coordinates_are_fractions_of_the_box(names):
     with pytest.raises(ReadError, match=rf"dump.txt, step 5: {names} are fractions of a box"):
         table(columns(names))
     both = columns(names, 9 * POSITION) | columns()
-    np.testing.assert_array_equal(table(both, BOX).position, POSITION)
+    holds(table(both, BOX), position=POSITION)
 
 
 def test_missing_columns_are_errors_that_list_what_there_is():
@@ -68,13 +66,13 @@ def test_missing_columns_are_errors_that_list_what_there_is():
 @pytest.mark.parametrize("name", ["radius", "radii", "RADIUS", "rad", "R", "Diameter", "diam"])
 def test_a_size_has_many_names_or_is_named_or_given_for_all(name):
     found = {"position": POSITION, name: RADIUS * (2 if "iam" in name else 1)}
-    np.testing.assert_array_equal(table(found).radius, RADIUS)
+    holds(table(found), radius=RADIUS)
     with pytest.raises(ReadError, match="`radius` is for dumps without radii"):
         table(found, radius=0.5)
     size = {"position": POSITION, "c_r": RADIUS}
-    np.testing.assert_array_equal(table(size, columns={"radius": "c_r"}).radius, RADIUS)
-    np.testing.assert_array_equal(table(size, columns={"diameter": "c_r"}).radius, 0.5 * RADIUS)
-    np.testing.assert_array_equal(table(size, radius=0.5).radius, [0.5, 0.5])
+    holds(table(size, columns={"radius": "c_r"}), radius=RADIUS)
+    holds(table(size, columns={"diameter": "c_r"}), radius=0.5 * RADIUS)
+    holds(table(size, radius=0.5), radius=[0.5, 0.5])
 
 
 @pytest.mark.parametrize("radius", [0.333, 12.3, 1e-4])
@@ -82,13 +80,12 @@ def test_a_diameter_that_is_not_twice_the_radius_is_an_error_unless_it_was_round
     radii = np.array([radius, radius])
     for factor in (1, 1.004):
         found = {"position": POSITION, "r": radii, "Diam": 2 * radii * [1, factor]}
-        np.testing.assert_array_equal(table(found).radius, radii)
+        holds(table(found), radius=radii)
     found["Diam"] = 2 * radii * [1, 0.5]
     with pytest.raises(ReadError, match=r"'r' and 'Diam' contradict each other at grain 2"):
         table(found)
-    np.testing.assert_array_equal(table(found, columns={"radius": "r"}).radius, radii)
-    half = table(found, columns={"diameter": "Diam"})
-    np.testing.assert_array_equal(half.radius, radii * [1, 0.5])
+    holds(table(found, columns={"radius": "r"}), radius=radii)
+    holds(table(found, columns={"diameter": "Diam"}), radius=radii * [1, 0.5])
 
 
 @pytest.mark.parametrize("other", [["big", "one"], [[1, 2], [3, 4]], [np.nan, np.nan]])
@@ -103,9 +100,7 @@ def test_what_was_chosen_stays_chosen_in_what_convert_writes(tmp_path, name):
     packing = scanfab.read(path, columns={"radius": "radius"})
     extension = installed_writers()[name].plugin.extensions[0]
     (out,) = scanfab.convert(packing, tmp_path / f"a{extension}", to=name)
-    again = scanfab.read(out)
-    assert again.radius.tolist() == [0.5, 1]
-    assert again.columns["diameter_of_dump"].tolist() == [1, 1]
+    holds(scanfab.read(out), radius=[0.5, 1], diameter_of_dump=[1, 1])
 
 
 @pytest.mark.parametrize("name", ["id", "ID", "particle_id", "body_id", "number"])
@@ -128,10 +123,9 @@ def test_ids_are_whole_numbers(wrong):
 def test_other_columns_keep_their_names_unless_the_user_names_them():
     more = columns(type=RADIUS, c_ca=2 * RADIUS, phase=3 * RADIUS, id=np.array([1, 2]))
     assert sorted(table(more).columns) == ["c_ca", "phase", "type"]
-    found = table(more, columns={"type": "phase", "id": "id"}).columns
-    np.testing.assert_array_equal(found["type"], 3 * RADIUS)
-    np.testing.assert_array_equal(found["type_of_dump"], RADIUS)
-    assert "phase" not in found
+    found = table(more, columns={"type": "phase", "id": "id"})
+    holds(found, type=3 * RADIUS, type_of_dump=RADIUS)
+    assert "phase" not in found.columns
 
 
 def cell_of(own=None, **options):
@@ -140,11 +134,9 @@ def cell_of(own=None, **options):
 
 def test_the_users_cell_replaces_the_dumps_and_keeps_its_corner():
     cell = cell_of(BOX, cell=(3.0, 5.0, 7.0))
-    np.testing.assert_array_equal(cell.vectors, np.diag([3.0, 5.0, 7.0]))
-    np.testing.assert_array_equal(cell.origin, BOX.origin)
-    assert cell.periodic == (True, True, True)
+    holds(cell, vectors=np.diag([3, 5, 7]), origin=BOX.origin, periodic=(True, True, True))
     tilted = cell_of(cell=(3.0, 5.0, 7.0, 0.1, 0.2, 0.3))
-    np.testing.assert_array_equal(tilted.vectors, [[3, 0, 0], [0.1, 5, 0], [0.2, 0.3, 7]])
+    holds(tilted, vectors=[[3, 0, 0], [0.1, 5, 0], [0.2, 0.3, 7]])
     assert (cell_of(BOX), cell_of()) == (BOX, None)
 
 
@@ -163,9 +155,6 @@ def test_periodic_letters_say_which_axes_repeat(letters):
 def test_a_cell_that_cannot_be_is_an_error(options):
     with pytest.raises(SettingsError, match=r"expected (three lengths|letters out of xyz)"):
         scanfab.read_series("nowhere", **options)
-
-
-CLUMPS = SAMPLE_DATA / "clumps"
 
 
 def dump(tmp_path, column, values, **options):
@@ -215,7 +204,7 @@ def test_an_empty_frame_has_no_bodies(tmp_path):
     [("clumps.xml.bz2", 60, 90), ("clumps_spheres.0.vtu", 60, 90), ("multisphere_2.txt", 40, 80)],
 )
 def test_what_the_programs_write_of_clumps_is_read(name, grains, spheres):
-    packing = scanfab.read(CLUMPS / name)
+    packing = scanfab.read(SAMPLE_DATA / "clumps" / name)
     assert (packing.bodies.count(np.ones(len(packing), bool)), len(packing)) == (grains, spheres)
 
 

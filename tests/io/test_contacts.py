@@ -10,6 +10,7 @@ import pytest
 from scanfab import ReadError
 from scanfab.io import GrainTable, join_ids, join_positions
 from scanfab.packing.cell import Cell
+from tests.helpers.dumps import holds
 from tests.helpers.fuzzing import only_scanfabs_warnings
 
 PATH = Path("contacts.txt")
@@ -43,17 +44,16 @@ def test_an_unknown_id_may_be_a_wall():
     force = np.arange(12.0).reshape(4, 3)
     ids = np.array([[10, 30], [77, 10], [30, 78], [10, 79]])
     joined = join_ids(PATH, grains(), ids, force, walls=True)
-    np.testing.assert_array_equal(joined.contacts.pairs, [[1, 2]])
-    np.testing.assert_array_equal(joined.contacts.force, force[:1])
-    np.testing.assert_array_equal(joined.wall_contacts, [0, 2, 1, 0])
+    holds(joined.contacts, pairs=[[1, 2]], force=force[:1])
+    holds(joined, wall_contacts=[0, 2, 1, 0])
 
 
 def test_ends_of_a_line_are_grains_or_walls():
     rounded = POSITION[[2, 1]] + [0.009, 0, 0]
     wall = [[POSITION[2], [3.8, 1, 0]], [[0, -1, 0], POSITION[0]]]
     joined = by_places([rounded, POSITION[[0, 1]], *wall])
-    np.testing.assert_array_equal(joined.contacts.pairs, [[2, 1], [0, 1]])
-    np.testing.assert_array_equal(joined.wall_contacts, [1, 0, 1, 0])
+    holds(joined.contacts, pairs=[[2, 1], [0, 1]])
+    holds(joined, wall_contacts=[1, 0, 1, 0])
     assert len(by_places(np.zeros((0, 2, 3))).contacts.pairs) == 0
     with pytest.raises(ReadError, match=r"contact 1 ends at a grain at \[9\.0, 9\.0, 9\.0\]"):
         by_places([[[9, 9, 9], [8, 8, 8]]])

@@ -23,7 +23,7 @@ from scanfab.base.errors import ReadError, ScanfabNote, SettingsError, UnknownFo
 from scanfab.cli.main import run
 from scanfab.io.writer import installed_writers
 from scanfab.testing import differences, made_up_packings
-from tests.helpers.dumps import dump_text, pairs_text, refuses, write
+from tests.helpers.dumps import dump_text, holds, pairs_text, refuses, write
 
 ENDINGS = {name: one.plugin.extensions[0] for name, one in installed_writers().items()}
 # the formats that hold everything
@@ -256,8 +256,7 @@ def test_a_name_that_means_something_else_is_told(tmp_path):
     with pytest.warns(ScanfabNote, match="the column Radius is renamed to Radius_of_dump"):
         scanfab.convert(packing, tmp_path / "a.npz")
     again = scanfab.read(tmp_path / "a.npz")
-    assert again.radius == [1.0]
-    assert {f"{name}_of_dump": values for name, values in columns.items()} == dict(again.columns)
+    holds(again, radius=[1.0], **{f"{name}_of_dump": values for name, values in columns.items()})
 
 
 @pytest.mark.parametrize("name", ["time", "Step", "frame", "TimeStep", "Time [s]", "t", "cycle"])
@@ -283,12 +282,10 @@ def test_clumps_that_were_left_apart_stay_apart(tmp_path, name):
 
 def test_vtk_reads_what_is_written(tmp_path):
     mesh = pyvista.read(written(EVERYTHING, tmp_path, "vtp"))
-    np.testing.assert_array_equal(mesh.points, EVERYTHING.position)
-    np.testing.assert_array_equal(mesh["radius"], EVERYTHING.radius)
-    np.testing.assert_array_equal(mesh["velocity"], EVERYTHING.columns["velocity"])
-    assert list(mesh["element"]) == list(EVERYTHING.columns["element"])
-    np.testing.assert_array_equal(mesh.lines.reshape(-1, 3)[:, 1:], EVERYTHING.contacts.pairs)
-    np.testing.assert_array_equal(mesh.cell_data["force"], EVERYTHING.contacts.force)
+    holds(mesh, points=EVERYTHING.position)
+    for name in ("radius", "velocity", "element"):
+        holds(EVERYTHING, **{name: mesh[name]})
+    holds(EVERYTHING.contacts, pairs=mesh.lines.reshape(-1, 3)[:, 1:], force=mesh["force"])
     assert mesh.field_data["TimeValue"] == [EVERYTHING.time]
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import scanfab
 from scanfab import ScanfabWarning
-from tests.helpers.dumps import dump_text, refuses, write
+from tests.helpers.dumps import dump_text, holds, refuses, write
 from tests.helpers.made.data_files import CENTRES, DIAMETERS, TITLE, data_file
 
 LAMMPS = "LAMMPS data file via write_data, version 2 Aug 2023, timestep = 12"
@@ -31,13 +31,9 @@ def test_every_order_gives_the_same_grains(tmp_path, order, behind, style, title
     path = write(tmp_path / "grains.spl", text)
     assert scanfab.read_series(path).grains.reader.name == name
     packing = scanfab.read(path)
-    assert packing.id.tolist() == [1, 2, 3]
-    assert packing.step == (12 if title == LAMMPS else None)
-    np.testing.assert_array_equal(packing.position, CENTRES)
-    np.testing.assert_array_equal(packing.radius, [0.5, 0.5, 0.25])
-    assert packing.columns["density"].tolist() == [2500.0] * 3
-    assert packing.cell.origin.tolist() == [-1, 0, 0]
-    assert packing.cell.periodic == (False, False, False)
+    holds(packing, id=[1, 2, 3], position=CENTRES, radius=[0.5, 0.5, 0.25], density=[2500] * 3)
+    holds(packing, step=12 if title == LAMMPS else None)
+    holds(packing.cell, origin=[-1, 0, 0], periodic=(False, False, False))
     assert ("mol" in packing.columns) == ("7" in behind)
     assert ("iz" in packing.columns) == (len(behind) > 4)
 
@@ -56,24 +52,16 @@ BOXES = [
 def test_boxes_of_lammps(tmp_path, box, vectors):
     text = data_file(title=LAMMPS, style=" # sphere", behind=" 0 0 0").replace(BOX, box)
     cell = scanfab.read(write(tmp_path / "a.data", text)).cell
-    np.testing.assert_array_equal(cell.vectors, vectors)
-    np.testing.assert_array_equal(cell.origin, [-1, 0, 0])
+    holds(cell, vectors=vectors, origin=[-1, 0, 0])
 
 
 def test_columns_can_be_named_by_their_numbers(tmp_path):
     columns = {"id": 1, "diameter": 6, "x": 3, "y": 4, "z": 5}
     packing = scanfab.read(write(tmp_path / "a.data", data_file("hybrid")), columns=columns)
-    np.testing.assert_array_equal(packing.position, CENTRES)
-    np.testing.assert_array_equal(packing.radius, [0.5, 0.5, 0.25])
+    holds(packing, position=CENTRES, radius=[0.5, 0.5, 0.25])
     path = write(tmp_path / "a.data", data_file(title="LIGGGHTS Description"))
     columns = {"id": 1, "radius": 3, "x": 5, "y": 6, "z": 7}
     np.testing.assert_array_equal(scanfab.read(path, columns=columns).radius, DIAMETERS)
-
-
-def test_a_last_line_without_an_end_is_doubted(tmp_path):
-    path = write(tmp_path / "a.data", data_file(velocities=False)[:-1])
-    with pytest.warns(ScanfabWarning, match="the last line has no end"):
-        assert len(scanfab.read(path)) == 3
 
 
 RESTARTS = [

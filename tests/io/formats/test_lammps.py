@@ -11,7 +11,7 @@ import scanfab
 from scanfab import ScanfabWarning
 from scanfab.io.formats import binary_dump as binary
 from scanfab.io.reader import reader_for
-from tests.helpers.dumps import NAMES, ROWS, binary_dump, refuses
+from tests.helpers.dumps import NAMES, ROWS, binary_dump, holds, refuses
 from tests.helpers.made.lammps import netcdf
 from tests.helpers.truth import OF_SHEAR, SHEAR, id_pairs, lammps_fabric, off_by
 
@@ -101,14 +101,12 @@ def test_netcdf(tmp_path):
     series = scanfab.read_series(netcdf(tmp_path / "a.nc", written=2))
     assert [(frame.step, frame.snapshot.time) for frame in series] == [(0, 0.0), (100, 50.0)]
     first, second = (frame.read() for frame in series)
-    np.testing.assert_array_equal(first.position, first.cell.wrap(np.array(ROWS)[:, 2:5]))
-    np.testing.assert_array_equal(first.radius, 0.1)
+    holds(first, position=first.cell.wrap(np.array(ROWS)[:, 2:5]), radius=0.1)
     # one atom was lost: its place holds what was never written
-    assert second.id.tolist() == [1, 2]
+    holds(second, id=[1, 2])
     # edges a, b and their angle; an edge of length 0 does not repeat
-    assert first.cell.periodic == (True, True, False)
+    holds(first.cell, periodic=(True, True, False), origin=[0, -1, 0])
     np.testing.assert_allclose(first.cell.vectors[:2], [[1, 0, 0], [1, 3**0.5, 0]], atol=1e-15)
-    assert first.cell.origin.tolist() == [0, -1, 0]
     assert scanfab.read(netcdf(tmp_path / "b.nc", lengths=(0, 0, 0)), frame=0).cell is None
     path = netcdf(tmp_path / "c.nc", name="scaled_coordinates", lengths=(2, 2, 4))
     scaled = scanfab.read(path, frame=0)
@@ -145,11 +143,8 @@ def test_both_layouts_hold_the_grains(tmp_path, blocks, more, format, options):
         series, rows = scanfab.read_series(path, **one), np.array(ROWS)
         assert series.grains.reader.name == one.get("format", format)
         packing = series[0].read()
-        np.testing.assert_array_equal(packing.id, rows[:, 0])
-        np.testing.assert_array_equal(packing.columns["type"], rows[:, 1])
-        np.testing.assert_array_equal(packing.position, rows[:, 2:5])
-        np.testing.assert_array_equal(packing.radius, rows[:, 5])
-        assert (packing.step, packing.time) == (7, more.get("time"))
+        holds(packing, id=rows[:, 0], type=rows[:, 1], position=rows[:, 2:5], radius=rows[:, 5])
+        holds(packing, step=7, time=more.get("time"))
 
 
 def test_the_box_repeats_where_both_faces_do(tmp_path):

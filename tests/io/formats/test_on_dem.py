@@ -10,7 +10,7 @@ import pyvista
 import scanfab
 from scanfab.io.reader import reader_for
 from scanfab.testing import made_up_packings
-from tests.helpers.dumps import refuses
+from tests.helpers.dumps import holds, refuses
 from tests.helpers.made.on_dem import COMPRESSION, FORCE, IDS, POSITION, draft_1, draft_2
 
 
@@ -19,15 +19,11 @@ def test_both_drafts_hold_the_same_packing(tmp_path, make):
     """The signs are those of the draft."""
     path = make(tmp_path / "a.vtkhdf")
     packing, of_spheres = scanfab.read(path), scanfab.read(path, bodies="id").contacts
-    np.testing.assert_array_equal(packing.position, POSITION)
-    np.testing.assert_array_equal(packing.id, IDS)
-    np.testing.assert_array_equal(packing.columns["clump_id"], [-1, 4, 4])
-    assert packing.time == 0.25
+    holds(packing, position=POSITION, id=IDS, clump_id=[-1, 4, 4], time=0.25)
     # the pair of one clump is no contact, the virtual one neither, the wall's is counted
-    np.testing.assert_array_equal(packing.contacts.pairs, [[0, 1]])
-    np.testing.assert_array_equal(packing.wall_contacts, [1, 0, 0])
-    np.testing.assert_array_equal(of_spheres.force, FORCE)
-    np.testing.assert_array_equal(of_spheres.force_n, COMPRESSION[:2])
+    holds(packing, wall_contacts=[1, 0, 0])
+    holds(packing.contacts, pairs=[[0, 1]])
+    holds(of_spheres, force=FORCE, force_n=COMPRESSION[:2])
 
 
 def test_a_draft_whose_signs_are_not_known_is_refused(tmp_path):
@@ -56,8 +52,7 @@ def test_vtkhdf_of_other_programs_is_read_as_vtk_and_other_hdf5_is_nobodys(tmp_p
         del file["ONDEM"]
     assert reader_for(tmp_path / "a.vtkhdf").name == "vtk"
     packing = scanfab.read(tmp_path / "a.vtkhdf")
-    np.testing.assert_array_equal(packing.id, IDS)
-    assert packing.contacts is None
+    holds(packing, id=IDS, contacts=None)
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["x"] = np.ones(3)
     assert reader_for(tmp_path / "a.h5") is None

@@ -11,7 +11,7 @@ from scanfab import ReadError, ScanfabNote
 from scanfab.io import reader as readers
 from scanfab.io.formats import musen as musen_reader
 from scanfab.io.reader import reader_named
-from tests.helpers.dumps import refuses, write
+from tests.helpers.dumps import holds, refuses, write
 from tests.helpers.made import esys, gsd, musen
 from tests.helpers.made.kratos import MDPA
 from tests.helpers.made.mfix import version_2
@@ -22,16 +22,12 @@ from tests.helpers.sound_files import made
 def test_esys_particles_of_all_workers(tmp_path, behind):
     path = esys.run(tmp_path, behind=behind)
     packing = scanfab.read(path)
-    assert packing.id.tolist() == [4, 5, 1]
-    np.testing.assert_array_equal(packing.position, [[1, 1, 2], [1.5, 1, 2], [3.75, 1, 2]])
-    np.testing.assert_array_equal(packing.radius, 0.25)
-    assert packing.columns["tag"].tolist() == [77] * 3
-    assert (packing.step, packing.time) == (30, 15.0)
-    assert packing.cell.periodic == (True, False, False)
-    assert packing.cell.origin.tolist() == [0, -1, 0]
-    assert packing.cell.vectors.diagonal().tolist() == [4, 6, 6]
+    holds(packing, id=[4, 5, 1], position=[[1, 1, 2], [1.5, 1, 2], [3.75, 1, 2]], radius=0.25)
     # bonds are no contacts
-    assert packing.contacts is None
+    holds(packing, tag=[77] * 3, step=30, time=15, contacts=None)
+    holds(
+        packing.cell, periodic=(True, False, False), origin=[0, -1, 0], vectors=np.diag([4, 6, 6])
+    )
     # in 2D it is not periodic across, whatever the header says
     flat = path.read_text().replace("0 -1 0 4 5 6", "0 -1 2 4 5 2").replace("n 3D", "n 2D")
     path.write_text(flat.replace("Boundaries 1 0 0", "Boundaries 1 0 1"))
@@ -53,14 +49,12 @@ def test_gsd_frames_have_what_they_or_the_first_one_say(tmp_path):
     series = scanfab.read_series(path)
     assert [one.step for one in series] == [7, 20]
     packing, second = (one.read() for one in series)
-    np.testing.assert_array_equal(packing.radius, [0.5, 0.5, 0.25])
-    np.testing.assert_array_equal(second.radius, [0.5, 0.5])
+    holds(second, radius=[0.5, 0.5])
     # tilt factors are multiples of the second and third edge; the box lies about the origin
-    np.testing.assert_array_equal(packing.cell.vectors, [[4, 0, 0], [1.5, 3, 0], [0.5, -1, 2]])
-    np.testing.assert_array_equal(packing.cell.center, [0, 0, 0])
-    assert packing.cell.periodic == (True, True, True)
-    np.testing.assert_array_equal(packing.position, packing.cell.wrap(gsd.CENTRES))
-    assert packing.columns["body"].tolist() == [-1, 4, 4]
+    vectors = [[4, 0, 0], [1.5, 3, 0], [0.5, -1, 2]]
+    holds(packing.cell, vectors=vectors, center=[0, 0, 0], periodic=(True, True, True))
+    position = packing.cell.wrap(gsd.CENTRES)
+    holds(packing, position=position, radius=[0.5, 0.5, 0.25], body=[-1, 4, 4])
 
 
 def test_gsd_default_diameters_are_none_and_a_plane_is_not_periodic_across(tmp_path):
@@ -68,7 +62,7 @@ def test_gsd_default_diameters_are_none_and_a_plane_is_not_periodic_across(tmp_p
     path = gsd.gsd_file(tmp_path / "a.gsd", flat)
     refuses(path, "no radius: expected radius or diameter")
     packing = scanfab.read(path, radius=0.2)
-    np.testing.assert_array_equal(packing.radius, 0.2)
+    holds(packing, radius=[0.2] * 3)
     assert packing.cell.periodic == (True, True, False)
     np.testing.assert_array_equal(packing.cell.vectors[:2], [[4, 0, 0], [0, 3, 0]])
 
@@ -94,9 +88,7 @@ def test_mfix_diameters_of_the_header_or_the_rows(
     text = version_2(diameter, size, dimension, behind=behind)
     packing = scanfab.read(write(tmp_path / "a.dat", text))
     z = 1 if dimension == 3 else 0
-    np.testing.assert_array_equal(packing.radius, radius)
-    np.testing.assert_array_equal(packing.position, [[0.05, 0.25, z], [0.15, 0.25, z]])
-    np.testing.assert_array_equal(packing.columns["density"], 2650)
+    holds(packing, radius=radius, position=[[0.05, 0.25, z], [0.15, 0.25, z]], density=2650)
     assert ("w" in packing.columns) == (dimension == 3)
 
 
@@ -106,8 +98,7 @@ def test_mfix_rows_alone_have_radii_and_columns_may_lack_names(tmp_path):
         ("0.1 0.2 3 0.0525 2650 7 8 9", [0.1, 0.2, 3]),
     ):
         packing = scanfab.read(write(tmp_path / "particle_input.dat", f"{row}\n"))
-        assert packing.radius.tolist() == [0.0525]
-        assert packing.position.tolist() == [place]
+        holds(packing, radius=[0.0525], position=[place])
         # rows of numbers by another name may be anything
         refuses(write(tmp_path / "other.dat", f"{row}\n"), "", error=scanfab.ScanfabError)
     text = version_2().replace("Velocity:        T", "Velocity: F")
@@ -118,10 +109,9 @@ def test_mfix_rows_alone_have_radii_and_columns_may_lack_names(tmp_path):
 def test_kratos_nodes_with_a_radius_are_spheres(tmp_path):
     path = write(tmp_path / "a.mdpa", MDPA)
     packing = scanfab.read(path)
-    assert packing.id.tolist() == [3, 7]
     # the column between says whether the value is fixed
-    np.testing.assert_array_equal(packing.radius, [0.1, 0.2])
-    np.testing.assert_array_equal(packing.position, [[0.75, 0.25, 0.125], [0.5, 0.25, 0.125]])
+    holds(packing, id=[3, 7], radius=[0.1, 0.2])
+    holds(packing, position=[[0.75, 0.25, 0.125], [0.5, 0.25, 0.125]])
     write(path, MDPA.replace("7  1 0.2", "End NodalData\nBegin NodalData RADIUS\n7 0 0.3"))
     np.testing.assert_array_equal(scanfab.read(path).radius, [0.1, 0.3])
 
@@ -133,9 +123,7 @@ def test_kratos_groups_are_frames_in_the_order_of_their_numbers(tmp_path):
         file["10"].attrs["time"] = 9.0
     series = scanfab.read_series(path)
     assert [frame.snapshot.time for frame in series] == [0.5, 1.0, 9.0]
-    packing = series[1].read()
-    assert packing.id.tolist() == [1, 2]
-    np.testing.assert_array_equal(packing.radius, [2, 3])
+    holds(series[1].read(), id=[1, 2], radius=[2, 3])
     with h5py.File(path, "a") as file:
         del file["2/id"]
         file["2/id"] = np.zeros(3)
@@ -151,11 +139,9 @@ def test_musen_spheres_of_each_time(tmp_path, monkeypatch):
     with pytest.warns(ScanfabNote, match="bonds are not read"):
         first, second = (frame.read() for frame in series)
     # one sphere comes later
-    assert (first.id.tolist(), second.id.tolist()) == ([3, 1], [3, 1, 2])
-    np.testing.assert_array_equal(first.radius, 0.1)
+    holds(first, id=[3, 1], radius=0.1, contacts=None, cell=None)
+    holds(second, id=[3, 1, 2])
     np.testing.assert_allclose(second.position[:, 0], [0.21, 0.385, 0.61])
-    assert first.contacts is None
-    assert first.cell is None
     # a file is parsed once for all its frames, and again when it has changed
     assert len(read) == 1
     write(path, musen.export(*musen.ROWS, musen.sphere(9, 0.85)))

@@ -9,7 +9,7 @@ import pyvista
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
-from tests.helpers.dumps import refuses, vtk_array, vtk_xml, write
+from tests.helpers.dumps import holds, refuses, vtk_array, vtk_xml, write
 from tests.helpers.truth import FLOOR
 
 POSITION = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0.25], [5.6, 0.5, 0]])
@@ -37,8 +37,7 @@ def test_what_meshio_writes_is_read(tmp_path, name, axes):
     vertices = [("vertex", np.arange(4)[:, None])]
     meshio.Mesh(POSITION[:, :axes], vertices, **arrays).write(tmp_path / name)
     packing = scanfab.read(tmp_path / name)
-    np.testing.assert_array_equal(packing.position, POSITION * [1, 1, axes == 3])
-    np.testing.assert_array_equal(packing.columns["number"], range(4))
+    holds(packing, position=POSITION * [1, 1, axes == 3], number=range(4))
 
 
 def test_lines_with_ids_name_grains_by_id(tmp_path):
@@ -48,15 +47,6 @@ def test_lines_with_ids_name_grains_by_id(tmp_path):
     contacts = polydata(tmp_path / "lines.vtp", cells={"id1": second, "id2": first})
     packing = scanfab.read(spheres, contacts=contacts)
     np.testing.assert_array_equal(packing.contacts.pairs, LINES[:, ::-1])
-
-
-@pytest.mark.parametrize("name", ["a.vtk", "a.vtp", "a.stl", "a.vti", "grid.vtk"])
-def test_walls_boxes_and_images_hold_no_grains(tmp_path, name):
-    others = {"a.vti": pyvista.ImageData(dimensions=[3] * 3), "grid.vtk": pyvista.RectilinearGrid()}
-    mesh = others.get(name, pyvista.Plane().triangulate())
-    mesh["radius"] = np.ones(mesh.n_points)
-    mesh.save(tmp_path / name)
-    refuses(tmp_path / name, r"no grains|no reader knows")
 
 
 @pytest.mark.parametrize("name", ["all_30000.vtm", "liggghts_simulation.pvd"])
@@ -141,8 +131,7 @@ def test_pieces_make_one_frame_and_their_ghosts_count_once(tmp_path, kind, endin
     cloud(tmp_path / f"parts/1{ending}", [1, 2, 3], [1, 0, 0])
     names = [f"parts/{k}{ending}" for k in range(2)]
     packing = scanfab.read(listing(tmp_path / f"all.p{ending[1:]}", kind, *names))
-    np.testing.assert_array_equal(packing.id, range(4))
-    np.testing.assert_array_equal(packing.position, POSITION)
+    holds(packing, id=range(4), position=POSITION)
 
 
 def test_a_piece_that_is_missing_or_damaged_is_named(tmp_path):
@@ -224,8 +213,7 @@ def test_the_parts_of_one_time_are_one_frame(tmp_path, one):
     packings = [frame.read() for frame in series]
     assert [(one.step, one.time) for one in packings] == [(5, 2.5), (6, 3.0)]
     for packing, ids in zip(packings, [[0, 1, 2, 3], [3, 2, 1, 0]], strict=True):
-        np.testing.assert_array_equal(packing.id, ids)
-        np.testing.assert_array_equal(packing.position, POSITION[ids])
+        holds(packing, id=ids, position=POSITION[ids])
     assert {file.name for file in series.files()} >= {name.split("/")[-1] for name, _ in entries}
     alone = series[1].alone()
     assert all(file.is_absolute() for file in (alone.snapshot.path, *alone.snapshot.parts))

@@ -146,6 +146,7 @@ TEXTS = [
     (dump_text([(1, 0.5, 0.5, 0.5, 1e200)], "id x y z radius"), "grain 1: .* cannot be a length"),
     (dump_text(FAR, "id x y z radius", flags=" pp pp pp"), r"grain 1 lies 1e\+30 from the origin"),
     (dump_text(box=((-1e30, 1 - 1e30), (0, 1), (0, 1)), flags=" pp pp pp"), "no volume"),
+    ("2 samples of sand from France\nwere sheared by hand in a wooden box\n", "no reader knows"),
     (FAR_CELL, r"grain 1 lies 1e\+30 from the origin"),
     *((dump_text([(id, 1, 0.5, 0.5, 0.5, 0.1)]), "ids must be whole numbers")
       for id in ("1e300", "nan", "inf", "0.5")),

@@ -12,7 +12,7 @@ import pytest
 import scanfab
 from scanfab.base.errors import ScanfabNote, ScanfabWarning
 from scanfab.io.reader import reader_for
-from tests.helpers.dumps import refuses, small_save, write
+from tests.helpers.dumps import holds, refuses, small_save, write
 from tests.helpers.truth import SAMPLE_DATA, YADE, assert_true_contacts, centres, csv_rows
 
 PERIODIC, BOX = YADE / "periodic.xml.bz2", YADE / "formats.xml.bz2"
@@ -28,11 +28,8 @@ def truth(path, what):
 @pytest.mark.parametrize("path", [PERIODIC, BOX])
 def test_spheres_and_real_contacts_are_those_that_yade_holds(path):
     packing, bodies, contacts = read_once(path), truth(path, "bodies"), truth(path, "contacts")
-    np.testing.assert_array_equal(packing.id, bodies["id"])
-    np.testing.assert_array_equal(packing.radius, bodies["r"])
-    cell, expected = packing.cell, centres(bodies)
-    expected = expected if cell is None else cell.wrap(expected)
-    np.testing.assert_array_equal(packing.position, expected)
+    place = centres(bodies) if packing.cell is None else packing.cell.wrap(centres(bodies))
+    holds(packing, id=bodies["id"], radius=bodies["r"], position=place)
     assert_true_contacts(packing, contacts, normals=1e-12, forces=1e-12)
 
 
@@ -50,15 +47,11 @@ def test_cell_walls_step_time_and_mask():
 
 def test_the_small_save_in_a_tilted_cell(tmp_path):
     packing = scanfab.read(write(tmp_path / "a.xml", small_save()))
-    np.testing.assert_array_equal(packing.cell.vectors, [[1, 0, 0], [0.25, 2, 0], [0, 0, 3]])
-    assert (packing.step, packing.time) == (30, 1.5e-3)
-    np.testing.assert_array_equal(packing.columns["mask"], [1, 2, 3])
-    assert packing.contacts.pairs.tolist() == [[0, 1], [2, 0]]
-    assert packing.contacts.image.tolist() == [[0, 0, 0], [1, 0, 0]]
-    np.testing.assert_allclose(packing.contacts.normal, [[1, 0, 0]] * 2, atol=1e-15)
-    np.testing.assert_array_equal(packing.contacts.force, [[2, 3, 0]] * 2)
-    np.testing.assert_array_equal(packing.wall_contacts, [0, 1, 0])
-
+    holds(packing.cell, vectors=[[1, 0, 0], [0.25, 2, 0], [0, 0, 3]])
+    holds(packing, step=30, time=1.5e-3, mask=[1, 2, 3], wall_contacts=[0, 1, 0])
+    contacts = packing.contacts
+    holds(contacts, pairs=[[0, 1], [2, 0]], image=[[0] * 3, [1, 0, 0]], force=[[2, 3, 0]] * 2)
+    np.testing.assert_allclose(contacts.normal, [[1, 0, 0]] * 2, atol=1e-15)
     # a contact that may become real is none
     contacts = ((0, 1, (0, 0, 0), 5), (2, 0, (1, 0, 0), -1))
     packing = scanfab.read(write(tmp_path / "a.xml", small_save(contacts)))
