@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import gzip
-import shutil
 import warnings
 from itertools import product
 
 import pytest
 
 import scanfab
-from scanfab.base.errors import ReadError, ScanfabNote
+from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.cli.main import run
 from tests.helpers.dumps import PAIRS, dump_text, local_text, pairs_text, refuses, write
 from tests.helpers.truth import SAMPLE_DATA, TRIAXIAL
@@ -97,6 +96,8 @@ def test_globs_in_quotes_are_expanded(folder, capsys):
     assert len(capsys.readouterr().out.splitlines()) == 2
     assert run(["inspect", f"{folder}/grains_*.txt"]) == 2
     assert "grains_*.txt: matches nothing: there is no file" in capsys.readouterr().err
+    assert run(["inspect", str(folder), "--cell", "nowhere.csv"]) == 2
+    assert "CSV file with the cell of each frame" in capsys.readouterr().err
 
 
 SPHERES, INTRS = (
@@ -134,16 +135,6 @@ def test_what_editors_leave_is_no_frame(folder):
         assert contacts_of(folder) == [2, 2]
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
-def test_the_command_line_takes_a_file_of_cells(tmp_path, capsys):
-    strained = SAMPLE_DATA / "yade_strained"
-    words = ["inspect", str(strained / "rec_spheres.27500.vtu"), "--json"]
-    assert run([*words, "--cell", str(strained / "truth.csv")]) == 0
-    assert "0.0035473249830325487" in capsys.readouterr().out
-    assert run([*words, "--cell", str(tmp_path / "nowhere.csv")]) == 2
-    assert "CSV file with the cell of each frame" in capsys.readouterr().err
-
-
 STEPLESS = "x,y,z,radius\n0,0,0,1\n1.9,0,0,1\n"
 CONTACTS = "id1,id2\n0,1\n"
 
@@ -166,19 +157,22 @@ def test_contacts_of_another_sample_are_skipped_with_a_note(tmp_path, grains, co
         assert contacts_of(path) == [1]
 
 
-def test_a_data_file_is_no_frame_beside_dumps(folder):
-    shutil.copy(SAMPLE_DATA / "lammps_shear" / "forms" / "shear.data.gz", folder)
-    with pytest.warns(ScanfabNote, match=r"skipped shear.data.gz: it holds grains that a simul"):
-        assert contacts_of(folder) == [2, 2]
-    assert len(scanfab.read(folder / "shear.data.gz")) == 700
+DATA = (SAMPLE_DATA / "lammps_shear" / "forms" / "shear.data.gz").read_bytes()
+LOCAL = local_text([(0.5, 1.5, -0.25), (2.5, 1, 0.5)], step=9).encode()
+BESIDE = [
+    ("shear.data.gz", DATA, "it holds grains that a simulation starts"),
+    ("other_9.txt", LOCAL, "no two columns"),
+    ("photo.vtu", b'<VTKFile type="UnstructuredGrid">', "cannot be read"),
+    ("log.gz", b"\x1f\x8b\x08broken", "cannot be"),
+    ("restart.1000", b"LammpS RestartT\0\1\0\0\0\2\0\0\0" + bytes(99), "a binary restart"),
+]
 
 
-def test_a_dump_local_without_ids_is_skipped_with_a_note(folder):
-    write(folder / "other_9.txt", local_text([(0.5, 1.5, -0.25), (2.5, 1, 0.5)], step=9))
-    with pytest.warns(ScanfabNote, match=r"skipped .*other_9.txt: no two columns"):
+@pytest.mark.parametrize(("name", "data", "told"), BESIDE)
+def test_other_files_beside_the_frames_are_skipped_and_told(folder, name, data, told):
+    (folder / name).write_bytes(data)
+    with pytest.warns((ScanfabNote, ScanfabWarning), match=f"skipped .*{name}: .*{told}"):
         assert contacts_of(folder) == [2, 2]
-    with pytest.raises(ReadError, match="surely ids of these grains"):
-        contacts_of(folder / "dump_9.txt", contacts=folder / "other_9.txt")
 
 
 ONE_GRAIN = "x,y,z,radius\n0,0,0,1\n"

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
-import pyvista
 
 import scanfab
 from scanfab.base.errors import SettingsError, UnknownFormatError
@@ -15,30 +13,6 @@ from scanfab.cli.main import run
 from scanfab.io.reader import installed_readers, reader_for
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.truth import FLOOR, SAMPLE_DATA
-
-POSITION = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0], [1.9, 1.9, 0]])
-PAIRS = np.array([[0, 1], [1, 2], [1, 3]])
-
-
-def grains_with_lines(path: Path, vertices: bool = False) -> Path:
-    """One VTK file with grains as points and contacts as lines between them."""
-    lines = np.column_stack([np.full(3, 2), PAIRS]).ravel()
-    verts = np.column_stack([np.full(4, 1), np.arange(4)]).ravel() if vertices else None
-    mesh = pyvista.PolyData(POSITION, verts=verts, lines=lines)
-    mesh["radius"] = np.ones(4)
-    if path.suffix == ".vtu":
-        mesh = mesh.cast_to_unstructured_grid()
-    mesh.save(str(path))
-    return path
-
-
-@pytest.mark.parametrize("vertices", [False, True])
-@pytest.mark.parametrize("ending", [".vtk", ".vtp", ".vtu"])
-def test_one_vtk_file_may_hold_grains_and_contacts(tmp_path, ending, vertices):
-    file = grains_with_lines(tmp_path / f"both{ending}", vertices)
-    contacts = scanfab.read(file).contacts
-    assert (contacts.source, contacts.pairs.tolist()) == ("file", PAIRS.tolist())
-    assert scanfab.read(file, contacts="geometric").contacts is None
 
 
 @pytest.mark.parametrize("again", ["dumps", "./dumps/", "latest", "dum*"])

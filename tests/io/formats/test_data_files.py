@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import ScanfabWarning
-from tests.helpers.dumps import dump_text, holds, refuses, write
+from tests.helpers.dumps import holds, refuses, write
 from tests.helpers.made.data_files import CENTRES, DIAMETERS, TITLE, data_file
 
 LAMMPS = "LAMMPS data file via write_data, version 2 Aug 2023, timestep = 12"
@@ -75,6 +74,3 @@ def test_a_binary_restart_is_named_with_what_to_write(tmp_path, data):
     path = tmp_path / "restart.1000"
     path.write_bytes(data)
     refuses(path, r"a binary restart.*dump custom")
-    write(tmp_path / "dump.1000", dump_text())
-    with pytest.warns(ScanfabWarning, match="binary restart"):
-        assert len(scanfab.read_series(tmp_path)) == 1

@@ -15,13 +15,13 @@ from tests.helpers.truth import FLOOR
 POSITION = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0.25], [5.6, 0.5, 0]])
 RADIUS = np.array([1.0, 1.0, 1.1, 0.9])
 LINES = np.array([[0, 1], [1, 2], [2, 3]])
+FLAT = np.insert(LINES, 0, 2, axis=1).ravel()
 # forces on the second grain that push it off the first
 PUSH = (POSITION[1:] - POSITION[:-1]) * np.arange(1.0, 4)[:, None]
 
 
 def polydata(path, binary=False, cells=None, **arrays):
-    flat = np.column_stack([np.full(len(LINES), 2), LINES]).ravel()
-    cloud = pyvista.PolyData(POSITION) if cells is None else pyvista.PolyData(POSITION, lines=flat)
+    cloud = pyvista.PolyData(POSITION, lines=None if cells is None else FLAT)
     for name, values in arrays.items():
         cloud.point_data[name] = values
     for name, values in (cells or {}).items():
@@ -38,6 +38,16 @@ def test_what_meshio_writes_is_read(tmp_path, name, axes):
     meshio.Mesh(POSITION[:, :axes], vertices, **arrays).write(tmp_path / name)
     packing = scanfab.read(tmp_path / name)
     holds(packing, position=POSITION * [1, 1, axes == 3], number=range(4))
+
+
+@pytest.mark.parametrize("vertices", [None, np.insert(np.arange(4)[:, None], 0, 1, axis=1).ravel()])
+@pytest.mark.parametrize("ending", [".vtk", ".vtp", ".vtu"])
+def test_one_file_may_hold_grains_and_contacts(tmp_path, ending, vertices):
+    mesh, path = pyvista.PolyData(POSITION, lines=FLAT, verts=vertices), tmp_path / f"both{ending}"
+    mesh["radius"] = RADIUS
+    (mesh.cast_to_unstructured_grid() if ending == ".vtu" else mesh).save(path)
+    holds(scanfab.read(path).contacts, source="file", pairs=LINES)
+    assert scanfab.read(path, contacts="geometric").contacts is None
 
 
 def test_lines_with_ids_name_grains_by_id(tmp_path):
