@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cache, partial
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from tempfile import mkdtemp
@@ -298,18 +298,15 @@ def made(format: str, folder: Path) -> list[Path]:
     return written + (MAKERS[format](folder) if format in MAKERS else [])
 
 
-SMALL = {
-    name: partial(made, name)
-    for name in ("esys", "gsd", "kratos", "lf-dem", "mercurydpm", "mfix", "musen")
-}
-"""Makers of the files of each format that has few of them; the first file has grains."""
+# formats that have few files, of which the first has grains
+SMALL = ("esys", "gsd", "kratos", "lf-dem", "mercurydpm", "mfix", "musen")
 
 
 @cache
 def companion_grains(format: str) -> tuple[GrainTable, Family]:
     """Sound grains to read contacts with: the table, and the file."""
     if format in SMALL:
-        path = SMALL[format](Path(mkdtemp(prefix="companion-")))[0]
+        path = made(format, Path(mkdtemp(prefix="companion-")))[0]
     else:
         path = {
             "lammps": FLOOR / "shuffled.txt",

@@ -17,7 +17,7 @@ from scanfab.base.errors import ReadError, ScanfabWarning
 from scanfab.io.files import plain
 from scanfab.io.mesh import read_mesh
 from scanfab.io.surface import SUFFIXES, read_surface
-from tests.helpers.dumps import vtk_array, vtk_xml, write, yade_spheres
+from tests.helpers.dumps import holds, vtk_array, vtk_xml, write, yade_spheres
 from tests.helpers.fuzzing import only_scanfabs_warnings
 from tests.helpers.truth import FLOOR, YADE
 from tests.helpers.windows import OF_A_BOX, corners_of_a_box
@@ -51,42 +51,41 @@ def lines():
 
 def same(path, mesh):
     found = read_mesh(path)
-    np.testing.assert_array_equal(found.points, mesh.points)
+    holds(found, points=mesh.points, lines=np.arange(499)[:, None] + [0, 1], has_faces=False)
     for name in ("radius", "id", "velocity"):
-        np.testing.assert_array_equal(found.point_arrays[name], mesh[name])
-        assert found.point_arrays[name].dtype == mesh[name].dtype
-    np.testing.assert_array_equal(found.lines, np.arange(499)[:, None] + [0, 1])
+        np.testing.assert_array_equal(found.point_arrays[name], mesh[name], strict=True)
     np.testing.assert_array_equal(found.line_arrays["kn"], np.arange(500.0, 999))
-    assert not found.has_faces
+
+
+def put(writer, data, path, **settings):
+    """What a writer of VTK writes with these settings."""
+    writer.SetInputData(data)
+    writer.SetFileName(str(path))
+    for name, value in settings.items():
+        getattr(writer, f"Set{name}")(value)
+    writer.Write()
+    return path
 
 
 @pytest.mark.parametrize("compressor", ["ZLib", "LZ4", "LZMA", "None"])
 @pytest.mark.parametrize(("mode", "is_raw"), [("Binary", 0), ("Appended", 0), ("Appended", 1)])
 def test_all_that_vtk_writes_is_read(tmp_path, lines, compressor, mode, is_raw):
-    grid = lines.cast_to_unstructured_grid()
-    for data, header, order in itertools.product((lines, grid), (32, 64), (0, 1)):
-        writer = vtkXMLPolyDataWriter() if data is lines else vtkXMLUnstructuredGridWriter()
-        writer.SetInputData(data)
-        getattr(writer, f"SetCompressorTypeTo{compressor}")()
-        getattr(writer, f"SetDataModeTo{mode}")()
-        writer.SetEncodeAppendedData(not is_raw)
-        writer.SetHeaderType(header)
-        writer.SetByteOrder(order)
-        path = tmp_path / ("a.vtp" if data is lines else "a.vtu")
-        writer.SetFileName(str(path))
-        writer.Write()
-        same(path, lines)
+    form = {"DataMode": getattr(vtkXMLPolyDataWriter, mode), "EncodeAppendedData": not is_raw}
+    for header, order in itertools.product((32, 64), (0, 1)):
+        for data, name, writer in (
+            (lines, "a.vtp", vtkXMLPolyDataWriter()),
+            (lines.cast_to_unstructured_grid(), "a.vtu", vtkXMLUnstructuredGridWriter()),
+        ):
+            getattr(writer, f"SetCompressorTypeTo{compressor}")()
+            how = {**form, "HeaderType": header, "ByteOrder": order}
+            same(put(writer, data, tmp_path / name, **how), lines)
 
 
 @pytest.mark.parametrize("binary", [False, True])
 @pytest.mark.parametrize("version", [42, 51])
 def test_all_legacy_files_are_read(tmp_path, lines, binary, version):
-    path, writer = tmp_path / "a.vtk", vtkPolyDataWriter()
-    writer.SetInputData(lines)
-    writer.SetFileVersion(version)
-    writer.SetFileType(2 if binary else 1)
-    writer.SetFileName(str(path))
-    writer.Write()
+    form = {"FileVersion": version, "FileType": 2 if binary else 1}
+    path = put(vtkPolyDataWriter(), lines, tmp_path / "a.vtk", **form)
     if binary:
         return same(path, lines)
     mesh = read_mesh(path)
@@ -104,23 +103,16 @@ def test_lines_of_several_points_and_beside_other_cells_join_their_ends(tmp_path
     assert mesh.has_faces
 
 
-SOURCES = {
-    "legacy text": YADE / "periodic-spheres-00000000.vtk.gz",
-    "legacy text of lines": YADE / "id-intrs-00000000.vtk.gz",
-    "legacy text of a grid": YADE / "periodic-periCell-00000001.vtk",
-    "legacy bytes": FLOOR / "grains_binary_30000.vtk",
-    "XML text": FLOOR / "grains_30000.vtp",
-    "XML base64": FLOOR / "grains_binary_30000.vtp",
-    "XML text of a grid": FLOOR / "grains_30000.vtu",
-    "XML of packed bytes": YADE / "zlib_spheres.30000.vtu",
-}
+TEXTS = ("periodic-spheres-00000000.vtk.gz", "id-intrs-00000000.vtk.gz")
+SOURCES = [YADE / name for name in (*TEXTS, "periodic-periCell-00000001.vtk")]
+SOURCES += [FLOOR / f"grains_{end}" for end in ("binary_30000.vtk", "30000.vtp", "30000.vtu")]
+SOURCES += [FLOOR / "grains_binary_30000.vtp", YADE / "zlib_spheres.30000.vtu"]
 
 
-@pytest.mark.parametrize("form", SOURCES)
-def test_a_file_that_was_cut_off_is_an_error_that_prints_nothing(tmp_path, form, capfd):
+@pytest.mark.parametrize("source", SOURCES, ids=str)
+def test_a_file_that_was_cut_off_is_an_error_that_prints_nothing(tmp_path, source, capfd):
     """Wherever it was cut: VTK fills the rest with zeros, or with what memory holds."""
-    data = plain(SOURCES[form]).read_bytes()
-    path = tmp_path / SOURCES[form].name.removesuffix(".gz")
+    data, path = plain(source).read_bytes(), tmp_path / source.name.removesuffix(".gz")
     whole = len(data.rstrip())
     for size in np.random.default_rng(2).integers(200, whole - 60, 12):
         path.write_bytes(data[:size])
