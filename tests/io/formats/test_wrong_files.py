@@ -1,13 +1,14 @@
-"""What is wrong with a file is told: a damage of a sound one, or a text that cannot be right."""
+"""What is wrong with a file is told; odd files, some found by fuzzing, are read or refused."""
 
 from __future__ import annotations
 
 import time
 
+import numpy as np
 import pytest
 
 import scanfab
-from tests.helpers.dumps import ROWS, dump_text, refuses, write
+from tests.helpers.dumps import ROWS, dump_text, refuses, write, yade_spheres
 from tests.helpers.fuzzing import only_scanfabs_warnings
 from tests.helpers.sound_files import made
 
@@ -166,12 +167,57 @@ TABLES = [
 ]
 
 
+def refuses_quietly(path, told, **options):
+    """An error of the package, and no warning of a library."""
+    with only_scanfabs_warnings():
+        refuses(path, told, error=scanfab.ScanfabError, **options)
+
+
 @pytest.mark.parametrize("number", range(len(TEXTS + TABLES)))
 def test_a_text_that_cannot_be_right_is_refused_at_once(tmp_path, number):
-    """Many of these were found by fuzzing: no library warns of them."""
-    text, message = (TEXTS + TABLES)[number]
+    text, told = (TEXTS + TABLES)[number]
     path, began = write(tmp_path / "a.txt", text), time.monotonic()
-    with only_scanfabs_warnings():
-        format = None if number < len(TEXTS) else "table"
-        refuses(path, rf"a\.txt.*{message}", error=scanfab.ScanfabError, format=format)
+    refuses_quietly(path, rf"a\.txt.*{told}", format=None if number < len(TEXTS) else "table")
     assert time.monotonic() - began < 5
+
+
+ODD = [
+    # bounds without an end are no box: their difference made NumPy warn
+    ("a.data", "1 0.5 inf 0 inf 2 \n0.1 1 9 9 0.1 0 0 0\n", 1),
+    ("a.txt.gz", "#format x_y_z_r\n0 0 0 1\n", 1),
+    ("a.txt", "#format x_y_z_r\n  # none\n", 0),
+    ("a.txt", dump_text(box=((-1e300, 1e300), (0, 1), (0, 1))), 3),
+]
+
+
+@pytest.mark.parametrize(("name", "text", "count"), ODD)
+def test_an_odd_text_is_read(tmp_path, name, text, count):
+    with only_scanfabs_warnings():
+        packing = scanfab.read(write(tmp_path / name, text))
+    assert (len(packing), packing.cell) == (count, None)
+
+
+def test_a_box_of_any_extent_fits_into_the_file(tmp_path):
+    yade_spheres(tmp_path / "g1.vtk", [[0, 0, 0]], [1])
+    extent = 'Extent="0 1000000000 0 1 0 1"'
+    text = f"<RectilinearGrid Whole{extent}><Piece {extent}/></RectilinearGrid></VTKFile>"
+    write(tmp_path / "gboundingBox_1.vtr", f'<VTKFile type="RectilinearGrid">{text}')
+    refuses_quietly(tmp_path / "g1.vtk", "its Coordinates")
+
+
+def test_columns_of_contacts_without_a_name_or_with_too_short_a_row_that_the_user_names(tmp_path):
+    grains = write(tmp_path / "d1.csv", "id,x,y,z,radius\n1,0,0,0,1\n2,2,0,0,1\n")
+    named = "id1=id1,id2=id2,fx2=fx,fy2=fy,fz2=5"
+    for rows in ("", "1,2,0.5,0,\n"):
+        pairs = write(tmp_path / "p1.csv", f"id1,id2,fx,fy,\n{rows}")
+        refuses_quietly(grains, "contacts", contacts=pairs, contact_columns=named)
+    path = write(tmp_path / "p1.txt", "id\tx\t\tz\tr\n1\n")
+    refuses_quietly(path, "p1.txt", format="table", contact_columns="id1=id,id2=r")
+
+
+@pytest.mark.filterwarnings("ignore:.*packing.nfo")
+def test_doubles_that_begin_as_an_archive_does(tmp_path):
+    rows = np.column_stack([np.arange(12.0), np.zeros((12, 2)), np.ones(12)]).astype("<f8")
+    rows[0, 0] = np.frombuffer(b"PK" + bytes(6), "<f8")[0]
+    (tmp_path / "a.xyzd").write_bytes(rows.tobytes())
+    assert len(scanfab.read(tmp_path / "a.xyzd")) == 12
