@@ -1,10 +1,13 @@
-"""Series of frames: sources, grains and contacts of a step, frames by number and slice."""
+"""Series of frames: sources, contacts of a step, frames by number and slice, very many of them."""
 
 from __future__ import annotations
 
 import json
+import os
 import pickle
 import shutil
+import time
+import weakref
 
 import numpy as np
 import pytest
@@ -18,8 +21,11 @@ from scanfab.base.errors import (
     UnknownFormatError,
 )
 from scanfab.cli.main import run
+from scanfab.io import frame as frame_module
 from scanfab.io.formats.lammps import LiggghtsReader
 from scanfab.io.reader import installed_readers, reader_for
+from scanfab.pipeline.compute import compute_rows
+from scanfab.pipeline.settings import Settings
 from tests.helpers.dumps import PAIRS, cubic_rows, dump_text, pairs_text, refuses, write
 from tests.helpers.truth import FLOOR, id_pairs
 
@@ -286,3 +292,47 @@ def test_the_name_of_a_file_does_not_matter(tmp_path):
     for name in ("log.txt", "deck.vtk", "notes.dump", "x.vtu", "no_ending_at_all"):
         assert reader_for(write(tmp_path / name, "hello\n")) is None
         assert reader_for(write(tmp_path / name, dump_text())).name == "liggghts"
+
+
+SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "a"}
+FRAMES = 8
+
+
+@pytest.fixture
+def long_series(tmp_path):
+    for frame in range(FRAMES):
+        text = dump_text(cubic_rows(squeeze=1 - 0.01 * frame), step=frame)
+        write(tmp_path / f"dump_{frame}.txt", text)
+    return scanfab.read_series(tmp_path)
+
+
+def test_ten_thousand_files_open_within_seconds(tmp_path):
+    first = write(tmp_path / "dump_0.txt", dump_text())
+    for step in range(1, 10_000):
+        os.link(first, tmp_path / f"dump_{step}.txt")
+    start = time.perf_counter()
+    assert len(next(iter(scanfab.read_series(tmp_path))).read()) == 3
+    assert time.perf_counter() - start < 4
+
+
+def test_memory_holds_one_frame_a_worker_and_all_give_the_same_rows(long_series, monkeypatch):
+    found = []
+
+    class Watched(scanfab.Packing):
+        def __init__(self, *words, **named):
+            super().__init__(*words, **named)
+            found.append(weakref.ref(self))
+
+    monkeypatch.setattr(frame_module, "Packing", Watched)
+    tables = []
+    for workers in (1, 2, 3):
+        found.clear()
+        rows, most = [], 0
+        for row in compute_rows(long_series, Settings(workers=workers, **SCAN)):
+            rows.append(row)
+            most = max(most, sum(reference() is not None for reference in found))
+        # one more for each row that is taken while the next frame is read
+        assert (len(found), most <= workers + 2) == (FRAMES, True)
+        tables.append(rows)
+    tables.append(list(compute_rows(long_series, Settings(workers=16, **SCAN))))
+    assert all(table == tables[0] for table in tables)
