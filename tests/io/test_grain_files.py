@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import warnings
 from itertools import product
 
@@ -12,7 +11,7 @@ import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.cli.main import run
 from tests.helpers.dumps import PAIRS, dump_text, local_text, pairs_text, refuses, write
-from tests.helpers.truth import SAMPLE_DATA, TRIAXIAL
+from tests.helpers.truth import SAMPLE_DATA
 
 NO_RADIUS = "id type x y z c_rad"
 
@@ -100,31 +99,21 @@ def test_globs_in_quotes_are_expanded(folder, capsys):
     assert "CSV file with the cell of each frame" in capsys.readouterr().err
 
 
-SPHERES, INTRS = (
-    gzip.decompress((TRIAXIAL / f"triaxial-{name}-00000000.vtk.gz").read_bytes()).decode()
-    for name in ("spheres", "intrs")
+LISTS = (
+    (pairs_text([(1, 77)], step=9), "no two columns"),
+    (pairs_text(step=9)[:60], "incomplete"),
+    ("# vtk DataFile Version 3.0.\ncomment\nASCII\n\nDATASET POLYDATA\nPOINTS 4 double\n0 0 ", ""),
 )
 
 
-@pytest.mark.filterwarnings("ignore:skipped a-intrs", "ignore::scanfab.ScanfabNote")
-@pytest.mark.parametrize("beside", [True, False])
-@pytest.mark.parametrize(
-    ("grains", "contacts", "told"),
-    [
-        (dump_text(step=9), pairs_text([(1, 77)], step=9), "no two columns"),
-        (dump_text(step=9), pairs_text(step=9)[:60], "incomplete"),
-        (SPHERES, INTRS[:300], ""),
-    ],
-    ids=["another's", "cut", "cut VTK"],
-)
-def test_contacts_that_cannot_be_read_say_how_to_leave_them_alone(
-    tmp_path, grains, contacts, told, beside
-):
-    path = write(tmp_path / "a-spheres-9.vtk", grains)
-    write(tmp_path / "a-intrs-9.vtk", contacts)
-    source = path if beside else tmp_path
-    refuses(source, rf'a-intrs-9.vtk.*{told}.*`contacts="geometric"` ignores it')
-    assert scanfab.read(source, contacts="geometric").contacts is None
+@pytest.mark.filterwarnings("ignore:skipped contacts_9", "ignore::scanfab.ScanfabNote")
+@pytest.mark.parametrize("source", ["dump_9.txt", "."])
+@pytest.mark.parametrize(("contacts", "told"), LISTS)
+def test_contacts_that_cannot_be_read_say_how_to_leave_them_alone(folder, source, contacts, told):
+    (folder / "dump_10.txt").unlink()
+    write(folder / "contacts_9.txt", contacts)
+    refuses(folder / source, rf'contacts_9.txt.*{told}.*`contacts="geometric"` ignores it')
+    assert scanfab.read(folder / source, contacts="geometric").contacts is None
 
 
 def test_what_editors_leave_is_no_frame(folder):

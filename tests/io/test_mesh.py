@@ -127,10 +127,8 @@ def test_a_last_number_without_a_line_end_is_doubted(tmp_path):
         read_mesh(path)
 
 
-GRID, CELLS_51 = (
-    "UNSTRUCTURED_GRID",
-    "CELLS 3 2\nOFFSETS vtktypeint64\n{}\nCONNECTIVITY vtktypeint64\n",
-)
+GRID = "UNSTRUCTURED_GRID"
+CELLS_51 = "CELLS 3 2\nOFFSETS vtktypeint64\n{}\nCONNECTIVITY vtktypeint64\n"
 ONES = "CELL_TYPES 2\n1\n1\n"
 
 

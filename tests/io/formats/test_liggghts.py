@@ -65,9 +65,8 @@ def test_every_form_gives_the_same_grains(folder, name, options):
 @pytest.mark.parametrize("grains", ["tutorial.txt", "unwrapped.txt", "grains_30000.vtk"])
 def test_every_contact_form_gives_the_same_contacts(grains, name):
     for keywords in {KEYWORDS[name], None}:
-        packing = scanfab.read(
-            FLOOR / grains, contacts=FLOOR / name, periodic="xy", contact_columns=keywords
-        )
+        options = {"contacts": FLOOR / name, "contact_columns": keywords}
+        packing = scanfab.read(FLOOR / grains, periodic="xy", **options)
         assert_true_contacts(packing, csv_rows(FLOOR / "truth_contacts.csv"), normals=1e-4)
         assert_true_contacts(packing, FORCES, forces=1e-5)
     push = np.sum(packing.contacts.force * packing.contacts.normal, axis=1)

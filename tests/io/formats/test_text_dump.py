@@ -63,11 +63,10 @@ def test_a_dump_that_names_no_columns(tmp_path):
 @pytest.mark.parametrize("place", ["before", "after"])
 def test_every_snapshot_is_found_in_the_order_of_its_step(tmp_path, monkeypatch, piece, place):
     monkeypatch.setattr(shared, "PIECE", piece)
-    order = (8, 10, 9)
-    texts = [
-        dump_text(ROWS[: step % 4], step=step, **{place: TIMES.format(step / 4)}) for step in order
-    ]
-    frames = list(scanfab.read_series(write(tmp_path / "dump", "".join(texts))))
+    text = ""
+    for step in (8, 10, 9):
+        text += dump_text(ROWS[: step % 4], step=step, **{place: TIMES.format(step / 4)})
+    frames = list(scanfab.read_series(write(tmp_path / "dump", text)))
     assert [frame.step for frame in frames] == [8, 9, 10]
     assert [frame.snapshot.time for frame in frames] == [2.0, 2.25, 2.5]
     assert [len(frame.read()) for frame in frames] == [0, 1, 2]
