@@ -8,7 +8,7 @@ import pytest
 import pyvista
 
 import scanfab
-from scanfab.base.errors import ScanfabNote, ScanfabWarning
+from scanfab.base.errors import ScanfabNote
 from tests.helpers.dumps import holds, refuses, vtk_array, vtk_xml, write
 from tests.helpers.truth import FLOOR
 
@@ -102,13 +102,10 @@ def test_forces_act_on_the_grain_that_they_push_off_the_other(tmp_path, sign, gr
     np.testing.assert_array_equal(packing.contacts.force, PUSH)
 
 
-def test_forces_whose_grain_is_in_doubt_and_arrays_of_other_names_are_left_out(tmp_path):
+def test_arrays_of_other_names_are_left_out_and_told(tmp_path):
     spheres = polydata(tmp_path / "spheres.vtp", radius=RADIUS)
-    force = PUSH * [[1], [-1], [1]]
-    contacts = polydata(tmp_path / "lines.vtp", cells={"force": force})
-    with pytest.warns(ScanfabWarning, match=r"lines\.vtp: the forces are left out: 67% of them"):
-        assert scanfab.read(spheres, contacts=contacts).contacts.force is None
-    polydata(contacts, cells={"normal_force": np.ones(3), "ContactForce": PUSH, "kn": np.ones(3)})
+    arrays = {"normal_force": np.ones(3), "ContactForce": PUSH, "kn": np.ones(3)}
+    contacts = polydata(tmp_path / "lines.vtp", cells=arrays)
     with pytest.warns(ScanfabNote, match=r"arrays that are not read: \w+, \w+: only a vector"):
         assert scanfab.read(spheres, contacts=contacts).contacts.force is None
 
