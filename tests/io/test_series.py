@@ -27,7 +27,7 @@ from scanfab.io.reader import installed_readers, reader_for
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
 from tests.helpers.dumps import PAIRS, cubic_rows, dump_text, pairs_text, refuses, write
-from tests.helpers.truth import FLOOR, id_pairs
+from tests.helpers.truth import FLOOR, SAMPLE_DATA, id_pairs
 
 STEPS = (9, 10, 100)
 
@@ -336,3 +336,14 @@ def test_memory_holds_one_frame_a_worker_and_all_give_the_same_rows(long_series,
         tables.append(rows)
     tables.append(list(compute_rows(long_series, Settings(workers=16, **SCAN))))
     assert all(table == tables[0] for table in tables)
+
+
+def test_contacts_that_convert_wrote_beside_the_dumps_belong_to_its_own_files(tmp_path):
+    for step in (30000, 60000):
+        for kind in ("dump", "contacts"):
+            name = f"{kind}_{step}.txt.gz"
+            (tmp_path / name).write_bytes((SAMPLE_DATA / "liggghts_periodic" / name).read_bytes())
+    before = scanfab.read(tmp_path).contacts.pairs
+    scanfab.convert(tmp_path, tmp_path / "x_{step}.csv")
+    for source in (tmp_path, tmp_path / "x_30000.csv"):
+        np.testing.assert_array_equal(scanfab.read(source).contacts.pairs, before)
