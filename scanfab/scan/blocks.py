@@ -139,7 +139,7 @@ class Blocks:
         apart = np.moveaxis(apart, (-5, -3, -1), (-3, -2, -1))
         return apart.reshape(*shape, len(self), 8)
 
-    @property
+    @cached_property
     def matrix(self) -> FloatArray:
         """M of the coordinates f = M x + t, shape (3, 3), per length unit."""
         return np.asarray(np.linalg.inv(self.edges).T, np.float64)
