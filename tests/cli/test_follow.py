@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -37,7 +38,7 @@ def copied(folder: Path, files: list[Path], pause: float = 0.02) -> list:
     return [partial(in_halves, path.read_bytes(), folder / path.name, pause) for path in files]
 
 
-def follow(*words: str, seconds: float = 2.5) -> int:
+def follow(*words: str, seconds: float) -> int:
     return run(["compute", "dumps", *FAST, "--follow-for", str(seconds), "-o", "t.csv", *words])
 
 
@@ -46,10 +47,11 @@ def finished_run(*words: str) -> bytes:
     return Path("finished.csv").read_bytes()
 
 
-def is_followed(steps: list, *words: str) -> bool:
-    """Whether a run beside these steps ends with the bytes of a run behind them."""
+def is_followed(steps: list, frames: int, *words: str) -> bool:
+    """Whether a run beside these steps ends with its last frame, and the bytes of a run behind."""
+    words = ("--frames", f":{frames}", *words)
     thread = meanwhile(steps)
-    assert follow(*words) == 0
+    assert follow(*words, seconds=30) == 0
     thread.join()
     assert not Path("t.csv.part").exists()
     return Path("t.csv").read_bytes() == finished_run(*words)
@@ -62,33 +64,27 @@ def test_an_empty_folder_waits_for_frames(folder, series, suffix):
         Path("converted").mkdir()
         assert run(["convert", str(series), "converted/f_{step}.npz"]) == 0
         files = sorted(Path("converted").iterdir())
-    assert is_followed([partial(time.sleep, 0.2), *copied(folder, files)])
+    assert is_followed([partial(time.sleep, 0.2), *copied(folder, files)], 4)
 
 
-def test_grains_wait_for_their_contacts(folder):
-    """As VTK, packed; contact files come long after the grains of their frame."""
-    steps = []
+@pytest.mark.parametrize("beside", ["dumps", "pairs"])
+def test_grains_wait_for_their_contacts(folder, beside):
+    """As VTK, packed; contact files, of another folder too, come long after their grains."""
+    pairs, steps = folder.with_name(beside), []
+    pairs.mkdir(exist_ok=True)
     for grains, contacts in sample_frames()[:2]:
-        steps += [*copied(folder, [grains]), partial(time.sleep, 1.0), *copied(folder, [contacts])]
-    assert is_followed(steps, "--boundary", "mask=3")
+        steps += [*copied(folder, [grains]), partial(time.sleep, 0.6), *copied(pairs, [contacts])]
+    words = () if pairs == folder else ("--contacts", beside)
+    assert is_followed(steps, 2, "--boundary", "mask=3", *words)
     data = Path("t.csv").read_bytes()
     assert b",file," in data
     assert b",geometric," not in data
 
 
-def test_contacts_of_another_folder_may_come_after_their_grains(folder):
-    beside, steps = folder.with_name("pairs"), []
-    beside.mkdir()
-    for grains, contacts in sample_frames()[:2]:
-        steps += [*copied(folder, [grains]), partial(time.sleep, 0.8), *copied(beside, [contacts])]
-    assert is_followed(steps, "--boundary", "mask=3", "--contacts", str(beside))
-    assert b",geometric," not in Path("t.csv").read_bytes()
-
-
 def test_a_folder_with_contact_files_only_waits(folder):
     (folder / "pairs_0.txt").write_text(pairs_text(step=0))
     write_it = partial(in_halves, dump_text(cubic_rows()).encode(), folder / "dump_0.txt", 0.1)
-    assert is_followed([partial(time.sleep, 0.3), write_it])
+    assert is_followed([partial(time.sleep, 0.3), write_it], 1)
 
 
 def test_one_file_that_grows(folder, series):
@@ -102,34 +98,37 @@ def test_one_file_that_grows(folder, series):
 
     texts = [path.read_bytes() for path in sorted(series.iterdir())]
     halves = [half for text in texts for half in (text[: len(text) // 2], text[len(text) // 2 :])]
-    assert is_followed([partial(append, half) for half in halves])
+    assert is_followed([partial(append, half) for half in halves], 5)
 
 
-def wait_for_rows(frames: int) -> None:
-    part, end = Path("t.csv.part"), time.monotonic() + 60
-    while not part.exists() or part.read_text().count("\n") <= frames:
+def until(is_so: Callable[[], bool]) -> None:
+    end = time.monotonic() + 60
+    while not is_so():
         assert time.monotonic() < end
-        time.sleep(0.05)
+        time.sleep(0.02)
 
 
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
-def test_the_first_signal_ends_it_in_order(folder, series, capfd, sent):
+def has_rows(frames: int) -> bool:
+    part = Path("t.csv.part")
+    return part.exists() and part.read_text().count("\n") > frames
+
+
+def test_the_first_signal_ends_it_in_order(folder, series, capfd):
+    """And it is gone on with, and ended, in the same way."""
     files = sorted(series.iterdir())
-    for path in files[:2]:
-        shutil.copy(path, folder)
-    cut = partial((folder / files[2].name).write_bytes, files[2].read_bytes()[:300])
-    thread = meanwhile([partial(wait_for_rows, 2), cut, partial(os.kill, os.getpid(), sent)])
-    assert run(["compute", "dumps", *FAST, "--follow", "-o", "t.csv"]) == 0
-    thread.join()
-    assert "finishing frames under way" in capfd.readouterr().err
-    assert not Path("t.csv.part").exists()
-    (folder / files[2].name).unlink()
-    assert Path("t.csv").read_bytes() == finished_run()
-    # and it is gone on with, in the same way
-    for path in files[2:]:
-        shutil.copy(path, folder)
-    assert follow("--resume") == 0
-    assert Path("t.csv").read_bytes() == finished_run()
+    for sent, count in ((signal.SIGINT, 2), (signal.SIGTERM, 4)):
+        for path in files[:count]:
+            shutil.copy(path, folder)
+        half = folder / files[count].name
+        cut = partial(half.write_bytes, files[count].read_bytes()[:300])
+        there = partial(until, partial(has_rows, 2))
+        thread = meanwhile([there, cut, partial(os.kill, os.getpid(), sent)])
+        assert run(["compute", "dumps", *FAST, "--follow", "-o", "t.csv", "--resume"]) == 0
+        thread.join()
+        assert "finishing frames under way" in capfd.readouterr().err
+        assert not Path("t.csv.part").exists()
+        half.unlink()
+        assert Path("t.csv").read_bytes() == finished_run()
 
 
 def test_a_second_signal_interrupts(folder):
@@ -143,18 +142,14 @@ def test_a_second_signal_interrupts(folder):
     assert not Path("t.csv").exists()
 
 
-def test_what_is_passed_over_is_told_once(folder, series, capsys):
-    shutil.copytree(series, folder, dirs_exist_ok=True)
-    (folder / "log.txt").write_text("nothing of use\n")
-    assert follow(seconds=0.3) == 0
-    assert capsys.readouterr().err.count("skipped log.txt") == 1
-
-
-def test_without_any_frame_the_table_has_no_rows(folder, capsys):
+def test_without_any_frame_the_table_has_no_rows_and_each_note_is_told_once(folder, series, capsys):
     (folder / "log.txt").write_text("nothing yet\n")
     assert follow(seconds=0.1) == 0
     assert Path("t.csv").read_text().count("\n") == 1
     assert "scanfab: note: dumps: no reader knows" in capsys.readouterr().err
+    shutil.copytree(series, folder, dirs_exist_ok=True)
+    assert follow(seconds=0.3) == 0
+    assert capsys.readouterr().err.count("skipped log.txt") == 1
 
 
 def test_a_broken_file_stops_it_or_is_skipped_and_a_last_one_left_out(folder, series, capsys):
@@ -181,7 +176,8 @@ def test_a_folder_that_vanishes_is_named_and_nothing_is_lost(folder, series, cap
     files = sorted(series.iterdir())
     for path in files[:2]:
         shutil.copy(path, folder)
-    thread = meanwhile([partial(wait_for_rows, 2), partial(shutil.rmtree, folder)])
+    there = partial(until, partial(has_rows, 2))
+    thread = meanwhile([there, partial(shutil.rmtree, folder)])
     assert follow("--on-error", "skip", seconds=30) == 1
     thread.join()
     (error,) = [one for one in capsys.readouterr().err.splitlines() if "error" in one]
@@ -215,10 +211,8 @@ def test_the_plot_is_drawn_again(folder, series, monkeypatch):
     drawn = []
     monkeypatch.setattr(page, "save_figures", lambda path, figures: drawn.append(path))
     files = sorted(series.iterdir())
-    steps = [*copied(folder, files[:2]), partial(wait_for_rows, 2), partial(time.sleep, 0.5)]
-    thread = meanwhile([*steps, *copied(folder, files[2:])])
-    assert follow("--plot", "p.png", seconds=1.5) == 0
-    thread.join()
+    steps = [*copied(folder, files[:2]), partial(until, lambda: drawn), *copied(folder, files[2:])]
+    assert is_followed(steps, 5, "--plot", "p.png")
     assert len(drawn) >= 3
 
 
@@ -226,12 +220,6 @@ def test_the_plot_is_drawn_again(folder, series, monkeypatch):
 def test_frames_cannot_be_counted_from_the_end(folder, frames):
     with pytest.raises(SettingsError, match="counts from the end of the series"):
         scanfab.compute(scanfab.follow_series(folder, seconds=0), frames=frames)
-
-
-def test_it_ends_with_the_last_frame_that_is_asked_for(folder, series):
-    shutil.copytree(series, folder, dirs_exist_ok=True)
-    assert run(["compute", "dumps", *FAST, "--follow", "--frames", ":2", "-o", "t.csv"]) == 0
-    assert Path("t.csv").read_bytes() == finished_run("--frames", ":2")
 
 
 def test_the_library_follows(folder, series):
