@@ -88,6 +88,7 @@ def test_the_line_of_the_paper_can_be_left_out(compare, table, tmp_path):
         compare(given, "--figure", "correlation", "--plot", plot, *words)
         assert ("2017 paper: 0.096" in plot.read_text(encoding="utf-8")) == is_drawn
     assert "goes with --plot FILE" in compare(given, "--no-paper-line", code=2).err
+    assert compare(given, "--summary", "--strain-max", "0.03").rows[0]["frames"] == "4"
 
 
 @pytest.mark.parametrize("is_empty", [False, True])

@@ -21,6 +21,7 @@ from scanfab.table.formats import Json
 from tests.helpers.dumps import pairs_text, write
 from tests.helpers.interruptions import PROGRAM, interrupted_at_row
 from tests.helpers.truth import SAMPLE_DATA
+from tests.helpers.windows import corners_of_a_box, surface
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")
 
@@ -111,18 +112,26 @@ def test_a_run_that_is_killed(dumps, compute, is_whole):
     assert is_whole("t.csv", *words)
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".json", ".parquet"])
-def test_an_interrupted_run_is_gone_on_with(stop, last_frame, resumes, suffix):
+@pytest.mark.parametrize(
+    ("suffix", "row", "words"),
+    [
+        (".csv", 6, ("--rv-shape", "box", "--rv-follows", "strain", "--strain", "grains")),
+        # equal cut-offs too: every frame has as many rows as were asked for
+        (".json", 15, ("--cutoffs", "0.2rmin,0.05,0.2rmin", "--seed", "3")),
+        (".parquet", 8, ("--rv", "0.5,0.7")),
+    ],
+)
+def test_an_interrupted_run_is_gone_on_with(stop, last_frame, resumes, suffix, row, words):
     """And frames that come later are added to the complete table."""
-    table = f"table{suffix}"
-    stop(table, told="interrupted after 2 of 4 frames; the same command with --resume goes on\n")
+    table, told = f"table{suffix}", "after 2 of 4 frames; the same command with --resume goes on\n"
+    stop(table, *words, row=row, told=f"interrupted {told}")
     assert not Path(table).exists()
     with open(f"{table}.part", "ab") as part:
         part.write(b'{"inputs": [], "rows"')  # killed while it wrote a frame
-    assert resumes(table, 2, "--workers", "1")
+    assert resumes(table, 2, *words, "--workers", "1")
     last_frame()
     for computed in (1, 0):
-        assert resumes(table, computed, "--workers", "1")
+        assert resumes(table, computed, *words, "--workers", "1")
 
 
 def test_without_a_part_everything_is_computed(compute, resumes):
@@ -217,7 +226,7 @@ def test_frames_that_nobody_has_chosen_stay_out(compute, last_frame, is_whole):
     last_frame()
     assert compute("table.csv", "--resume", "--frames=:1") == (0, 0)
     assert is_whole("table.csv", "--frames=:4")
-    assert run(["report", "table.csv", "-o", "report.html"]) == 0
+    assert read_manifest(Path("table.csv"))["settings"]["frames"] == "0:4"
     assert compute("few.csv", "--frames=:2")[0] == 0
     told = "holds frames 0 to 1, which with those chosen now make no slice"
     assert compute("few.csv", "--resume", "--frames=4:", told=told) == (2, 0)
@@ -351,6 +360,13 @@ def test_a_dump_of_many_snapshots_may_grow(begun, compute, series, is_whole):
     Path("dump.txt").write_text("".join(texts))
     assert compute("t.csv", "--resume", **dump)[0] == 0
     assert is_whole("t.csv", **dump)
+
+
+def test_a_surface_that_has_changed_is_refused(begun, is_refused):
+    words = ("--rv-shape", surface("box.ply", 2 + corners_of_a_box(1.2)))
+    left = begun(*words)
+    surface("box.ply", 2 + corners_of_a_box(1.1))
+    assert is_refused(left, "box.ply has changed since", *words)
 
 
 @pytest.mark.parametrize(

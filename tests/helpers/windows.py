@@ -1,5 +1,6 @@
 """Windows of every shape, and one that no constructor makes: a ball with a piece cut off."""
 
+import meshio
 import numpy as np
 
 from scanfab.base.convex import Body, Convex, Quadric
@@ -31,6 +32,12 @@ def corners_of_a_box(half, turn=None):
     """In the order of OF_A_BOX."""
     signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
     return signs * half @ (np.eye(3) if turn is None else turn)
+
+
+def surface(path, corners):
+    """A file of the surface of a box."""
+    meshio.Mesh(corners, [("triangle", OF_A_BOX)]).write(path)
+    return str(path)
 
 
 def box_by_corners(half, turn=None):

@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_contacts
+from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, direction_rule, find_contacts
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.pipeline.measurement import measure
 from scanfab.pipeline.plan import make_plan
+from scanfab.scan.lines import line_triads, turned_triads
 from tests.helpers import naive
 from tests.helpers.lattices import shaken_cubic
 
@@ -102,3 +103,24 @@ def test_other_cut_offs_of_the_same_lines_are_those_of_a_scan_with_all_of_them(p
     for one, other in ((again.gaps, whole.gaps), (again.blocked, whole.blocked)):
         for part in ("number", "length", "square"):
             assert np.array_equal(getattr(one, part), getattr(other, part))
+
+
+def test_second_moment_is_that_of_the_slow_twin():
+    """ℓ² = Σ l² / Σ l over all lines of a direction, and the tensor of those."""
+    packing = find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 5)))
+    rule, spacing, cutoff = direction_rule("lebedev:5"), 0.6, 0.3
+    options = {"rv_radius": 1.5, "rv_center": (2.5, 2.5, 2.5), "variants": "c"}
+    row = compute(packing, directions=rule, spacing=spacing, cutoff=cutoff, moment=2, **options)[0]
+    assert row.replicates == 1
+    frames, offsets = turned_triads(rule, line_triads(rule.axes), 0, 0)
+    over, under = np.zeros(len(rule)), np.zeros(len(rule))
+    for axis in range(len(rule)):
+        _, window = naive.void_segments(
+            packing.position - 2.5, packing.radius, frames[axis], offsets[axis], spacing, 1.5
+        )
+        lengths = np.array([one.length for one in window if one.length >= cutoff])
+        over[axis], under[axis] = np.sum(lengths**2), np.sum(lengths)
+    tensor = naive.void_tensor(frames[:, 2], rule.weights, over / under)
+    assert row.gvs_xy == pytest.approx(tensor[0, 1], abs=1e-12)
+    assert row.alpha_vs_axial == pytest.approx(naive.axial(tensor, (0, 0, 1)), abs=1e-12)
+    assert row.mean_length == pytest.approx((rule.weights @ over) / (rule.weights @ under))

@@ -1,6 +1,5 @@
 """The RV of every shape: default sizes, places, what is refused, and how it follows the sample."""
 
-import meshio
 import numpy as np
 import pytest
 
@@ -13,7 +12,7 @@ from scanfab.pipeline.rv import rvs_of
 from scanfab.scan.scan import scan_lines
 from scanfab.scan.solids import Solids
 from tests.helpers.lattices import rotation, shaken_cubic
-from tests.helpers.windows import OF_A_BOX, corners_of_a_box
+from tests.helpers.windows import corners_of_a_box, surface
 
 LINES = {"directions": "lebedev:5", "spacing": 0.3, "cutoff": 0.2}
 
@@ -59,11 +58,6 @@ def test_sizes_are_fractions_of_the_half_extents(flat):
     given = window_of(flat, rv_shape="box", rv_size="1,2,3", rv_center="4 4 2")
     assert given.shape.high.tolist() == [0.5, 1.0, 1.5]
     assert given.center.tolist() == [4.0, 4.0, 2.0]
-
-
-def surface(path, corners):
-    meshio.Mesh(corners, [("triangle", OF_A_BOX)]).write(path)
-    return path
 
 
 def test_a_surface_lies_where_its_file_says_or_about_the_centre_that_is_asked_for(flat, tmp_path):
