@@ -69,19 +69,6 @@ def test_tables_on_a_terminal_are_not_cut(calibrate, monkeypatch, width):
     assert head.split() == ["ladder", "value"]
 
 
-@pytest.mark.parametrize(
-    ("rows", "message"),
-    [
-        (cubic_rows()[:1], "variant c has no void fabric at any cut-off"),
-        ([], "no frame has grains, so there is nothing to calibrate"),
-    ],
-)
-def test_a_dump_of_one_grain_or_none_is_one_message(calibrate, tmp_path, rows, message):
-    answer = calibrate(write(tmp_path / "dump", dump_text(rows, box=((0, 4),) * 3)), code=1)
-    assert answer.out == ""
-    assert message in answer.err
-
-
 @pytest.fixture
 def cube(tmp_path, monkeypatch):
     """64 grains that overlap their neighbours, and ladders of two steps."""

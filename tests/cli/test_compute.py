@@ -44,11 +44,6 @@ def test_the_command_gives_what_the_library_gives_with_any_number_of_workers(com
     assert [row["variant"] for row in chosen] == ["a", "c"]
 
 
-def test_a_missing_boundary_is_a_warning(compute) -> None:
-    answer = compute(*FILES, "--frames", "0", *FAST[:4])
-    assert 'name them: --boundary "mask=3"' in answer.err
-
-
 def on_terminal(words: list[str], out: IO[str] | None = None, **more: str) -> tuple[int, str]:
     """Exit code and what a terminal shows of a process, whose results may go to a file."""
     pty = pytest.importorskip("pty", reason="terminals are POSIX")

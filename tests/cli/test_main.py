@@ -32,13 +32,8 @@ def test_help_lists_every_command_and_like_version_imports_no_heavy_package() ->
         assert f"\n  {command} " in answer.stdout
 
 
-def test_unreadable_source_is_exit_code_1_and_debug_shows_why(ask, tmp_path: Path) -> None:
-    (tmp_path / "notes.txt").write_text("nothing\n")
-    answer = ask("compute", tmp_path, code=1)
-    assert answer.err.startswith("scanfab: error: ")
-    assert "no reader knows this format" in answer.err
-    assert answer.out == ""
-    with pytest.raises(ReadError, match="no reader knows this format"):
+def test_debug_shows_why(tmp_path: Path) -> None:
+    with pytest.raises(ReadError, match="the folder holds no files"):
         main.run(["compute", str(tmp_path), "--debug"])
 
 

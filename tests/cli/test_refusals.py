@@ -1,13 +1,23 @@
 """What cannot be: one message and the exit code, nothing printed, and no file touched."""
 
-import os
+import json
 import shlex
 
 import pytest
 
 from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.tables import curve
 from tests.helpers.truth import SAMPLE_DATA
 
+FILES = {
+    "out.csv": "precious",
+    "notes": "-",
+    "head.csv": "source,frame\n",
+    "letters.csv": "a,b\n1,2\n",
+    "row.csv": json.dumps(curve()[0]),
+    "one/scanfab.toml": "[compute]\n",
+    "none/scanfab.toml": "[compute]\n",
+}
 DISCS = SAMPLE_DATA / "lammps_biaxial" / "discs.0.lammpstrj.gz"
 
 
@@ -15,6 +25,8 @@ DISCS = SAMPLE_DATA / "lammps_biaxial" / "discs.0.lammpstrj.gz"
     ("line", "code", "message"),
     [
         # words
+        ("compute cube --quiet --verbose", 2, "--quiet and --verbose contradict each other"),
+        ("compute one none", 2, "the sources have several settings files"),
         ("computee", 2, "No such command 'computee'. Did you mean 'compute'?"),
         ("nonsense", 2, "No such command 'nonsense'. Choose from compute, merge, compare, inspect"),
         ("compute nowhere", 2, "nowhere: there is no such file, folder or glob"),
@@ -45,9 +57,18 @@ DISCS = SAMPLE_DATA / "lammps_biaxial" / "discs.0.lammpstrj.gz"
         ("compute cube other --plot x.png --figure rose", 2, "draws one series"),
         ("compare out.csv --summary --differences", 2, "print different tables"),
         ("compare nowhere.csv", 2, "nowhere.csv"),
+        ("compare head.csv -o out.csv", 1, "the tables hold no frames"),
+        ("compare head.csv --summary --no-paper-line", 2, "goes with --plot FILE"),
+        ("compare letters.csv -o out.csv", 1, "there is no column source, frame"),
+        ("compare row.csv --differences", 1, "hold no two variants of one frame"),
+        ("compare row.csv --variants ab", 1, "expected variants of the tables, c, found 'ab'"),
+        ("compare row.csv --variants x", 2, "--variants: expected letters out of abcd, found 'x'"),
         ("view cube --screenshot x.jpg", 2, "screenshots are PNG files"),
         # what does not fit the sample
+        ("compute notes", 1, "no reader knows this format"),
         ("compute cube --spacing 50 -o out.csv", 1, "spacing: expected a length from"),
+        ("calibrate one", 1, "variant c has no void fabric at any cut-off"),
+        ("calibrate none", 1, "no frame has grains, so there is nothing to calibrate"),
         ("view cube --screenshot x.png --frame 9", 1, "there is no frame 9"),
         # what is of space, of discs
         ("compute {DISCS} --axis 0,1,1", 2, "--axis: the axis (0, 0.7071, 0.7071) leads out of"),
@@ -55,15 +76,21 @@ DISCS = SAMPLE_DATA / "lammps_biaxial" / "discs.0.lammpstrj.gz"
     ],
 )
 def test_one_message_and_nothing_else(tmp_path, monkeypatch, ask, line, code, message):
-    """Beside two series of 64 grains in a cube, and a result of earlier days."""
+    """Nor is any file touched, such as a result of earlier days."""
     monkeypatch.chdir(tmp_path)
-    for name in ("cube", "other"):
-        (tmp_path / name).mkdir()
-        write(tmp_path / name / "dump_0.txt", dump_text(cubic_rows(), box=((0, 4),) * 3))
-    output = write(tmp_path / "out.csv", "precious")
-    files = sorted(os.walk(tmp_path))
+    dumps = {
+        f"{name}/dump_0.txt": dump_text(cubic_rows()[:count], box=((0, 4),) * 3)
+        for name, count in (("cube", 64), ("other", 64), ("one", 1), ("none", 0))
+    }
+    for name, text in {**FILES, **dumps}.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        write(tmp_path / name, text)
     answer = ask(*shlex.split(line.format(DISCS=DISCS)), code=code)
     assert message in answer.told
+    assert ("scanfab: error: " in answer.err) == (code == 1)
     assert answer.out == ""
-    assert sorted(os.walk(tmp_path)) == files
-    assert output.read_text() == "precious"
+    left = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert {str(path.relative_to(tmp_path)): path.read_text() for path in left} == {
+        **FILES,
+        **dumps,
+    }

@@ -1,6 +1,5 @@
 """--plot, --figure, --vtk, view: what is written, and what is told when it cannot be."""
 
-import json
 import os
 import re
 import subprocess
@@ -20,15 +19,8 @@ from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.figures import save_rows
 from tests.helpers.interruptions import PROGRAM
-from tests.helpers.tables import curve
 
 FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac"]
-
-
-@pytest.fixture
-def table(tmp_path):
-    rows = [*curve(), *curve(variant="d")]
-    return write(tmp_path / "t.jsonl", "".join(json.dumps(row) + "\n" for row in rows))
 
 
 def test_a_resumed_run_draws_all_frames_and_keeps_their_files(series, tmp_path, ask):

@@ -113,12 +113,3 @@ def test_the_manifest_lists_what_came_from_the_file(series, tmp_path_factory, as
     command = repeat_command(found["settings"], named=found["settings_file"]["not_used"])
     assert "--rv 0.7" in command
     assert "--spacing 0.5rmin" in command
-
-
-def test_different_files_of_several_sources_are_refused(tmp_path, ask):
-    for name in ("one", "two"):
-        (tmp_path / name).mkdir()
-        write(tmp_path / name / "dump_0.txt", dump_text(cubic_rows()))
-        write(tmp_path / name / "scanfab.toml", "[compute]\n")
-    told = ask("compute", tmp_path / "one", tmp_path / "two", code=2).told
-    assert "the sources have several settings files" in told

@@ -59,12 +59,6 @@ def test_verbose_says_what_is_used_and_how_long_each_frame_takes(said, series):
     assert result == said("compute", *FAST)[0]
 
 
-@pytest.mark.parametrize("command", ["compute", "inspect"])
-def test_quiet_and_verbose_exclude_one_another(said, command):
-    _, lines = said(command, "--quiet", "--verbose", code=2)
-    assert "--quiet and --verbose contradict each other" in lines[-1]
-
-
 @pytest.mark.parametrize(
     ("words", "every", "says"), [((), 0.002, 1), (("--quiet",), 0.002, 0), ((), 60.0, 0)]
 )
