@@ -2,7 +2,6 @@
 
 import shlex
 from dataclasses import replace
-from functools import partial
 
 import pytest
 
@@ -23,11 +22,6 @@ STEP = StepRow(
 FOUND = Calibration((STEP, replace(STEP, ladder="cutoff")), ("nothing found",), {})
 
 
-@pytest.fixture
-def calibrate(ask):
-    return partial(ask, "calibrate")
-
-
 def command_of(text: str) -> list[str]:
     """The recommended command, which is the last line."""
     program, *words = shlex.split(text.splitlines()[-1])
@@ -35,9 +29,9 @@ def command_of(text: str) -> list[str]:
     return words
 
 
-def test_rows_on_one_stream_and_words_on_the_other(calibrate, ask, tmp_path):
+def test_rows_on_one_stream_and_words_on_the_other(ask, tmp_path):
     figure = tmp_path / "ladders.png"
-    rows, told = (answer := calibrate(TRIAXIAL, *QUICK, "--plot", figure)).rows, answer.err
+    rows, told = (answer := ask("calibrate", TRIAXIAL, *QUICK, "--plot", figure)).rows, answer.err
     assert list(rows[0]) == [column.name for column in columns_of_fields(StepRow)]
     assert {row["frame"] for row in rows} == {"6"}
     assert figure.stat().st_size > 10_000
@@ -49,11 +43,11 @@ def test_rows_on_one_stream_and_words_on_the_other(calibrate, ask, tmp_path):
 
 
 @pytest.mark.parametrize("width", [70, 100, 160])
-def test_tables_on_a_terminal_are_not_cut(calibrate, monkeypatch, width):
+def test_tables_on_a_terminal_are_not_cut(ask, monkeypatch, width):
     monkeypatch.setenv("COLUMNS", str(width))
     monkeypatch.setattr("scanfab.cli.calibrate.is_readable", lambda: True)
     monkeypatch.setattr("scanfab.pipeline.calibration.calibrate", lambda *_, **__: FOUND)
-    out = calibrate(TRIAXIAL, *QUICK).out
+    out = ask("calibrate", TRIAXIAL, *QUICK).out
     table = out.split("nothing found")[0].splitlines()
     assert "…" not in out
     assert max(map(len, table)) <= width
@@ -65,7 +59,7 @@ def test_tables_on_a_terminal_are_not_cut(calibrate, monkeypatch, width):
     present = [title in heads[0] for title in ("time", "rule", "segments", "bias")]
     assert present == sorted(present, reverse=True)
     assert all(present) == (width == 160)
-    head = calibrate(TRIAXIAL, *QUICK, "--fields", "ladder,value").out.splitlines()[0]
+    head = ask("calibrate", TRIAXIAL, *QUICK, "--fields", "ladder,value").out.splitlines()[0]
     assert head.split() == ["ladder", "value"]
 
 
@@ -77,13 +71,13 @@ def cube(tmp_path, monkeypatch):
     return write(tmp_path / "dump_0.txt", dump_text(cubic_rows(), box=((0, 4),) * 3))
 
 
-def test_with_a_file_the_words_are_the_output(calibrate, cube, tmp_path):
+def test_with_a_file_the_words_are_the_output(ask, cube, tmp_path):
     """The size of an RV that a file draws is left out; it follows the strain that is named."""
     table = tmp_path / "steps.csv"
     words = ("--variants", "c", "--tolerance", "2e-2", "--max-chords", "1e6", "--cutoff", "0.2rmin")
     words += ("--rv-shape", surface(tmp_path / "box.stl", 2 + corners_of_a_box(1.2)))
     words += ("--rv-follows", "strain", "--strain", "grains", "--edge", "start")
-    out = calibrate(cube, *words, "--verbose", "-o", table).out
+    out = ask("calibrate", cube, *words, "--verbose", "-o", table).out
     assert len(out.splitlines()) == 5
     command = " ".join(command_of(out))
     for one in ("--variants c ", "--spacing ", "--strain grains", "--edge start"):

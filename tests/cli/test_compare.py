@@ -3,7 +3,6 @@
 import io
 import json
 import sys
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -30,75 +29,73 @@ def table(tmp_path):
     return make
 
 
-@pytest.fixture
-def compare(ask):
-    return partial(ask, "compare")
-
-
 @pytest.mark.parametrize(
     ("words", "columns", "count"),
     [([], FRAMES, 10), (["--summary"], SUMMARY, 2), (["--differences"], DIFFERENCES, 5)],
 )
-def test_columns_are_the_same_in_every_format(tmp_path, compare, table, words, columns, count):
+def test_columns_are_the_same_in_every_format(tmp_path, ask, table, words, columns, count):
     given = table([*curve(), *curve(variant="d")])
-    printed = compare(given, *words)
+    printed = ask("compare", given, *words)
     assert list(printed.rows[0]) == columns.split()
     assert len(printed.rows) == count
     expected = read_rows(write(tmp_path / "printed.csv", printed.out))
     for suffix in SUFFIXES:
         output = tmp_path / f"out{suffix}"
-        assert compare(given, *words, "-o", output).out == ""
+        assert ask("compare", given, *words, "-o", output).out == ""
         assert read_rows(output) == expected
 
 
-def test_several_tables_stand_side_by_side_under_their_labels(compare, table):
+def test_several_tables_stand_side_by_side_under_their_labels(ask, table):
     tables = [table(curve(name), f"{name}.jsonl") for name in ("one", "two")]
-    assert [row["source"] for row in compare(*tables, "--summary").rows] == ["one", "two"]
+    assert [row["source"] for row in ask("compare", *tables, "--summary").rows] == ["one", "two"]
     given = [table(curve(factor=k), f"{k}.jsonl") for k in (1.0, 2.0)]
     coarse, fine = ("--label", "coarse"), ("--label", "fine")
-    rows = compare(*given, "--summary", *coarse, *fine).rows
+    rows = ask("compare", *given, "--summary", *coarse, *fine).rows
     assert [row["source"] for row in rows] == ["coarse", "fine"]
-    assert "with --label NAME" in compare(*given, code=1).err
-    assert "expected one per table: 2, found 1" in compare(*given, *fine, code=2).err
+    assert "with --label NAME" in ask("compare", *given, code=1).err
+    assert "expected one per table: 2, found 1" in ask("compare", *given, *fine, code=2).err
 
 
-def test_the_rows_of_one_cutoff_are_chosen(compare, table):
+def test_the_rows_of_one_cutoff_are_chosen(ask, table):
     given = table([{**row, "cutoff": c} for row in curve() for c in (0.0, 0.5, 1.0)])
-    assert "choose one cut-off with --cutoff" in compare(given, code=1).err
-    assert len(compare(given, "--cutoff", "0.5").rows) == 5
-    told = compare(given, "--cutoff", "0.7", code=1).err
+    assert "choose one cut-off with --cutoff" in ask("compare", given, code=1).err
+    assert len(ask("compare", given, "--cutoff", "0.5").rows) == 5
+    told = ask("compare", given, "--cutoff", "0.7", code=1).err
     assert "no row has the cut-off 0.7: expected a cut-off of the table: 0, 0.5, 1" in told
 
 
-def test_variants_are_chosen(compare, table):
+def test_variants_are_chosen(ask, table):
     given = table([row for variant in "acd" for row in curve(variant=variant)])
     alone = table([row for variant in "ad" for row in curve(variant=variant)], "alone.jsonl")
     for words in ([], ["--summary"], ["--differences"]):
-        assert compare(given, "--variants", "da", *words).out == compare(alone, *words).out
+        assert (
+            ask("compare", given, "--variants", "da", *words).out
+            == ask("compare", alone, *words).out
+        )
 
 
-def test_the_line_of_the_paper_can_be_left_out(compare, table, tmp_path):
+def test_the_line_of_the_paper_can_be_left_out(ask, table, tmp_path):
     given, plot = table(curve()), tmp_path / "plot.svg"
     for words, is_drawn in ([], True), (["--no-paper-line"], False):
-        compare(given, "--figure", "correlation", "--plot", plot, *words)
+        ask("compare", given, "--figure", "correlation", "--plot", plot, *words)
         assert ("2017 paper: 0.096" in plot.read_text(encoding="utf-8")) == is_drawn
-    assert compare(given, "--summary", "--strain-max", "0.03").rows[0]["frames"] == "4"
+    assert ask("compare", given, "--summary", "--strain-max", "0.03").rows[0]["frames"] == "4"
 
 
 @pytest.mark.parametrize("is_empty", [False, True])
-def test_a_dash_is_standard_input(compare, table, monkeypatch, is_empty):
+def test_a_dash_is_standard_input(ask, table, monkeypatch, is_empty):
     """An empty one is what a command that failed before it leaves."""
     data = b"" if is_empty else table(curve()).read_bytes()
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data)))
-    answer = compare("-", code=int(is_empty))
+    answer = ask("compare", "-", code=int(is_empty))
     told = "scanfab: error: -: expected a table, found an empty file\n"
     assert len(answer.rows) == (0 if is_empty else 5)
     assert (answer.err == told) == is_empty
 
 
-def test_a_table_of_compare_is_called_so_and_one_without_a_void_fabric_fails(compare, table):
+def test_a_table_of_compare_is_called_so_and_one_without_a_void_fabric_fails(ask, table):
     rows = [{**row, "alpha_vs_axial": None} for row in curve()]
     output = table(rows, "t.jsonl").with_name("compared.csv")
-    assert len(compare(output.with_name("t.jsonl"), code=1).rows) == 5
-    compare(table(curve()), "-o", output)
-    assert f"{output}: this is a table of scanfab compare" in compare(output, code=1).err
+    assert len(ask("compare", output.with_name("t.jsonl"), code=1).rows) == 5
+    ask("compare", table(curve()), "-o", output)
+    assert f"{output}: this is a table of scanfab compare" in ask("compare", output, code=1).err

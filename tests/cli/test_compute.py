@@ -5,7 +5,6 @@ import os
 import shutil
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
 from typing import IO
 
@@ -21,16 +20,11 @@ SMALL = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--
 FAST = ["--directions", "9", "--spacing", "1rmin", "--boundary", "mask=3"]
 
 
-@pytest.fixture
-def compute(ask):
-    return partial(ask, "compute")
-
-
-def test_the_command_gives_what_the_library_gives_with_any_number_of_workers(compute) -> None:
+def test_the_command_gives_what_the_library_gives_with_any_number_of_workers(ask) -> None:
     table = scanfab.compute(
         scanfab.read_series(FILES), directions=9, spacing="1rmin", boundary="mask=3"
     )
-    runs = [compute(*FILES, *FAST, "--workers", number) for number in (1, 2, 5)]
+    runs = [ask("compute", *FILES, *FAST, "--workers", number) for number in (1, 2, 5)]
     assert len({run.out for run in runs}) == 1
     assert "\x1b" not in runs[0].out + runs[0].err
     printed = runs[0].rows
@@ -39,8 +33,8 @@ def test_the_command_gives_what_the_library_gives_with_any_number_of_workers(com
     for name in ("alpha_vs", "mean_length", "gc_xz", "strain"):
         assert [float(row[name]) for row in printed] == table[name].tolist()
     # frames keep their numbers, and the series its first frame
-    assert compute(*FILES, *FAST, "--frames", "-1:").rows == printed[4:]
-    chosen = compute(*FILES, *FAST, "--variants", "ca", "--frames", "0").rows
+    assert ask("compute", *FILES, *FAST, "--frames", "-1:").rows == printed[4:]
+    chosen = ask("compute", *FILES, *FAST, "--variants", "ca", "--frames", "0").rows
     assert [row["variant"] for row in chosen] == ["a", "c"]
 
 

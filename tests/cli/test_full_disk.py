@@ -1,16 +1,22 @@
-"""Files that cannot be written to their end: a message that names the file, and nothing is lost."""
+"""A full disk, or little memory: one message, exit code 1, no traceback, and nothing is lost."""
 
 import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 import scanfab
+from scanfab.base import files
+from scanfab.cli import group, main
 from scanfab.cli.main import run
 from scanfab.io.writer import installed_writers
 from scanfab.testing import made_up_packings
+from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.interruptions import PROGRAM
 
 resource = pytest.importorskip("resource", reason="limits of a process are POSIX")
@@ -69,20 +75,20 @@ def test_the_rows_that_fitted_are_gone_on_with(compute, capsys, tmp_path, name):
 @pytest.mark.parametrize("name", installed_writers())
 def test_a_conversion_that_does_not_fit_changes_nothing(capsys, tmp_path, name):
     packing = made_up_packings()["everything"]
-    source, files = tmp_path / "source.npz", tmp_path / name
+    source, folder = tmp_path / "source.npz", tmp_path / name
     scanfab.convert(packing, source)
-    files.mkdir()
-    out = files / f"a{installed_writers()[name].plugin.extensions[0]}"
+    folder.mkdir()
+    out = folder / f"a{installed_writers()[name].plugin.extensions[0]}"
     assert run(["convert", str(source), str(out), "--to", name]) == 0
-    sizes = {file: file.stat().st_size for file in files.iterdir()}
-    before = {file: file.read_bytes() for file in files.iterdir()}
+    sizes = {file: file.stat().st_size for file in folder.iterdir()}
+    before = {file: file.read_bytes() for file in folder.iterdir()}
     capsys.readouterr()
     # the largest file does not fit, be it that of the grains or a companion
     with files_up_to(max(sizes.values()) - 1):
         assert run(["convert", str(source), str(out), "--to", name]) == 1
     named = max(sizes, key=sizes.get)
     assert f"scanfab: error: {named}: File too large" in capsys.readouterr().err
-    assert {file: file.read_bytes() for file in files.iterdir()} == before
+    assert {file: file.read_bytes() for file in folder.iterdir()} == before
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
@@ -92,3 +98,47 @@ def test_a_full_standard_output_is_named(series):
         answer = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert answer.returncode == 1
     assert answer.stderr == "scanfab: error: standard output: No space left on device\n"
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the size is read from /proc")
+@pytest.mark.parametrize(("command", "megabytes"), [("compute", 1200), ("inspect", 400)])
+def test_a_limit_that_nothing_can_be_done_with_is_told_at_once(tmp_path, command, megabytes):
+    words = [*PROGRAM, command, str(write(tmp_path / "dump", dump_text(cubic_rows())))]
+    limit = partial(resource.setrlimit, resource.RLIMIT_AS, (megabytes << 20, megabytes << 20))
+    answer = subprocess.run(words, capture_output=True, text=True, check=False, preexec_fn=limit)
+    assert answer.returncode == 1, answer.stderr
+    assert answer.stderr.startswith("scanfab: error: not enough memory: the limit (ulimit -v) ")
+    assert len(answer.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "left"),
+    [
+        (MemoryError("Allocation failed (probably too large)."), None),
+        (RuntimeError("can't start new thread"), None),
+        (ImportError("libvtkCommonCore.so: failed to map segment from shared object"), None),
+        (NameError("name 'PyLazyFrame' is not defined"), 1_000_000),
+    ],
+)
+def test_what_fails_for_lack_of_memory_is_one_message(monkeypatch, capsys, error, left):
+    monkeypatch.setattr(group.cli, "main", Mock(side_effect=error))
+    if left is not None:
+        with pytest.raises(NameError):  # a mistake of ours is not hidden
+            main.run(["compute"])
+        monkeypatch.setattr(files, "address_space", lambda: left)
+    assert main.run(["compute"]) == 1
+    told = capsys.readouterr().err
+    assert told.startswith("scanfab: error: not enough memory (")
+    assert "fewer --workers need less" in told
+
+
+def test_what_is_free_is_the_least_of_all_limits(monkeypatch, tmp_path):
+    assert files.free_memory() > 0
+    monkeypatch.setattr(files, "address_space", lambda: 1000)
+    assert files.free_memory() == 1000
+    container = tmp_path / "memory.max"
+    monkeypatch.setattr(files, "CONTAINER", container)
+    for text, free in (("900\n", 900), ("max\n", 1000)):
+        container.write_text(text)
+        assert files.free_memory() == free
+    assert group.LEAST_SPACE > main.LITTLE

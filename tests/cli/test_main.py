@@ -1,5 +1,6 @@
-"""The command line as a process: help, version, exit codes, streams."""
+"""The command line as a process: help, version, exit codes, streams, and signals at any moment."""
 
+import signal
 import subprocess
 import sys
 from importlib.metadata import version
@@ -9,9 +10,11 @@ import pytest
 
 from scanfab.base.errors import ReadError
 from scanfab.cli import group, main
+from scanfab.cli.signals import interrupted_words, telling
 from tests.helpers.interruptions import PROGRAM
 from tests.helpers.truth import TRIAXIAL
 
+posix = pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
 FAST = ["--directions", "9", "--spacing", "1rmin", "--boundary", "mask=3", "--variants", "a"]
 
 
@@ -48,3 +51,104 @@ def test_a_closed_pipe_ends_quietly() -> None:
         errors = process.stderr.read()
     assert "Traceback" not in errors
     assert "Broken" not in errors
+
+
+# a shell's background jobs ignore SIGINT
+START = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+DEAF = """
+class Deaf:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SENT)
+        time.sleep(0.1)
+
+def run(args):
+    Deaf()
+    try:
+        os.kill(os.getpid(), signal.SENT)
+        time.sleep(0.1)
+    except BaseException:
+        pass
+    sys.exit("it went on")
+"""
+TELLS = """
+from scanfab.cli.signals import telling
+
+def run(args):
+    with telling(lambda: "after 4 of 5 frames"):
+        os.kill(os.getpid(), signal.SENT)
+        time.sleep(10)
+"""
+
+
+def ended(tmp_path: Path, text: str) -> subprocess.CompletedProcess[str]:
+    """A process whose command line is this function ``run(args)``."""
+    program = f"{START}import os, sys, time\nfrom scanfab.cli import main\n{text}"
+    program += "\nmain.run = run\nmain.main([])"
+    return subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+
+
+@posix
+@pytest.mark.parametrize(
+    ("sent", "code", "word"), [("SIGINT", 130, "interrupted"), ("SIGTERM", 143, "terminated")]
+)
+@pytest.mark.parametrize(("text", "more"), [(DEAF, ""), (TELLS, " after 4 of 5 frames")])
+def test_a_signal_ends_the_process_at_once(tmp_path, sent, code, word, text, more):
+    """
+    Code that swallows exceptions cannot hold it back.
+
+    The compiler's callbacks do so, Python itself where an object is deleted; some extension
+    modules crash where an exception comes while they are imported.
+    """
+    answer = ended(tmp_path, text.replace("SENT", sent))
+    assert answer.returncode == code
+    assert answer.stderr == f"scanfab: {word}{more}\n"
+
+
+def test_words_of_a_command_that_is_over_are_not_told():
+    with telling(lambda: "after 1 of 2 frames"):
+        assert interrupted_words(signal.SIGINT) == "scanfab: interrupted after 1 of 2 frames"
+    assert interrupted_words(signal.SIGINT) == "scanfab: interrupted"
+
+
+PARTS = """
+from pathlib import Path
+from scanfab.table.columns import COLUMNS
+from scanfab.table.row import Row
+from scanfab.base.files import whole_file
+from scanfab.pipeline.record import PartFile
+
+def run(args):
+    part = PartFile(Path("table.csv"))
+    with part.alone():
+        part.begin({})
+        for _ in range(ROWS):
+            part.add([], [Row(**dict.fromkeys(COLUMNS))])
+        with whole_file(Path("figure.png")) as part:
+            part.write_text("half")
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(10)
+"""
+
+
+@posix
+@pytest.mark.parametrize(("rows", "left"), [(0, set()), (1, {"table.csv.part"})])
+def test_a_part_without_rows_and_half_a_file_are_removed(tmp_path, rows, left):
+    answer = ended(tmp_path, PARTS.replace("ROWS", str(rows)))
+    assert answer.returncode == 143, answer.stderr
+    assert {path.name for path in tmp_path.iterdir()} == left
+
+
+def test_the_process_hears_signals_before_anything_large_is_imported():
+    code = (
+        "import sys; before = set(sys.modules); import scanfab.cli.main; "
+        "heavy = {'click', 'numpy', 'typing', 're', 'contextlib', 'importlib'}; "
+        "print(*sorted(heavy & (set(sys.modules) - before)))"
+    )
+    words = [sys.executable, "-S", "-c", code]
+    root = str(Path(__file__).parents[2])
+    answer = subprocess.run(
+        words, env={"PYTHONPATH": root}, capture_output=True, text=True, check=True
+    )
+    assert answer.stdout == "\n"
