@@ -2,9 +2,11 @@
 
 import json
 import shutil
+from collections.abc import Callable
 from functools import reduce
 from operator import getitem
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -140,28 +142,48 @@ def test_a_frame_twice_is_to_have_the_same_values(parts, whole, series, tmp_path
     assert f"has other values than in {parts[1]}: lines is {cells[14]} here" in said
 
 
-def test_columns_of_a_package_that_is_missing_here_are_not_lost(parts, refused):
-    first, *lines = Path(parts[0]).read_text().splitlines()
-    Path(parts[0]).write_text(
-        "".join(f"{one}\n" for one in (f"{first},mine", *(f"{line},1" for line in lines)))
-    )
-    assert "nothing here makes its columns mine" in refused(*parts)
+def cut(kept: int) -> Callable[[Path], object]:
+    """Leaves so many lines of a part."""
+    return lambda part: part.write_text("".join(part.read_text().splitlines(True)[:kept]))
 
 
-def test_unfinished_parts_are_named(parts, refused):
-    part = Path(parts[1])
-    manifest, lines = Path(f"{part}.manifest.json"), part.read_text().splitlines(keepends=True)
-    for kept, said in ((-1, "expected 4 rows of frame 4"), (-4, "lacks frame 4")):
-        part.write_text("".join(lines[:kept]))
-        assert f"{part}: {said}" in refused(*parts)
-    part.write_text("".join(lines))
-    moved = manifest.rename(part.with_name("moved"))
-    assert f"{part}: there is no {manifest.name}" in refused(*parts)
-    moved.rename(manifest)
-    part.rename(f"{part}.part")
-    assert f"{part}: is not finished" in refused(*parts)
-    Path(f"{part}.part").unlink()
-    assert f"{part}: there is no such part" in refused(*parts)
+def told(value: Any, *place: Any) -> Callable[[Path], object]:
+    """Puts another value into the manifest of a part."""
+
+    def spoil(part: Path) -> None:
+        path = Path(f"{part}.manifest.json")
+        manifest = json.loads(path.read_text())
+        *outer, last = place
+        reduce(getitem, outer, manifest)[last] = value
+        path.write_text(json.dumps(manifest))
+
+    return spoil
+
+
+def with_foreign_column(part: Path) -> None:
+    first, *lines = part.read_text().splitlines()
+    part.write_text("\n".join([f"{first},mine", *(f"{line},1" for line in lines), ""]))
+
+
+@pytest.mark.parametrize(
+    ("number", "spoil", "said"),
+    [
+        (1, cut(-1), "expected 4 rows of frame 4"),
+        (1, cut(-4), "lacks frame 4"),
+        (1, lambda part: Path(f"{part}.manifest.json").unlink(), "there is no part_1.csv.manifest"),
+        (1, lambda part: part.rename(f"{part}.part"), "is not finished"),
+        (1, Path.unlink, "there is no such part"),
+        (0, with_foreign_column, "nothing here makes its columns mine"),
+        (0, told(5, "inputs", 0), "expected a manifest of scanfab compute"),
+        (0, told("gone.csv", "settings", "strain"), "the manifest cannot be used: strain"),
+        (2, told("0" * 64, "inputs", 1, "sha256"), "dump_100.txt has changed between the jobs"),
+    ],
+)
+def test_a_part_that_cannot_be_used_is_named(parts, refused, number, spoil, said):
+    spoil(Path(parts[number]))
+    message = refused(*parts)
+    assert parts[number] in message
+    assert said in message
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -173,25 +195,6 @@ def test_a_part_that_lost_its_end_is_named(series, tmp_path, suffix, refused):
     # nor is it gone on with
     words = ["--variants", "a", "-o", part, "--resume"]
     assert run(["compute", str(series), *FAST, *words]) == 1
-
-
-@pytest.mark.parametrize(
-    ("part", "place", "value", "said"),
-    [
-        (0, ("inputs", 0), 5, "expected a manifest of scanfab compute"),
-        (0, ("settings", "strain"), "gone.csv", "settings of the manifest cannot be used: strain"),
-        (2, ("inputs", 1, "sha256"), "0" * 64, "dump_100.txt has changed between the jobs"),
-    ],
-)
-def test_a_manifest_that_cannot_be_used_is_named(parts, refused, part, place, value, said):
-    path = Path(f"{parts[part]}.manifest.json")
-    manifest = json.loads(path.read_text())
-    *outer, last = place
-    reduce(getitem, outer, manifest)[last] = value
-    path.write_text(json.dumps(manifest))
-    message = refused(*parts)
-    assert parts[part] in message
-    assert said in message
 
 
 def test_the_library_merges(parts, whole, tmp_path, capsys):

@@ -15,38 +15,32 @@ from scanfab.pipeline.values import Length
 from scanfab.scan.directions import direction_rule
 from tests.helpers.dumps import write
 
-RADII = {"rmin": 0.5, "rmean": 1.0, "rmax": 2.0}
 NAN, INF = float("nan"), float("inf")
 
 
 @pytest.mark.parametrize(
-    ("text", "length"),
+    ("option", "meaning", "values"),
     [
-        ("0.5", 0.5), (3, 3.0), ("1e-3", 1e-3), ("1rmin", 0.5), ("0.2rmean", 0.2),
-        (" 2 rmax ", 4.0), (".5rmin", 0.25), ("0", 0.0), (Length(3.0, "rmax"), 6.0),
+        # a number, or relative to a radius
+        ("cutoff", lambda length: length.resolve({"rmin": 0.5, "rmean": 1.0, "rmax": 2.0}), [
+            ("0.5", 0.5), (3, 3.0), ("1e-3", 1e-3), ("1rmin", 0.5), ("0.2rmean", 0.2),
+            (" 2 rmax ", 4.0), (".5rmin", 0.25), ("0", 0.0), (Length(3.0, "rmax"), 6.0),
+        ]),
+        # unit vectors
+        ("axis", tuple, [
+            ("x", (1, 0, 0)), ("1, 1, 0", (2**-0.5, 2**-0.5, 0)), ((0, -3.0, 0), (0, -1, 0)),
+        ]),
+        # slices
+        ("frames", range(10).__getitem__, [
+            (None, range(10)), ("2:5", [2, 3, 4]), ("::4", [0, 4, 8]), ("-2:", [8, 9]), ("3", [3]),
+            ("-1", [9]), ("-3", [7]), (2, [2]), (-1, [9]), ("1 : 3", [1, 2]), (slice(1, 3), [1, 2]),
+        ]),
     ],
 )  # fmt: skip
-def test_lengths_are_numbers_or_relative_to_a_radius(text, length):
-    assert Settings(cutoff=text).cutoff.resolve(RADII) == pytest.approx(length)
-
-
-@pytest.mark.parametrize(
-    ("text", "axis"),
-    [("x", (1, 0, 0)), ("1, 1, 0", (2**-0.5, 2**-0.5, 0)), ((0, -3.0, 0), (0, -1, 0))],
-)
-def test_axes_are_unit_vectors(text, axis):
-    np.testing.assert_allclose(Settings(axis=text).axis, axis)
-
-
-@pytest.mark.parametrize(
-    ("text", "frames"),
-    [
-        (None, range(10)), ("2:5", [2, 3, 4]), ("::4", [0, 4, 8]), ("-2:", [8, 9]), ("3", [3]),
-        ("-1", [9]), ("-3", [7]), (2, [2]), (-1, [9]), ("1 : 3", [1, 2]), (slice(1, 3), [1, 2]),
-    ],
-)  # fmt: skip
-def test_frames_are_slices(text, frames):
-    assert list(range(10)[Settings(frames=text).frames]) == list(frames)
+def test_values_are_written_in_many_ways(option, meaning, values):
+    for text, expected in values:
+        found = meaning(getattr(Settings(**{option: text}), option))
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=0)
 
 
 @pytest.mark.parametrize(
