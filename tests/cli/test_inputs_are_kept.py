@@ -68,25 +68,3 @@ def test_damaged_tables_and_settings_are_one_message(files, tmp_path, ask):
     assert "expected a manifest" in ask("merge", "t.csv", code=1).told
     (tmp_path / "scanfab.toml").write_text(f"[compute]\nrv = {'[' * 20_000}{']' * 20_000}")
     assert "scanfab.toml" in ask("inspect", "g.csv", code=2).told
-
-
-def test_files_named_one_by_one_are_one_series(files, tmp_path, ask):
-    names = ("rcp20.csv", "rcp.csv", "rcp3.csv")
-    for name in names:
-        shutil.copy("g.csv", name)
-    assert ask("inspect", *names, "--json").out.count('"frame"') == 3
-    assert [row["frame"] for row in ask("compute", *names, *FAST).rows] == ["0", "1", "2"]
-    # inspect says once what all frames share
-    out = ask("inspect", *names).out
-    assert out.count("  radius_min ") == 1
-    assert out.count("grains") <= 4
-
-
-def test_a_map_is_reported_and_not_compared(files, tmp_path, ask):
-    ask("map", "g.csv", "--slices", "2", "--frame", "-1", *FAST, "-o", "m.csv", code=0)
-    told = ask("compare", "m.csv", code=1).told
-    assert "a table of scanfab map, which scanfab report shows" in told
-    ask("report", "m.csv", "t.csv", "-o", "r.html", "--quiet")
-    page = (tmp_path / "r.html").read_text()
-    assert "Blocks in frame 0" in page
-    ask("map", "g.csv", "--slices", "2", "--frame", "0", "--frames", "0", code=2)

@@ -15,6 +15,7 @@ FILES = {
     "head.csv": "source,frame\n",
     "letters.csv": "a,b\n1,2\n",
     "row.csv": json.dumps(curve()[0]),
+    "map.csv": json.dumps({**curve()[0], "block": 0}),
     "one/scanfab.toml": "[compute]\n",
     "none/scanfab.toml": "[compute]\n",
 }
@@ -41,6 +42,7 @@ DISCS = SAMPLE_DATA / "lammps_biaxial" / "discs.0.lammpstrj.gz"
         ("compute cube cube/dump_0.txt --follow", 2, "--follow takes one folder, or one file"),
         ("compute cube --rv -1 -o out.csv", 2, "--rv: expected a fraction above 0"),
         ("map cube --slices 2 --frame 1", 2, "--frame: there is no frame 1: cube has 1, counted"),
+        ("map cube --slices 2 --frame 0 --frames 0", 2, "--frame"),
         ("map cube --grid 2,2", 2, "three numbers of blocks, such as 4,4,8, found '2,2'"),
         ("view cube --rv -1 --screenshot x.png", 2, "rv: expected a fraction above 0"),
         # files to be written
@@ -61,6 +63,7 @@ DISCS = SAMPLE_DATA / "lammps_biaxial" / "discs.0.lammpstrj.gz"
         ("compare head.csv --summary --no-paper-line", 2, "goes with --plot FILE"),
         ("compare letters.csv -o out.csv", 1, "there is no column source, frame"),
         ("compare row.csv --differences", 1, "hold no two variants of one frame"),
+        ("compare map.csv", 1, "a table of scanfab map, which scanfab report shows"),
         ("compare row.csv --variants ab", 1, "expected variants of the tables, c, found 'ab'"),
         ("compare row.csv --variants x", 2, "--variants: expected letters out of abcd, found 'x'"),
         ("view cube --screenshot x.jpg", 2, "screenshots are PNG files"),

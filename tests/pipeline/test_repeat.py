@@ -11,13 +11,8 @@ import pytest
 
 from scanfab.base.errors import ReadError
 from scanfab.cli.main import run
-from scanfab.pipeline.record import (
-    asked_for,
-    read_manifest,
-    reopen,
-    repeat_command,
-    restored_settings,
-)
+from scanfab.pipeline import record
+from scanfab.pipeline.record import asked_for, read_manifest, repeat_command, restored_settings
 from scanfab.pipeline.settings import Settings
 from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import cubic_rows, dump_text, pairs_text, write
@@ -109,14 +104,14 @@ def test_the_source_is_opened_as_it_was(monkeypatch):
     reading = {"contacts": "geometric", "columns": None, "format": "yade"}
     asked = json.loads(json.dumps(asked_for([SAMPLE], reading, Settings())))
     with pytest.warns(match="skipped"):
-        series = reopen(asked)
+        series = record.reopen(asked)
     assert (series.name, series.contacts_from) == (SAMPLE, "geometric")
     # what is usual is not repeated
     usual = {**asked, **asked_for(["dumps"], {"contacts": "auto", "format": None}, Settings())}
     assert repeat_command(json.loads(json.dumps(usual))) == "scanfab compute dumps"
     for source, told in (("-", "standard input"), ("gone/away", "gone/away: there is no such")):
         with pytest.raises(ReadError, match=told):
-            reopen(asked_for([source], {}, Settings()))
+            record.reopen(asked_for([source], {}, Settings()))
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"settings": {}}', "\udcff"])

@@ -1,0 +1,199 @@
+"""Forces, orders 2 and 4, invariants: closed forms, and samples drawn from known harmonics."""
+
+import numpy as np
+import pytest
+
+from scanfab.fabric.contact import contact_fabric
+from scanfab.fabric.forces import directional_mean
+from scanfab.fabric.harmonics import Harmonics, harmonic, tensor4
+from scanfab.fabric.invariants import Invariants, intensity
+from scanfab.fabric.void import void_fabric
+from scanfab.scan.directions import direction_rule
+from tests.helpers.lattices import unit_vectors
+from tests.helpers.measured import drawn, measured_of
+
+Z = np.array([0.0, 0.0, 1.0])
+
+
+def test_legendre_polynomials_are_those_of_numpy():
+    x = np.linspace(-1, 1, 7)
+    for order in (2, 4):
+        expected = np.polynomial.legendre.Legendre.basis(order)(x)
+        np.testing.assert_allclose(harmonic(order, x), expected, atol=1e-14)
+
+
+@pytest.mark.parametrize(("a2", "a4"), [(0.4, -0.35), (-0.3, 0.2)])
+def test_contacts_drawn_from_harmonics_give_them_back(a2, a4):
+    def density(n):
+        return 1 + a2 * harmonic(2, n[:, 2]) + a4 * harmonic(4, n[:, 2])
+
+    normals = drawn(np.random.default_rng(1), 200_000, density, 1 + abs(a2) + abs(a4))
+    found = Harmonics().values(measured_of(normals))
+    assert abs(found["c_a2"] - a2) < 4 * found["c_a2_se"]
+    assert abs(found["c_a4"] - a4) < 4 * found["c_a4_se"]
+
+
+def test_lengths_of_known_harmonics_give_them_back():
+    axes = direction_rule("lebedev:15").axes[None]
+    weights = direction_rule("lebedev:15").weights
+    cosine = axes @ Z
+    length = 1 + 0.2 * harmonic(2, cosine) - 0.1 * harmonic(4, cosine)
+    void = void_fabric(axes, weights, length, np.ones_like(length))
+    found = Harmonics().values(measured_of(np.zeros((0, 3)), void=void))
+    assert found["vs_a2"] == pytest.approx(0.2)
+    assert found["vs_a4"] == pytest.approx(-0.1)
+    assert found["vs_a2"] == pytest.approx(5 * void.tensor.axial(Z))
+    assert found["c_a2"] is None
+    fourth = np.array(found["vs_tensor4"]).reshape(3, 3, 3, 3)
+    np.testing.assert_allclose(np.einsum("ijkk->ij", fourth), void.tensor.matrix, atol=1e-12)
+
+
+def test_the_fourth_order_tensor_of_isotropy():
+    rule = direction_rule("lebedev:15")
+    eye = np.eye(3)
+    expected = sum(
+        np.einsum(f"{one},{two}->ijkl", eye, eye)
+        for one, two in (("ij", "kl"), ("ik", "jl"), ("il", "jk"))
+    )
+    found = tensor4(rule.axes, rule.weights)
+    np.testing.assert_allclose(found, expected / 15, atol=1e-12)
+    naive = np.mean([np.multiply.outer(np.outer(n, n), np.outer(n, n)) for n in eye], axis=0)
+    np.testing.assert_allclose(tensor4(eye, np.ones(3)), naive)
+
+
+def p2(normals):
+    return 1.5 * normals[:, 2] ** 2 - 0.5
+
+
+def normals_of(rng, count, a2=0.8):
+    """Normals of the density 1 + a2 P2(n·z)."""
+    return drawn(rng, count, lambda n: 1 + a2 * p2(n), 1 + a2)
+
+
+def written_out(normals, vectors, size, factor):
+    """Contact by contact, as the formula has it."""
+    eye = np.eye(3)
+    fabric = sum(np.outer(n, n) for n in normals) / len(normals)
+    deviator = 7.5 * (fabric - eye / 3)
+    total, scale = np.zeros((3, 3)), 0.0
+    for n, v, s in zip(normals, vectors, size, strict=True):
+        weight = 1 / (1 + n @ deviator @ n)
+        total += weight * (np.outer(v, n) + np.outer(n, v)) / 2
+        scale += weight * s
+    return factor * (total / scale - eye * np.trace(total) / scale / 3)
+
+
+def fabrics(normals, branch, force, axis=Z):
+    """Of branches, normal and tangential forces."""
+    size = np.sum(force * normals, axis=1)
+    return (
+        directional_mean(normals, branch, axis),
+        directional_mean(normals, size, axis),
+        directional_mean(normals, size, axis, across=force - size[:, None] * normals),
+    )
+
+
+def test_against_the_formula_contact_by_contact():
+    rng, axis = np.random.default_rng(1), np.array([0.48, 0.6, 0.64])
+    normals, branch = normals_of(rng, 300), rng.uniform(1, 2, 300)
+    force = rng.normal(size=(300, 3)) + 3 * normals
+    force_n = np.sum(force * normals, axis=1)
+    tangential = force - force_n[:, None] * normals
+    cases = [
+        (branch[:, None] * normals, branch, 7.5),
+        (force_n[:, None] * normals, force_n, 7.5),
+        (tangential, force_n, 5.0),
+    ]
+    found_ones = fabrics(normals, branch, force, axis)
+    for found, (vectors, size, factor) in zip(found_ones, cases, strict=True):
+        expected = written_out(normals, vectors, size, factor)
+        np.testing.assert_allclose(found.matrix, expected, atol=1e-13)
+        assert found.axial == pytest.approx(1.5 * axis @ found.matrix @ axis, abs=1e-13)
+        assert np.trace(found.matrix) == pytest.approx(0.0, abs=1e-13)
+
+
+@pytest.mark.parametrize("density", [0.0, 0.6])
+def test_known_harmonics_come_back_whatever_the_density_of_contacts(density):
+    """b = 1 + 0.3 P2, f_n = 1 + 0.5 P2, f_t = -0.2 dP2/dθ: the axial values are 0.3, 0.5, 0.2."""
+    rng = np.random.default_rng(2)
+    normals = normals_of(rng, 200_000, density)
+    force_n = 1 + 0.5 * p2(normals)
+    across = Z - normals[:, 2:] * normals
+    # dP2/dθ = -3 cos sin, and |across| = sin; the mean tangential force points towards the axis
+    force = force_n[:, None] * normals + 0.2 * 3 * normals[:, 2:] * across
+    found = fabrics(normals, 1 + 0.3 * p2(normals), force)
+    expected = [0.3 * 1.5, 0.5 * 1.5, 0.2 * 1.5 * 2.0]
+    for one, value in zip(found, expected, strict=True):
+        assert abs(one.axial - value) < max(5 * one.axial_se, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("normals", "size"),
+    [
+        (np.zeros((0, 3)), np.zeros(0)),
+        # none that are pressed
+        (np.array([[1.0, 0, 0], [0, 1, 0]]), np.array([-1.0, -2.0])),
+        # a direction about which there are so few that 1 + n·C·n is below 0
+        (np.array([[1.0, 0, 0]] * 30 + [[0, 0, 1.0]]), np.ones(31)),
+    ],
+)
+def test_contacts_that_have_no_force_fabric(normals, size):
+    assert directional_mean(normals, size, Z) is None
+
+
+def values(normals, **more):
+    return Invariants().values(measured_of(normals, **more))
+
+
+@pytest.mark.parametrize("lateral", [0.25, 0.3, 1 / 3, 0.4])
+def test_a_is_seven_and_a_half_alpha_for_transverse_isotropy(lateral):
+    matrix = np.diag([lateral, lateral, 1 - 2 * lateral])
+    axial = 1 - 3 * lateral
+    assert intensity(matrix) == pytest.approx(7.5 * abs(axial), abs=1e-14)
+
+
+@pytest.mark.parametrize("count", [100, 1000])
+def test_the_bias_is_what_isotropic_contacts_give(count):
+    """METHOD: the mean of a is 7.136/√N, its standard deviation 2.31/√N."""
+    rng = np.random.default_rng(2)
+    found = [values(unit_vectors(rng, count)) for _ in range(600)]
+    a = np.array([one["f_c"] for one in found])
+    bias = found[0]["f_c_bias"]
+    assert bias == pytest.approx(7.136 / np.sqrt(count), rel=1e-3)
+    assert a.mean() == pytest.approx(bias, abs=4 * 2.31 / np.sqrt(count * 600) + 0.3 / count)
+    assert a.std() == pytest.approx(2.31 / np.sqrt(count), rel=0.12)
+    # b says nothing there: alpha is about 1.07/√N
+    assert sum(one["b_c"] is not None for one in found) < 3
+
+
+def test_the_bias_of_voids_is_that_of_the_replicates():
+    """A scan of an isotropic medium whose mean lengths have independent noise."""
+    rng = np.random.default_rng(3)
+    rule = direction_rule("lebedev:9")
+    found = []
+    for _ in range(300):
+        axes = np.repeat(rule.axes[None], 16, axis=0)
+        length = 1 + 0.05 * rng.normal(size=axes.shape[:2])
+        void = void_fabric(axes, rule.weights, length, np.ones_like(length))
+        found.append(values(np.zeros((0, 3)), void=void, segment_count=1000))
+    a = np.array([one["f_vs"] for one in found])
+    bias = np.sqrt(np.mean([one["f_vs_bias"] ** 2 for one in found]))
+    assert a.mean() == pytest.approx(bias, rel=0.08)
+
+
+def test_one_replicate_knows_no_bias_and_no_error():
+    rule = direction_rule("lebedev:9")
+    void = void_fabric(rule.axes[None], rule.weights, *[np.ones((1, len(rule)))] * 2)
+    found = values(np.zeros((0, 3)), void=void)
+    assert found["f_vs_bias"] is None
+    assert found["gvs_1_se"] is None
+    assert found["f_vs"] == pytest.approx(0.0, abs=1e-12)
+    assert found["b_vs"] is None
+
+
+def test_principal_values_and_b():
+    normals = np.repeat(np.eye(3), [500, 300, 200], axis=0)
+    found = values(normals)
+    assert [found[f"gc_{k}"] for k in (1, 2, 3)] == pytest.approx([0.5, 0.3, 0.2])
+    assert found["b_c"] == pytest.approx(1 / 3)
+    assert found["f_c"] == pytest.approx(intensity(contact_fabric(normals).matrix))
