@@ -77,14 +77,14 @@ def test_grains_that_are_removed_leave_no_void_fabric_and_no_solid(tmp_path, com
     assert "nan" not in alone.out.lower()
 
 
-@pytest.mark.parametrize(
-    ("where", "words"),
-    [
-        ("scanfab.io.files.open", ()),
-        ("pathlib.Path.iterdir", ()),
-        ("pathlib.Path.write_text", ("-o", "{}/table.csv")),
-    ],
-)
+FORBIDDEN = [
+    ("scanfab.io.files.open", ()),
+    ("pathlib.Path.iterdir", ()),
+    ("pathlib.Path.write_text", ("-o", "{}/table.csv")),
+]
+
+
+@pytest.mark.parametrize(("where", "words"), FORBIDDEN)
 def test_what_nobody_may_read_or_write(tmp_path, compute, monkeypatch, where, words):
     def forbidden(path, *_, **__):
         raise PermissionError(errno.EACCES, "Permission denied", str(path))
@@ -97,15 +97,15 @@ def test_what_nobody_may_read_or_write(tmp_path, compute, monkeypatch, where, wo
     assert not (tmp_path / "table.csv").exists()
 
 
+CLOSED = [
+    ("inspect FILE >&-", "standard output is closed"),
+    ("formats >&-", "standard output is closed"),
+    ("compute - --format liggghts <&-", "standard input: expected a dump"),
+]
+
+
 @pytest.mark.skipif(shutil.which("sh") is None, reason="needs a POSIX shell to close a stream")
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("inspect FILE >&-", "standard output is closed"),
-        ("formats >&-", "standard output is closed"),
-        ("compute - --format liggghts <&-", "standard input: expected a dump"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), CLOSED)
 def test_a_standard_stream_that_is_closed(tmp_path, words, message):
     command = f"{shlex.join(PROGRAM)} {words.replace('FILE', str(grains(tmp_path)))}"
     done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False)

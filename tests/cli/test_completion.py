@@ -26,9 +26,8 @@ INTERACTIVE = {"bash": ["bash", "--norc", "-i"], "zsh": ["zsh", "-f", "-i"]}
 def scripted(shell: str) -> str:
     """The line of the page on the command line that makes a shell complete."""
     page = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
-    (line,) = re.findall(
-        rf"^.*_SCANFAB_COMPLETE={shell}_source scanfab(?:\).*| \| .*)$", page, re.M
-    )
+    pattern = rf"^.*_SCANFAB_COMPLETE={shell}_source scanfab(?:\).*| \| .*)$"
+    (line,) = re.findall(pattern, page, re.M)
     return f"autoload -Uz compinit; compinit -u -D; {line}" if shell == "zsh" else line
 
 

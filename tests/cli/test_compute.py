@@ -21,9 +21,8 @@ FAST = ["--directions", "9", "--spacing", "1rmin", "--boundary", "mask=3"]
 
 
 def test_the_command_gives_what_the_library_gives_with_any_number_of_workers(ask) -> None:
-    table = scanfab.compute(
-        scanfab.read_series(FILES), directions=9, spacing="1rmin", boundary="mask=3"
-    )
+    series = scanfab.read_series(FILES)
+    table = scanfab.compute(series, directions=9, spacing="1rmin", boundary="mask=3")
     runs = [ask("compute", *FILES, *FAST, "--workers", number) for number in (1, 2, 5)]
     assert len({run.out for run in runs}) == 1
     assert "\x1b" not in runs[0].out + runs[0].err
@@ -43,9 +42,8 @@ def on_terminal(words: list[str], out: IO[str] | None = None, **more: str) -> tu
     pty = pytest.importorskip("pty", reason="terminals are POSIX")
     ours, theirs = pty.openpty()
     env = {**os.environ, "COLUMNS": "180", "LINES": "40", "TERM": "dumb", **more}
-    with subprocess.Popen(
-        [*PROGRAM, *words], stdout=out or theirs, stderr=theirs, env=env
-    ) as process:
+    streams = {"stdout": out or theirs, "stderr": theirs}
+    with subprocess.Popen([*PROGRAM, *words], env=env, **streams) as process:
         os.close(theirs)
         shown = b""
         try:

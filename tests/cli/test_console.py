@@ -71,11 +71,8 @@ def test_what_does_not_fit_is_left_out_least_telling_first(lines):
 
 
 def test_what_tells_rows_apart_is_shown_only_where_it_differs(lines):
-    first, other = (
-        a_row(**VALUES, rv=0.7),
-        a_row(**VALUES, source="a/folder/" * 9 + "other", rv=0.4, cutoff=0.5),
-    )
-    head, _, row = lines(60, print_table, [first, other], Excerpt())
+    other = a_row(**VALUES, source="a/folder/" * 9 + "other", rv=0.4, cutoff=0.5)
+    head, _, row = lines(60, print_table, [a_row(**VALUES, rv=0.7), other], Excerpt())
     shown = dict(zip(heads(head), row.split(), strict=True))
     assert (shown["source"], shown["rv"], shown["cutoff"]) == ("other", "0.4", "0.5")
     (head, *_) = lines(200, print_table, ROWS, Excerpt())
@@ -126,9 +123,8 @@ def test_a_comparison_shows_total_errors_and_curves_where_there_is_room(lines):
 
 @pytest.mark.filterwarnings("ignore:shear_strain is used in place")
 def test_a_sheared_cell_has_its_shear(lines):
-    assert any(
-        "shear strain" in one for one in lines(80, print_comparison, compare_tables(sheared()))
-    )
+    shown = lines(80, print_comparison, compare_tables(sheared()))
+    assert any("shear strain" in line for line in shown)
 
 
 def test_merged_tables_and_differences_are_shown_as_tables(ask, series, tmp_path, monkeypatch):
@@ -145,9 +141,8 @@ def test_merged_tables_and_differences_are_shown_as_tables(ask, series, tmp_path
     asked = ("--fields", "source,frame,variant,alpha_vs_axial", "--digits", "8")
     head, row, *_ = ask("compare", tmp_path / "t.csv", *asked).out.splitlines()
     assert heads(head) == ["source", "frame", "variant", "α_vs axial"]
-    assert float(row.split()[-1]) == pytest.approx(
-        scanfab.load(tmp_path / "t.csv")[0].alpha_vs_axial, rel=1e-7
-    )
+    value = scanfab.load(tmp_path / "t.csv")[0].alpha_vs_axial
+    assert float(row.split()[-1]) == pytest.approx(value, rel=1e-7)
 
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")
@@ -198,9 +193,10 @@ def test_verbose_says_what_is_used_and_how_long_each_frame_takes(said, settled):
     assert result == said("compute", *FAST)[0]
 
 
-@pytest.mark.parametrize(
-    ("words", "every", "says"), [((), 0.002, 1), (("--quiet",), 0.002, 0), ((), 60.0, 0)]
-)
+PROGRESS = [((), 0.002, 1), (("--quiet",), 0.002, 0), ((), 60.0, 0)]
+
+
+@pytest.mark.parametrize(("words", "every", "says"), PROGRESS)
 def test_a_log_gets_a_line_of_progress_each_minute(said, monkeypatch, words, every, says):
     """Here of a few milliseconds; nothing in a run that takes less."""
     assert console.EVERY == 60.0

@@ -44,16 +44,16 @@ def files_up_to(size: int) -> Iterator[None]:
             resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-@pytest.mark.parametrize(
-    ("words", "named"),
-    [
-        (["--vtk", "view"], "view/grains_000000.vtp"),
-        (["--plot", "figure.png"], "figure.png"),
-        # its writer fails with an error of another kind when what it began cannot be ended
-        (["--plot", "figure.pdf"], "figure.pdf"),
-        (["--manifest", "manifest.json"], "manifest.json"),
-    ],
-)
+TOO_LARGE = [
+    (["--vtk", "view"], "view/grains_000000.vtp"),
+    (["--plot", "figure.png"], "figure.png"),
+    # its writer fails with an error of another kind when what it began cannot be ended
+    (["--plot", "figure.pdf"], "figure.pdf"),
+    (["--manifest", "manifest.json"], "manifest.json"),
+]
+
+
+@pytest.mark.parametrize(("words", "named"), TOO_LARGE)
 def test_one_message_names_the_file(compute, capsys, tmp_path, words, named):
     with files_up_to(1_000):
         assert compute(*words) == 1
@@ -114,15 +114,15 @@ def test_a_limit_that_nothing_can_be_done_with_is_told_at_once(tmp_path, command
     assert len(answer.stderr.splitlines()) == 1
 
 
-@pytest.mark.parametrize(
-    ("error", "left"),
-    [
-        (MemoryError("Allocation failed (probably too large)."), None),
-        (RuntimeError("can't start new thread"), None),
-        (ImportError("libvtkCommonCore.so: failed to map segment from shared object"), None),
-        (NameError("name 'PyLazyFrame' is not defined"), 1_000_000),
-    ],
-)
+LACKS = [
+    (MemoryError("Allocation failed (probably too large)."), None),
+    (RuntimeError("can't start new thread"), None),
+    (ImportError("libvtkCommonCore.so: failed to map segment from shared object"), None),
+    (NameError("name 'PyLazyFrame' is not defined"), 1_000_000),
+]
+
+
+@pytest.mark.parametrize(("error", "left"), LACKS)
 def test_what_fails_for_lack_of_memory_is_one_message(monkeypatch, capsys, error, left):
     monkeypatch.setattr(group.cli, "main", Mock(side_effect=error))
     if left is not None:

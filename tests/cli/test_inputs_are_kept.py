@@ -21,20 +21,20 @@ def files(tmp_path, monkeypatch, ask):
     return {path.name: path.read_bytes() for path in tmp_path.iterdir()}
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        ("compute", "g.csv", *FAST, "-o", "g.csv"),
-        ("compute", "link.csv", *FAST, "-o", "./g.csv"),
-        ("compute", "g.csv", *FAST, "-o", "u.csv", "--manifest", "g.csv"),
-        ("map", "g.csv", "--slices", "1", *FAST, "-o", "g.csv"),
-        ("calibrate", "g.csv", "-o", "g.csv"),
-        ("compare", "t.csv", "-o", "t.csv"),
-        ("merge", "t.csv", "-o", "t.csv"),
-        ("convert", "g.csv", "g.csv", "--frames", "0:0"),
-        ("compute", "dump.1", "--strain", "t.csv", *FAST, "-o", "t.csv"),
-    ],
-)
+OVER_INPUTS = [
+    ("compute", "g.csv", *FAST, "-o", "g.csv"),
+    ("compute", "link.csv", *FAST, "-o", "./g.csv"),
+    ("compute", "g.csv", *FAST, "-o", "u.csv", "--manifest", "g.csv"),
+    ("map", "g.csv", "--slices", "1", *FAST, "-o", "g.csv"),
+    ("calibrate", "g.csv", "-o", "g.csv"),
+    ("compare", "t.csv", "-o", "t.csv"),
+    ("merge", "t.csv", "-o", "t.csv"),
+    ("convert", "g.csv", "g.csv", "--frames", "0:0"),
+    ("compute", "dump.1", "--strain", "t.csv", *FAST, "-o", "t.csv"),
+]
+
+
+@pytest.mark.parametrize("command", OVER_INPUTS)
 def test_an_output_that_is_an_input_is_refused(files, tmp_path, ask, command):
     answer = ask(*command, code=2)
     assert "input" in answer.told or "chooses none" in answer.told

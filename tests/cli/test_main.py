@@ -70,6 +70,7 @@ def run(args):
         pass
     sys.exit("it went on")
 """
+ENDED = [("SIGINT", 130, "interrupted"), ("SIGTERM", 143, "terminated")]
 TELLS = """
 from scanfab.cli.signals import telling
 
@@ -84,15 +85,12 @@ def ended(tmp_path: Path, text: str) -> subprocess.CompletedProcess[str]:
     """A process whose command line is this function ``run(args)``."""
     program = f"{START}import os, sys, time\nfrom scanfab.cli import main\n{text}"
     program += "\nmain.run = run\nmain.main([])"
-    return subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    words = [sys.executable, "-c", program]
+    return subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
 
 
 @posix
-@pytest.mark.parametrize(
-    ("sent", "code", "word"), [("SIGINT", 130, "interrupted"), ("SIGTERM", 143, "terminated")]
-)
+@pytest.mark.parametrize(("sent", "code", "word"), ENDED)
 @pytest.mark.parametrize(("text", "more"), [(DEAF, ""), (TELLS, " after 4 of 5 frames")])
 def test_a_signal_ends_the_process_at_once(tmp_path, sent, code, word, text, more):
     """
@@ -147,8 +145,6 @@ def test_the_process_hears_signals_before_anything_large_is_imported():
         "print(*sorted(heavy & (set(sys.modules) - before)))"
     )
     words = [sys.executable, "-S", "-c", code]
-    root = str(Path(__file__).parents[2])
-    answer = subprocess.run(
-        words, env={"PYTHONPATH": root}, capture_output=True, text=True, check=True
-    )
+    env = {"PYTHONPATH": str(Path(__file__).parents[2])}
+    answer = subprocess.run(words, env=env, capture_output=True, text=True, check=True)
     assert answer.stdout == "\n"

@@ -42,18 +42,14 @@ def test_it_is_drawn_and_written_for_paraview(table):
     assert mesh.cell_centers().points[:, 0].tolist() == pytest.approx([row.x for row in rows])
 
 
-def test_a_frame_on_the_command_line_overrides_frames_of_the_settings_file(
-    series, tmp_path, monkeypatch, ask
-):
+def test_a_frame_that_is_named_overrides_the_settings_file(series, tmp_path, monkeypatch, ask):
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "scanfab.toml", '[compute]\nframes = "0:2"\n')
     assert {row["frame"] for row in ask("map", series, *FAST, *GRID, "--frame", "3").rows} == {"3"}
 
 
-def test_a_run_that_was_stopped_goes_on_but_not_with_other_blocks(
-    series, table, tmp_path, monkeypatch, ask
-):
-    """In the middle of a frame, which has two rows."""
+def test_a_run_that_was_stopped_goes_on(series, table, tmp_path, monkeypatch, ask):
+    """In the middle of a frame, which has two rows; but not with other blocks."""
     output = tmp_path / "map.csv"
     with interrupted_at_row(monkeypatch, 4) as rows:
         ask("map", series, *FAST, *GRID, "-o", output, code=130)

@@ -165,20 +165,20 @@ def with_foreign_column(part: Path) -> None:
     part.write_text("\n".join([f"{first},mine", *(f"{line},1" for line in lines), ""]))
 
 
-@pytest.mark.parametrize(
-    ("number", "spoil", "said"),
-    [
-        (1, cut(-1), "expected 4 rows of frame 4"),
-        (1, cut(-4), "lacks frame 4"),
-        (1, lambda part: Path(f"{part}.manifest.json").unlink(), "there is no part_1.csv.manifest"),
-        (1, lambda part: part.rename(f"{part}.part"), "is not finished"),
-        (1, Path.unlink, "there is no such part"),
-        (0, with_foreign_column, "nothing here makes its columns mine"),
-        (0, told(5, "inputs", 0), "expected a manifest of scanfab compute"),
-        (0, told("gone.csv", "settings", "strain"), "the manifest cannot be used: strain"),
-        (2, told("0" * 64, "inputs", 1, "sha256"), "dump_100.txt has changed between the jobs"),
-    ],
-)
+SPOILT = [
+    (1, cut(-1), "expected 4 rows of frame 4"),
+    (1, cut(-4), "lacks frame 4"),
+    (1, lambda part: Path(f"{part}.manifest.json").unlink(), "there is no part_1.csv.manifest"),
+    (1, lambda part: part.rename(f"{part}.part"), "is not finished"),
+    (1, Path.unlink, "there is no such part"),
+    (0, with_foreign_column, "nothing here makes its columns mine"),
+    (0, told(5, "inputs", 0), "expected a manifest of scanfab compute"),
+    (0, told("gone.csv", "settings", "strain"), "the manifest cannot be used: strain"),
+    (2, told("0" * 64, "inputs", 1, "sha256"), "dump_100.txt has changed between the jobs"),
+]
+
+
+@pytest.mark.parametrize(("number", "spoil", "said"), SPOILT)
 def test_a_part_that_cannot_be_used_is_named(parts, refused, number, spoil, said):
     spoil(Path(parts[number]))
     message = refused(*parts)

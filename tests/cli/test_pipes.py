@@ -46,22 +46,22 @@ def test_a_dump_is_computed_and_compared_in_one_pipe(packed):
         assert told.startswith(("scanfab: warning: ", "scanfab: note: "))
 
 
-@pytest.mark.parametrize(
-    ("typed", "found"),
-    [
-        ("co", "plain,compute plain,compare plain,convert"),
-        ("compare --figure ev", "plain,evolution"), ("compute --strain ce", "plain,cell file,ce"),
-        ("compute --on-error ", "plain,stop plain,skip"),
-        ("inspect --format l", "plain,lammps plain,liggghts plain,lf-dem"),
-        ("calibrate --rv-shape c", "plain,cylinder file,c"),
-        ("compute --contacts g", "plain,geometric file,g"), ("compute --figure ro", "plain,rose"),
-        ("compute --directions le", "plain,lebedev:"),
-        ("compute --directions equal-angle:", "plain,equal-angle:"),
-        ("compare --summary --fields slope_o", "plain,slope_origin"),
-        ("compute --fields frame,alpha_c_axial_se", "plain,frame,alpha_c_axial_se"),
-        ("view --axis ", "plain,x plain,y plain,z"),
-    ],
-)  # fmt: skip
+TYPED = [
+    ("co", "plain,compute plain,compare plain,convert"),
+    ("compare --figure ev", "plain,evolution"), ("compute --strain ce", "plain,cell file,ce"),
+    ("compute --on-error ", "plain,stop plain,skip"),
+    ("inspect --format l", "plain,lammps plain,liggghts plain,lf-dem"),
+    ("calibrate --rv-shape c", "plain,cylinder file,c"),
+    ("compute --contacts g", "plain,geometric file,g"), ("compute --figure ro", "plain,rose"),
+    ("compute --directions le", "plain,lebedev:"),
+    ("compute --directions equal-angle:", "plain,equal-angle:"),
+    ("compare --summary --fields slope_o", "plain,slope_origin"),
+    ("compute --fields frame,alpha_c_axial_se", "plain,frame,alpha_c_axial_se"),
+    ("view --axis ", "plain,x plain,y plain,z"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("typed", "found"), TYPED)
 def test_commands_and_choices_are_completed(typed, found):
     complete = ShellComplete(cli, {}, "scanfab", "_SCANFAB_COMPLETE")
     *words, current = typed.split(" ")

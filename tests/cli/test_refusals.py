@@ -22,62 +22,62 @@ FILES = {
 DISCS = SAMPLE_DATA / "lammps_biaxial" / "discs.0.lammpstrj.gz"
 
 
-@pytest.mark.parametrize(
-    ("line", "code", "message"),
-    [
-        # words
-        ("compute cube --quiet --verbose", 2, "--quiet and --verbose contradict each other"),
-        ("compute one none", 2, "the sources have several settings files"),
-        ("computee", 2, "No such command 'computee'. Did you mean 'compute'?"),
-        ("nonsense", 2, "No such command 'nonsense'. Choose from compute, merge, compare, inspect"),
-        ("compute nowhere", 2, "nowhere: there is no such file, folder or glob"),
-        ("compute -", 2, "standard input needs --format"),
-        ("compute - . --format table", 2, "cannot be combined with other sources"),
-        ("compute cube --tolerence 1", 2, "No such option '--tolerence'"),
-        # values of options
-        ("compute cube --format nonsense", 2, "there is no reader called 'nonsense', only edem"),
-        ("compute cube --cell 1 2", 2, "--cell: expected three lengths"),
-        ("compute cube --columns radius", 2, "--columns: expected NAME=COLUMN"),
-        ("compute cube --follow-for -1", 2, "--follow-for"),
-        ("compute cube cube/dump_0.txt --follow", 2, "--follow takes one folder, or one file"),
-        ("compute cube --rv -1 -o out.csv", 2, "--rv: expected a fraction above 0"),
-        ("map cube --slices 2 --frame 1", 2, "--frame: there is no frame 1: cube has 1, counted"),
-        ("map cube --slices 2 --frame 0 --frames 0", 2, "--frame"),
-        ("map cube --grid 2,2", 2, "three numbers of blocks, such as 4,4,8, found '2,2'"),
-        ("view cube --rv -1 --screenshot x.png", 2, "rv: expected a fraction above 0"),
-        # files to be written
-        ("compute cube -o table.docx", 2, "results can be written as .csv"),
-        ("merge out.csv -o merged.doc", 2, "results can be written as .csv"),
-        ("compute cube --fields frame,alpha_v", 2, "no column 'alpha_v': did you mean alpha_vs?"),
-        ("compute cube --resume", 2, "--resume needs -o FILE"),
-        ("compute cube --vtk v --scheduler tcp://x:1", 2, "--vtk cannot be used with --scheduler"),
-        ("compute cube --scheduler x --scheduler-file f", 2, "--scheduler"),
-        ("compute cube --vtk out.csv/vtk", 2, "out.csv/vtk"),
-        ("compute cube --figure rose", 2, "--figure goes with --plot FILE"),
-        ("compute cube --plot x.docx", 2, "figures can be written as .png, .svg, .pdf, not as"),
-        ("compute cube --plot x.png --figure pie", 2, "--figure: expected evolution"),
-        ("compute cube other --plot x.png --figure rose", 2, "draws one series"),
-        ("compare out.csv --summary --differences", 2, "print different tables"),
-        ("compare nowhere.csv", 2, "nowhere.csv"),
-        ("compare head.csv -o out.csv", 1, "the tables hold no frames"),
-        ("compare head.csv --summary --no-paper-line", 2, "goes with --plot FILE"),
-        ("compare letters.csv -o out.csv", 1, "there is no column source, frame"),
-        ("compare row.csv --differences", 1, "hold no two variants of one frame"),
-        ("compare map.csv", 1, "a table of scanfab map, which scanfab report shows"),
-        ("compare row.csv --variants ab", 1, "expected variants of the tables, c, found 'ab'"),
-        ("compare row.csv --variants x", 2, "--variants: expected letters out of abcd, found 'x'"),
-        ("view cube --screenshot x.jpg", 2, "screenshots are PNG files"),
-        # what does not fit the sample
-        ("compute notes", 1, "no reader knows this format"),
-        ("compute cube --spacing 50 -o out.csv", 1, "spacing: expected a length from"),
-        ("calibrate one", 1, "variant c has no void fabric at any cut-off"),
-        ("calibrate none", 1, "no frame has grains, so there is nothing to calibrate"),
-        ("view cube --screenshot x.png --frame 9", 1, "there is no frame 9"),
-        # what is of space, of discs
-        ("compute {DISCS} --axis 0,1,1", 2, "--axis: the axis (0, 0.7071, 0.7071) leads out of"),
-        ("map {DISCS}", 2, "a map needs spheres, but all grains are discs"),
-    ],
-)
+LINES = [
+    # words
+    ("compute cube --quiet --verbose", 2, "--quiet and --verbose contradict each other"),
+    ("compute one none", 2, "the sources have several settings files"),
+    ("computee", 2, "No such command 'computee'. Did you mean 'compute'?"),
+    ("nonsense", 2, "No such command 'nonsense'. Choose from compute, merge, compare, inspect"),
+    ("compute nowhere", 2, "nowhere: there is no such file, folder or glob"),
+    ("compute -", 2, "standard input needs --format"),
+    ("compute - . --format table", 2, "cannot be combined with other sources"),
+    ("compute cube --tolerence 1", 2, "No such option '--tolerence'"),
+    # values of options
+    ("compute cube --format nonsense", 2, "there is no reader called 'nonsense', only edem"),
+    ("compute cube --cell 1 2", 2, "--cell: expected three lengths"),
+    ("compute cube --columns radius", 2, "--columns: expected NAME=COLUMN"),
+    ("compute cube --follow-for -1", 2, "--follow-for"),
+    ("compute cube cube/dump_0.txt --follow", 2, "--follow takes one folder, or one file"),
+    ("compute cube --rv -1 -o out.csv", 2, "--rv: expected a fraction above 0"),
+    ("map cube --slices 2 --frame 1", 2, "--frame: there is no frame 1: cube has 1, counted"),
+    ("map cube --slices 2 --frame 0 --frames 0", 2, "--frame"),
+    ("map cube --grid 2,2", 2, "three numbers of blocks, such as 4,4,8, found '2,2'"),
+    ("view cube --rv -1 --screenshot x.png", 2, "rv: expected a fraction above 0"),
+    # files to be written
+    ("compute cube -o table.docx", 2, "results can be written as .csv"),
+    ("merge out.csv -o merged.doc", 2, "results can be written as .csv"),
+    ("compute cube --fields frame,alpha_v", 2, "no column 'alpha_v': did you mean alpha_vs?"),
+    ("compute cube --resume", 2, "--resume needs -o FILE"),
+    ("compute cube --vtk v --scheduler tcp://x:1", 2, "--vtk cannot be used with --scheduler"),
+    ("compute cube --scheduler x --scheduler-file f", 2, "--scheduler"),
+    ("compute cube --vtk out.csv/vtk", 2, "out.csv/vtk"),
+    ("compute cube --figure rose", 2, "--figure goes with --plot FILE"),
+    ("compute cube --plot x.docx", 2, "figures can be written as .png, .svg, .pdf, not as"),
+    ("compute cube --plot x.png --figure pie", 2, "--figure: expected evolution"),
+    ("compute cube other --plot x.png --figure rose", 2, "draws one series"),
+    ("compare out.csv --summary --differences", 2, "print different tables"),
+    ("compare nowhere.csv", 2, "nowhere.csv"),
+    ("compare head.csv -o out.csv", 1, "the tables hold no frames"),
+    ("compare head.csv --summary --no-paper-line", 2, "goes with --plot FILE"),
+    ("compare letters.csv -o out.csv", 1, "there is no column source, frame"),
+    ("compare row.csv --differences", 1, "hold no two variants of one frame"),
+    ("compare map.csv", 1, "a table of scanfab map, which scanfab report shows"),
+    ("compare row.csv --variants ab", 1, "expected variants of the tables, c, found 'ab'"),
+    ("compare row.csv --variants x", 2, "--variants: expected letters out of abcd, found 'x'"),
+    ("view cube --screenshot x.jpg", 2, "screenshots are PNG files"),
+    # what does not fit the sample
+    ("compute notes", 1, "no reader knows this format"),
+    ("compute cube --spacing 50 -o out.csv", 1, "spacing: expected a length from"),
+    ("calibrate one", 1, "variant c has no void fabric at any cut-off"),
+    ("calibrate none", 1, "no frame has grains, so there is nothing to calibrate"),
+    ("view cube --screenshot x.png --frame 9", 1, "there is no frame 9"),
+    # what is of space, of discs
+    ("compute {DISCS} --axis 0,1,1", 2, "--axis: the axis (0, 0.7071, 0.7071) leads out of"),
+    ("map {DISCS}", 2, "a map needs spheres, but all grains are discs"),
+]
+
+
+@pytest.mark.parametrize(("line", "code", "message"), LINES)
 def test_one_message_and_nothing_else(tmp_path, monkeypatch, ask, line, code, message):
     """Nor is any file touched, such as a result of earlier days."""
     monkeypatch.chdir(tmp_path)

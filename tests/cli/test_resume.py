@@ -112,15 +112,15 @@ def test_a_run_that_is_killed(dumps, compute, is_whole):
     assert is_whole("t.csv", *words)
 
 
-@pytest.mark.parametrize(
-    ("suffix", "row", "words"),
-    [
-        (".csv", 6, ("--rv-shape", "box", "--rv-follows", "strain", "--strain", "grains")),
-        # equal cut-offs too: every frame has as many rows as were asked for
-        (".json", 15, ("--cutoffs", "0.2rmin,0.05,0.2rmin", "--seed", "3")),
-        (".parquet", 8, ("--rv", "0.5,0.7")),
-    ],
-)
+INTERRUPTED = [
+    (".csv", 6, ("--rv-shape", "box", "--rv-follows", "strain", "--strain", "grains")),
+    # equal cut-offs too: every frame has as many rows as were asked for
+    (".json", 15, ("--cutoffs", "0.2rmin,0.05,0.2rmin", "--seed", "3")),
+    (".parquet", 8, ("--rv", "0.5,0.7")),
+]
+
+
+@pytest.mark.parametrize(("suffix", "row", "words"), INTERRUPTED)
 def test_an_interrupted_run_is_gone_on_with(stop, last_frame, resumes, suffix, row, words):
     """And frames that come later are added to the complete table."""
     table, told = f"table{suffix}", "after 2 of 4 frames; the same command with --resume goes on\n"
@@ -209,10 +209,10 @@ def test_dumps_behind_the_rows_of_a_part_may_change(dumps, stop, resumes):
 # a complete FILE
 
 
-@pytest.mark.parametrize(
-    ("first", "then", "every", "computed"),
-    [(":", ":1", ":", 0), ("-1:", "-2:", "-2:", 1), ("::2", "1", "0:3", 1)],
-)
+JOINED = [(":", ":1", ":", 0), ("-1:", "-2:", "-2:", 1), ("::2", "1", "0:3", 1)]
+
+
+@pytest.mark.parametrize(("first", "then", "every", "computed"), JOINED)
 def test_other_frames_join_those_of_the_table(compute, is_whole, first, then, every, computed):
     """No frame of the table is lost."""
     assert compute("table.csv", f"--frames={first}")[0] == 0
@@ -369,10 +369,10 @@ def test_a_surface_that_has_changed_is_refused(begun, is_refused):
     assert is_refused(left, "box.ply has changed since", *words)
 
 
-@pytest.mark.parametrize(
-    ("option", "header", "row"),
-    [("--strain", "step,strain", "0.1"), ("--cell", "step,lx,ly,lz", "4,4,4")],
-)
+NUMBERS = [("--strain", "step,strain", "0.1"), ("--cell", "step,lx,ly,lz", "4,4,4")]
+
+
+@pytest.mark.parametrize(("option", "header", "row"), NUMBERS)
 def test_numbers_of_the_frames_may_only_get_more_lines(
     begun, compute, last_frame, is_refused, is_whole, option, header, row
 ):

@@ -7,17 +7,14 @@ import subprocess
 import sys
 import tomllib
 import zipfile
-from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 import scanfab
-from tests.cli.conftest import Answer
 from tests.helpers.truth import SAMPLE_DATA
 
-Ask = Callable[..., Answer]
 ROOT = SAMPLE_DATA.parent
 sys.path.append(str(ROOT / "docs" / "make"))
 figures = import_module("figures")
@@ -68,7 +65,7 @@ def test_an_installed_wheel_copies_its_samples(wheel: zipfile.ZipFile, tmp_path:
     assert copied == {name: data for name, data in own.items() if name in shipped}
 
 
-def test_a_checkout_copies_all_its_samples(ask: Ask, tmp_path: Path) -> None:
+def test_a_checkout_copies_all_its_samples(ask, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     for name in ("new", "empty"):
         answer = ask("sample-data", tmp_path / name)
@@ -79,9 +76,7 @@ def test_a_checkout_copies_all_its_samples(ask: Ask, tmp_path: Path) -> None:
     assert len(scanfab.read_series(tmp_path / "quiet" / "liggghts_periodic")) == 5
 
 
-def test_a_folder_that_cannot_be_filled_is_refused_and_kept(
-    ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_that_cannot_be_filled_is_refused_and_kept(ask, tmp_path, monkeypatch) -> None:
     (tmp_path / "mine.txt").write_text("mine")
     (tmp_path / "empty").mkdir()
     for name, words in (
@@ -99,9 +94,7 @@ def test_a_folder_that_cannot_be_filled_is_refused_and_kept(
     assert {path.name for path in tmp_path.iterdir()} == {"mine.txt", "empty"}
 
 
-def test_an_installation_without_samples_says_so(
-    ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_installation_without_samples_says_so(ask, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(scanfab, "__file__", str(tmp_path / "scanfab" / "__init__.py"))
     told = ask("sample-data", tmp_path / "new", code=1).told
     assert told.endswith("the samples are missing: install scanfab again")

@@ -73,15 +73,15 @@ def drawn(path):
     return np.asarray(Image.open(path).convert("RGB")).astype(int)
 
 
+VIEWS = [
+    f"{SAMPLE} --boundary mask=3 --frame -1 --cut",
+    # an RV that follows the cell
+    "sample_data/lammps_shear --frame 5 --rv-shape cylinder --axis 1,1,2 --rv-follows strain",
+]
+
+
 @needs_drawing
-@pytest.mark.parametrize(
-    "words",
-    [
-        f"{SAMPLE} --boundary mask=3 --frame -1 --cut",
-        # an RV that follows the cell
-        "sample_data/lammps_shear --frame 5 --rv-shape cylinder --axis 1,1,2 --rv-follows strain",
-    ],
-)
+@pytest.mark.parametrize("words", VIEWS)
 def test_the_sample_fills_the_picture_and_its_rv_is_seen(view, words):
     source, *words = words.split()
     picture = view(ROOT / source, *words)
@@ -124,15 +124,15 @@ def scenes(monkeypatch):
     return found
 
 
+TITLES = [
+    ((SAMPLE, "--boundary", "mask=3", "--frame", "-1"), "frame 6, axial strain 15 %"),
+    (("sample_data/lammps_shear", "--frame", "5"), "frame 5, shear strain {shear} %"),
+    (("sample_data/liggghts_periodic",), "frame 0, axial strain 0 %"),
+]
+
+
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
-@pytest.mark.parametrize(
-    ("words", "title"),
-    [
-        ((SAMPLE, "--boundary", "mask=3", "--frame", "-1"), "frame 6, axial strain 15 %"),
-        (("sample_data/lammps_shear", "--frame", "5"), "frame 5, shear strain {shear} %"),
-        (("sample_data/liggghts_periodic",), "frame 0, axial strain 0 %"),
-    ],
-)
+@pytest.mark.parametrize(("words", "title"), TITLES)
 def test_the_title_names_the_frame_and_its_strain(view, monkeypatch, scenes, words, title):
     monkeypatch.chdir(ROOT)
     view(*words)
@@ -171,15 +171,15 @@ def test_damaged_frames_before_the_one_asked_for_are_skipped(tmp_path, scenes, a
 NO_LIBRARY = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkOSOpenGLRenderWindow", "LD_LIBRARY_PATH": ""}
 
 
+WITHOUT_SCREEN = [
+    ([], {}, "write a picture instead: --screenshot FILE.png"),
+    # a kind of window that needs a library which is not there
+    (["--screenshot", "x.png"], NO_LIBRARY, "apt-get install"),
+]
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems always have a screen")
-@pytest.mark.parametrize(
-    ("words", "env", "message"),
-    [
-        ([], {}, "write a picture instead: --screenshot FILE.png"),
-        # a kind of window that needs a library which is not there
-        (["--screenshot", "x.png"], NO_LIBRARY, "apt-get install"),
-    ],
-)
+@pytest.mark.parametrize(("words", "env", "message"), WITHOUT_SCREEN)
 def test_where_nothing_can_be_drawn_view_says_what_to_do(series, tmp_path, words, env, message):
     env = {**os.environ, **env}
     for screen in ("DISPLAY", "WAYLAND_DISPLAY"):

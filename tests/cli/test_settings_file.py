@@ -16,22 +16,20 @@ def series(tmp_path):
     return tmp_path
 
 
-@pytest.mark.parametrize(
-    ("text", "words", "variants", "grains"),
-    [
-        ('variants = "a"', (), "a", "64"),
-        ('variants = "a"', ("--variants", "abcd"), "abcd", "64"),
-        ('variants = "a"\nboundary = "id>=63"', (), "a", "62"),
-        ('variants = "a"\nboundary = ["id=63", "id=64"]', (), "a", "62"),
-        ('variants = "c"\nrv = 0.5\ncell = [4, 4, 4]', (), "c", "8"),
-        ('variants = "c"\nrv-radius = 1.0\nrv-center = [2, 2, 2]', (), "c", "8"),
-        ('variants = "ac"\nrv = [0.5, 0.7]', (), "acc", "64"),
-        ('variants = "a"\ncutoffs = ["0.2rmin", "0.3rmin"]', (), "aa", "64"),
-    ],
-)
-def test_options_are_those_of_the_file_but_for_those_of_the_line(
-    series, ask, text, words, variants, grains
-):
+TAKEN = [
+    ('variants = "a"', (), "a", "64"),
+    ('variants = "a"', ("--variants", "abcd"), "abcd", "64"),
+    ('variants = "a"\nboundary = "id>=63"', (), "a", "62"),
+    ('variants = "a"\nboundary = ["id=63", "id=64"]', (), "a", "62"),
+    ('variants = "c"\nrv = 0.5\ncell = [4, 4, 4]', (), "c", "8"),
+    ('variants = "c"\nrv-radius = 1.0\nrv-center = [2, 2, 2]', (), "c", "8"),
+    ('variants = "ac"\nrv = [0.5, 0.7]', (), "acc", "64"),
+    ('variants = "a"\ncutoffs = ["0.2rmin", "0.3rmin"]', (), "aa", "64"),
+]
+
+
+@pytest.mark.parametrize(("text", "words", "variants", "grains"), TAKEN)
+def test_options_of_the_line_come_before_the_file(series, ask, text, words, variants, grains):
     write(series / "scanfab.toml", f"[compute]\n{FAST}{text}\n")
     for source in (series, series / "dump_0.txt"):
         answer = ask("compute", source, *words)
@@ -60,25 +58,25 @@ def test_a_file_is_looked_for_beside_the_settings_file_first(
     assert ask("compute", series).rows[0]["strain"] == "0.5"
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("[view]\ncolour = 1", "'view' is not known: put options into the section [compute]"),
-        ("rv = 0.6\n[compute]", "'rv' is not known"),
-        ('[compute]\nvariant = "a"', "'variant' cannot be set in a settings file: did you mean"),
-        ("[compute]\nresume = true", "'resume' cannot be set"),
-        ("[compute", "Expected"),
-        ("[compute]\nrv = 0.6\nboundary = mask=3", "Invalid value (at line 3"),
-        ("[compute]\ncutoff = 1rmin # one", "text needs quotes"),
-        ("[compute]\nrv-center = [1, 2]", "rv-center: expected three finite numbers"),
-        ("[compute]\nrv-center = [[1, 2], 2, 3]", "rv-center: expected numbers or text in quo"),
-        ("[compute]\nrv = false", "rv: expected numbers or text in quotes"),
-        ("[compute]\nframes = 2020-01-01", "frames: expected numbers or text"),
-        ('[compute]\nseed = "many"', "seed: expected 0 or more, found 'many'"),
-        ('[compute]\nrv-axis = "x"', "rv-axis Usage"),
-        ('[compute]\nrv-axis = "x"', "--rv-axis: has no meaning if --rv-shape is sphere"),
-    ],
-)
+MEANINGLESS = [
+    ("[view]\ncolour = 1", "'view' is not known: put options into the section [compute]"),
+    ("rv = 0.6\n[compute]", "'rv' is not known"),
+    ('[compute]\nvariant = "a"', "'variant' cannot be set in a settings file: did you mean"),
+    ("[compute]\nresume = true", "'resume' cannot be set"),
+    ("[compute", "Expected"),
+    ("[compute]\nrv = 0.6\nboundary = mask=3", "Invalid value (at line 3"),
+    ("[compute]\ncutoff = 1rmin # one", "text needs quotes"),
+    ("[compute]\nrv-center = [1, 2]", "rv-center: expected three finite numbers"),
+    ("[compute]\nrv-center = [[1, 2], 2, 3]", "rv-center: expected numbers or text in quo"),
+    ("[compute]\nrv = false", "rv: expected numbers or text in quotes"),
+    ("[compute]\nframes = 2020-01-01", "frames: expected numbers or text"),
+    ('[compute]\nseed = "many"', "seed: expected 0 or more, found 'many'"),
+    ('[compute]\nrv-axis = "x"', "rv-axis Usage"),
+    ('[compute]\nrv-axis = "x"', "--rv-axis: has no meaning if --rv-shape is sphere"),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), MEANINGLESS)
 def test_what_has_no_meaning_is_refused_with_the_name_of_the_file(series, ask, text, message):
     write(series / "scanfab.toml", f"{text}\n")
     told = ask("compute", series, code=2).told

@@ -44,18 +44,18 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize(
-    ("words", "code", "message"),
-    [
-        ("compute pipe", 1, "pipe: is a pipe, expected a file: to read what a program writes from"),
-        ("compute dump.txt --contacts pip*", 1, "is a pipe, expected a file"),
-        ("compute dump.txt --strain pipe", 2, "or a CSV file that exists"),
-        ("compute /dev/zero", 1, "error: /dev/zero: is a device, expected a file"),
-        ("compute socket", 1, "error: socket: is a socket, expected a file"),
-        ("compare pipe", 1, "pipe: is a pipe, expected a table: to read what a program writes"),
-        ("compare /dev/zero", 1, "/dev/zero: is a device, expected a table"),
-    ],
-)
+NO_FILES = [
+    ("compute pipe", 1, "pipe: is a pipe, expected a file: to read what a program writes from"),
+    ("compute dump.txt --contacts pip*", 1, "is a pipe, expected a file"),
+    ("compute dump.txt --strain pipe", 2, "or a CSV file that exists"),
+    ("compute /dev/zero", 1, "error: /dev/zero: is a device, expected a file"),
+    ("compute socket", 1, "error: socket: is a socket, expected a file"),
+    ("compare pipe", 1, "pipe: is a pipe, expected a table: to read what a program writes"),
+    ("compare /dev/zero", 1, "/dev/zero: is a device, expected a table"),
+]
+
+
+@pytest.mark.parametrize(("words", "code", "message"), NO_FILES)
 def test_what_is_no_file_is_refused(folder, ask, words, code, message):
     with socket.socket(socket.AF_UNIX) as one:
         one.bind("socket")

@@ -132,16 +132,16 @@ def test_known_harmonics_come_back_whatever_the_density_of_contacts(density):
         assert abs(one.axial - value) < max(5 * one.axial_se, 0.01)
 
 
-@pytest.mark.parametrize(
-    ("normals", "size"),
-    [
-        (np.zeros((0, 3)), np.zeros(0)),
-        # none that are pressed
-        (np.array([[1.0, 0, 0], [0, 1, 0]]), np.array([-1.0, -2.0])),
-        # a direction about which there are so few that 1 + n·C·n is below 0
-        (np.array([[1.0, 0, 0]] * 30 + [[0, 0, 1.0]]), np.ones(31)),
-    ],
-)
+NO_FABRIC = [
+    (np.zeros((0, 3)), np.zeros(0)),
+    # none that are pressed
+    (np.array([[1.0, 0, 0], [0, 1, 0]]), np.array([-1.0, -2.0])),
+    # a direction about which there are so few that 1 + n·C·n is below 0
+    (np.array([[1.0, 0, 0]] * 30 + [[0, 0, 1.0]]), np.ones(31)),
+]
+
+
+@pytest.mark.parametrize(("normals", "size"), NO_FABRIC)
 def test_contacts_that_have_no_force_fabric(normals, size):
     assert directional_mean(normals, size, Z) is None
 

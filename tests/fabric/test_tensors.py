@@ -108,15 +108,15 @@ def even(n):
     return 1.0 + 0.3 * z**2 - 0.2 * x * y + 0.1 * x**2 * z**2 + 0.05 * z**6 + 0.04 * x**4 * y**2
 
 
-@pytest.mark.parametrize(
-    "rule",
-    [
-        direction_rule("lebedev:17"),
-        direction_rule("product:13"),
-        direction_rule("fibonacci:200"),
-        plane_rule(20, Space(2)),
-    ],
-)
+EXACT = [
+    direction_rule("lebedev:17"),
+    direction_rule("product:13"),
+    direction_rule("fibonacci:200"),
+    plane_rule(20, Space(2)),
+]
+
+
+@pytest.mark.parametrize("rule", EXACT)
 def test_even_polynomials_of_degree_six_come_back(rule):
     axes, weights = rule.axes, np.random.default_rng(0).uniform(1, 2, len(rule))
     function = fit_even(axes, even(axes), weights, rule.space)
@@ -126,15 +126,15 @@ def test_even_polynomials_of_degree_six_come_back(rule):
     assert function(-points) == pytest.approx(function(points), abs=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("axes", "degree"),
-    [
-        (direction_rule("design:9").axes, 4),
-        (direction_rule("lebedev:3").axes, 0),
-        # the corners of an icosahedron, as many as there are even terms of degree 2
-        (direction_rule("icosahedral:9").axes[:6], 2),
-    ],
-)
+FEW = [
+    (direction_rule("design:9").axes, 4),
+    (direction_rule("lebedev:3").axes, 0),
+    # the corners of an icosahedron, as many as there are even terms of degree 2
+    (direction_rule("icosahedral:9").axes[:6], 2),
+]
+
+
+@pytest.mark.parametrize(("axes", "degree"), FEW)
 def test_few_directions_take_a_low_degree(axes, degree):
     assert fit_even(axes, np.ones(len(axes)), np.ones(len(axes))).degree == degree
 

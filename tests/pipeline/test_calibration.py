@@ -110,16 +110,16 @@ def test_an_rv_within_another_differs_from_it_by_less_than_two_samples_do():
 LEAVE_OUT = "leave out `cutoffs`, `moment`, `frames` and all but one `rv`"
 
 
-@pytest.mark.parametrize(
-    ("options", "told"),
-    [
-        ({"frame": -2}, "frame: there is no frame -2: .* has 1 frame, 0"),
-        ({"moment": 2}, LEAVE_OUT),
-        ({"cutoffs": "0.1,0.2"}, LEAVE_OUT), ({"rv": (0.5, 0.6)}, LEAVE_OUT),
-        ({"frames": ":1"}, LEAVE_OUT),
-        ({"tolerence": 0.02}, "Settings has no option 'tolerence': .*'tolerance'"),
-    ],
-)  # fmt: skip
+REFUSED = [
+    ({"frame": -2}, "frame: there is no frame -2: .* has 1 frame, 0"),
+    ({"moment": 2}, LEAVE_OUT),
+    ({"cutoffs": "0.1,0.2"}, LEAVE_OUT), ({"rv": (0.5, 0.6)}, LEAVE_OUT),
+    ({"frames": ":1"}, LEAVE_OUT),
+    ({"tolerence": 0.02}, "Settings has no option 'tolerence': .*'tolerance'"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("options", "told"), REFUSED)
 def test_what_cannot_be_calibrated_is_refused(packing, options, told):
     with pytest.raises((TypeError, SettingsError), match=told):
         calibrate(packing, **{**QUICK, **options})

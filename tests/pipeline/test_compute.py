@@ -141,16 +141,16 @@ def test_lengths_come_from_the_reference_frame(bed, tmp_path, reference):
     assert usual[0].cutoff == pytest.approx(whole.cutoff / 1.02**2)
 
 
-@pytest.mark.parametrize(
-    ("reference", "error", "words"),
-    [
-        (4, NoReferenceError, "reference: there is no frame 4: .*bed has 4 frames"),
-        (-5, NoReferenceError, "reference: there is no frame -5"),
-        (0, NoReferenceError, "reference: frame 0 of .*bed has no grains"),
-        (2, ReadError, "dump_200.txt"),
-        ("last", SettingsError, "reference: expected the number of a frame, .*found 'last'"),
-    ],
-)
+NO_REFERENCES = [
+    (4, NoReferenceError, "reference: there is no frame 4: .*bed has 4 frames"),
+    (-5, NoReferenceError, "reference: there is no frame -5"),
+    (0, NoReferenceError, "reference: frame 0 of .*bed has no grains"),
+    (2, ReadError, "dump_200.txt"),
+    ("last", SettingsError, "reference: expected the number of a frame, .*found 'last'"),
+]
+
+
+@pytest.mark.parametrize(("reference", "error", "words"), NO_REFERENCES)
 def test_a_frame_that_cannot_be_the_reference_is_an_error(bed, reference, error, words):
     (bed / "dump_200.txt").write_text((bed / "dump_200.txt").read_text()[:-40])
     with pytest.raises(error, match=words):

@@ -9,7 +9,6 @@ from tests.helpers.lattices import ball_points
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* leave the sample")
 FIXED = {"spacing": "0.3rmin", "directions": "lebedev:5", "workers": 1, "cutoff": "0.5rmin"}
-ALONE = {**FIXED, "variants": "ac"}
 FRACTIONS = (0.4, 0.55, 0.7)
 
 
@@ -23,10 +22,13 @@ def columns(table, *names):
     return [[row.get(name) for name in names] for row in table]
 
 
+def by_rules(packing, **options):
+    words = {**FIXED, "variants": "ac", **options}
+    return [compute(packing, edge=edge, **words) for edge in ("clip", "start", "ends")]
+
+
 def test_rows_say_by_which_rule_they_are(ball):
-    clip, start, ends = (
-        compute(ball, edge=edge, rv=0.35, **ALONE) for edge in ("clip", "start", "ends")
-    )
+    clip, start, ends = by_rules(ball, rv=0.35)
     assert list(clip.names) == list(scanfab.COLUMNS)
     assert [name for name in start.names if name not in scanfab.COLUMNS] == ["edge", "left_out"]
     assert [row.edge for row in start] == ["clip", "start"]
@@ -44,9 +46,7 @@ def test_periodic_wholes_have_no_edge():
     random = np.random.default_rng(1)
     cell = Cell([6.0, 6.0, 6.0])
     packing = Packing(6 * random.random((150, 3)), np.full(150, 0.6), cell=cell)
-    clip, start, ends = (
-        compute(packing, edge=edge, rv=0.8, **ALONE) for edge in ("clip", "start", "ends")
-    )
+    clip, start, ends = by_rules(packing, rv=0.8)
     for table in (start, ends):
         assert table[0].edge is None
         assert table[0].mean_length == clip[0].mean_length
@@ -72,18 +72,17 @@ def without_rv(row):
     return {name: value for name, value in row.items() if name != "rv"}
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"edge": "start", "variants": "c"},
-        {"edge": "ends", "variants": "c"},
-        {"rv_shape": "cylinder", "rv_axis": "x"},
-        {"cutoffs": "0,0.5rmin,1rmin"},
-        {"moment": 2},
-        {"rv_center": (0.5, 0.0, -0.5), "rv_follows": "strain", "strain": "grains"},
-    ],
-    ids=str,
-)
+RULES = [
+    {"edge": "start", "variants": "c"},
+    {"edge": "ends", "variants": "c"},
+    {"rv_shape": "cylinder", "rv_axis": "x"},
+    {"cutoffs": "0,0.5rmin,1rmin"},
+    {"moment": 2},
+    {"rv_center": (0.5, 0.0, -0.5), "rv_follows": "strain", "strain": "grains"},
+]
+
+
+@pytest.mark.parametrize("options", RULES)
 def test_each_is_what_it_is_alone_along_the_same_lines(ball, options):
     words = {"variants": "cd", **FIXED, **options}
     several = compute(ball, rv=FRACTIONS, **words)

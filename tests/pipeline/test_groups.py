@@ -47,13 +47,13 @@ def test_without_forces_their_columns_are_an_error_and_stress_is_empty_with_one_
         assert known <= {"void_ratio", "coordination_mechanical", "volumetric_strain"}
 
 
-@pytest.mark.parametrize(
-    ("force", "told", "empty"),
-    [
-        (lambda one: {"force_n": one.force_n}, "normal part of", ("ft", "stress")),
-        (lambda one: {"force": -one.force}, "the mean normal force is tension", ("fn", "ft")),
-    ],
-)
+POOR_FORCES = [
+    (lambda one: {"force_n": one.force_n}, "normal part of", ("ft", "stress")),
+    (lambda one: {"force": -one.force}, "the mean normal force is tension", ("fn", "ft")),
+]
+
+
+@pytest.mark.parametrize(("force", "told", "empty"), POOR_FORCES)
 def test_forces_that_do_not_suffice_leave_columns_empty(yade, force, told, empty):
     contacts = yade.contacts
     packing = yade.with_contacts(ContactList(contacts.pairs, contacts.image, **force(contacts)))

@@ -133,17 +133,17 @@ def assert_same(live: scanfab.Packing, file: scanfab.Packing) -> None:
         np.testing.assert_array_equal(live.bodies.head, file.bodies.head)
 
 
+DUMPS = [
+    "liggghts_periodic/dump_30000.txt.gz",
+    "liggghts_clumps/dump_40000.txt.gz",
+    "liggghts_box/dump_40000.txt.gz",
+    "lammps_shear/shear.80000.lammpstrj.gz",
+    "lammps_biaxial/discs.20000.lammpstrj.gz",
+]
+
+
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabNote")
-@pytest.mark.parametrize(
-    "name",
-    [
-        "liggghts_periodic/dump_30000.txt.gz",
-        "liggghts_clumps/dump_40000.txt.gz",
-        "liggghts_box/dump_40000.txt.gz",
-        "lammps_shear/shear.80000.lammpstrj.gz",
-        "lammps_biaxial/discs.20000.lammpstrj.gz",
-    ],
-)
+@pytest.mark.parametrize("name", DUMPS)
 def test_the_data_of_ovito_are_those_of_the_file(name: str) -> None:
     live = scanfab.from_ovito(ovito(name).compute())
     file = scanfab.read(SAMPLE_DATA / name, contacts="geometric")

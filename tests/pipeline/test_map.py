@@ -187,19 +187,19 @@ def test_blocks_of_later_frames_and_of_frames_without_grains():
     assert (table[0].alpha_vs_axial is None, table[3].alpha_vs_axial is None) == (True, False)
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({}, "exactly one of `grid`, `slices` and `shells`, found none"),
-        ({"shells": 2.5}, "shells: expected 1 or more"),
-        ({"slices": 2, "cutoffs": "0,1"}, "cutoffs: a map has one cut-off"),
-        ({"slices": 2, "rv": "0.4,0.6"}, "rv: expected one size, .* found 2"),
-        ({"slices": 2, "with_": "state"}, "with_: a map has no further columns, found state"),
-        ({"slice": 3}, "no option 'slice': did you mean 'slices'"),
-        ({"grid": (20, 1, 1)}, r"grid: makes blocks 0.45 thick.*choose fewer"),
-        ({"slices": 2, "axis": (1, 0, 1)}, "45 degrees off the axis"),
-    ],
-)
+REFUSED = [
+    ({}, "exactly one of `grid`, `slices` and `shells`, found none"),
+    ({"shells": 2.5}, "shells: expected 1 or more"),
+    ({"slices": 2, "cutoffs": "0,1"}, "cutoffs: a map has one cut-off"),
+    ({"slices": 2, "rv": "0.4,0.6"}, "rv: expected one size, .* found 2"),
+    ({"slices": 2, "with_": "state"}, "with_: a map has no further columns, found state"),
+    ({"slice": 3}, "no option 'slice': did you mean 'slices'"),
+    ({"grid": (20, 1, 1)}, r"grid: makes blocks 0.45 thick.*choose fewer"),
+    ({"slices": 2, "axis": (1, 0, 1)}, "45 degrees off the axis"),
+]
+
+
+@pytest.mark.parametrize(("options", "message"), REFUSED)
 def test_what_is_no_map_is_refused(packing, options, message):
     with pytest.raises((TypeError, SettingsError), match=message):
         fabric_map(packing, **options)
@@ -228,17 +228,17 @@ CAPS = 6 * np.pi * (R[2] - 1) ** 2 * (R[2] - (R[2] - 1) / 3)
 IN_CUBE = np.diff([*(4 / 3 * np.pi * R**3 - [0, 0, CAPS]), 8.0])
 
 
+BLOCKS = [
+    ({"slices": 5}, "sphere", np.diff(3 * Z - Z**3)),
+    ({"grid": (2, 2, 2)}, "ellipsoid", np.ones(8)),
+    ({"grid": (3, 1, 1)}, "cylinder", ARCS),
+    ({"shells": 3}, "sphere", np.diff([0, 1, 8, 27])),
+    ({"shells": 3}, "box", IN_CUBE),
+]
+
+
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
-@pytest.mark.parametrize(
-    ("kind", "shape", "volumes"),
-    [
-        ({"slices": 5}, "sphere", np.diff(3 * Z - Z**3)),
-        ({"grid": (2, 2, 2)}, "ellipsoid", np.ones(8)),
-        ({"grid": (3, 1, 1)}, "cylinder", ARCS),
-        ({"shells": 3}, "sphere", np.diff([0, 1, 8, 27])),
-        ({"shells": 3}, "box", IN_CUBE),
-    ],
-)
+@pytest.mark.parametrize(("kind", "shape", "volumes"), BLOCKS)
 def test_the_solid_in_all_blocks_of_an_rv_is_what_is_in_the_rv(packing, kind, shape, volumes):
     words = {"variants": "c", "rv": 0.8, "rv_shape": shape, "spacing": 0.1}
     words["directions"] = "lebedev:11"

@@ -29,18 +29,18 @@ def series_of(tmp_path, *heights, **options):
     return scanfab.read_series(tmp_path, **options)
 
 
+FRAMES = [
+    ([[0.5] * 10], "auto", XY), ([[0.5] * 9], "auto", SPACE),
+    ([[0.5] * 9], 2, XY), ([[0.5] * 10], 3, SPACE),
+    # the first frame that has grains decides for all, whichever is read first
+    ([[], [0.5] * 12, [0.7] * 2], "auto", XY),
+    ([[0.5] * 16, [*[0.5] * 15, 0.6]], "auto", r"dump.1: .*z = 0.5 and at z = 0.6: `dim=3`"),
+    ([[*[0.5] * 15, 0.6]], 2, "do not lie in one coordinate plane"),
+]  # fmt: skip
+
+
 @pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
-@pytest.mark.parametrize(
-    ("heights", "dim", "found"),
-    [
-        ([[0.5] * 10], "auto", XY), ([[0.5] * 9], "auto", SPACE),
-        ([[0.5] * 9], 2, XY), ([[0.5] * 10], 3, SPACE),
-        # the first frame that has grains decides for all, whichever is read first
-        ([[], [0.5] * 12, [0.7] * 2], "auto", XY),
-        ([[0.5] * 16, [*[0.5] * 15, 0.6]], "auto", r"dump.1: .*z = 0.5 and at z = 0.6: `dim=3`"),
-        ([[*[0.5] * 15, 0.6]], 2, "do not lie in one coordinate plane"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("heights", "dim", "found"), FRAMES)
 def test_the_first_frame_decides(tmp_path, heights, dim, found):
     series = series_of(tmp_path, *heights, dim=dim)
     if isinstance(found, str):
@@ -83,16 +83,16 @@ def test_the_period_across_the_plane_is_ignored(discs):
     assert others == [one, one]
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"axis": "z"}, "axis: the axis z leads out of the plane x-y.*choose x, y"),
-        ({"rv_shape": "cylinder"}, "rv_shape: cylinder is no window for discs"),
-        ({"rv_shape": "box", "rv_size": "1,2,3"}, "rv_size: expected two, A,B, full edges"),
-        ({"directions": "lebedev:11"}, "directions: lebedev:11 is a rule for three dim.*as 16"),
-        ({"rv_center": (7, 7, 3)}, "rv_center: lies outside the plane x-y.*z = 0, found 3"),
-    ],
-)
+MEANINGLESS = [
+    ({"axis": "z"}, "axis: the axis z leads out of the plane x-y.*choose x, y"),
+    ({"rv_shape": "cylinder"}, "rv_shape: cylinder is no window for discs"),
+    ({"rv_shape": "box", "rv_size": "1,2,3"}, "rv_size: expected two, A,B, full edges"),
+    ({"directions": "lebedev:11"}, "directions: lebedev:11 is a rule for three dim.*as 16"),
+    ({"rv_center": (7, 7, 3)}, "rv_center: lies outside the plane x-y.*z = 0, found 3"),
+]
+
+
+@pytest.mark.parametrize(("options", "message"), MEANINGLESS)
 def test_what_has_no_meaning_in_a_plane_is_an_error(discs, options, message):
     with pytest.raises(SettingsError, match=message):
         compute(Packing(*discs), **FAST, **options)

@@ -47,9 +47,10 @@ def test_a_periodic_lattice():
     assert state.coordination_mechanical == 6
 
 
-@pytest.mark.parametrize(
-    "shape", [sphere(2.3), box((3.1, 3.7, 4.3)), cylinder(2.0, 3.0, (0.0, 0.0, 1.0))]
-)
+SHAPES = [sphere(2.3), box((3.1, 3.7, 4.3)), cylinder(2.0, 3.0, (0.0, 0.0, 1.0))]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
 def test_in_the_mean_of_its_places_an_rv_has_the_stress_of_the_whole(shape):
     rng = np.random.default_rng(1)
     packing = cubic()
@@ -236,16 +237,16 @@ def test_stress_and_strong_and_weak_contacts_are_those_of_yade():
     np.testing.assert_allclose(state_of(exported).stress, expected, rtol=0, atol=2.0)
 
 
+WRITTEN = [
+    # its box has six digits
+    ("liggghts.1.txt.gz", "liggghts_contacts.1.txt.gz", 3e-6),
+    ("yade.xml.bz2", None, 1e-11),
+    ("yade-spheres-00000000.vtk.gz", "yade-intrs-00000000.vtk.gz", 1e-5),
+]
+
+
 @pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning", "ignore::scanfab.ScanfabNote")
-@pytest.mark.parametrize(
-    ("grains", "contacts", "tolerance"),
-    [
-        # its box has six digits
-        ("liggghts.1.txt.gz", "liggghts_contacts.1.txt.gz", 3e-6),
-        ("yade.xml.bz2", None, 1e-11),
-        ("yade-spheres-00000000.vtk.gz", "yade-intrs-00000000.vtk.gz", 1e-5),
-    ],
-)
+@pytest.mark.parametrize(("grains", "contacts", "tolerance"), WRITTEN)
 def test_one_state_written_by_each_program_has_the_same_tensors(grains, contacts, tolerance):
     columns = (
         "id1=c_ids[1],id2=c_ids[2],fx=c_pair[2],fy=c_pair[3],fz=c_pair[4],"

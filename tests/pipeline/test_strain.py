@@ -38,47 +38,43 @@ def strain(periodic=None, boundary="type=2", **options):
     return compute(frames, boundary=boundary, **SCAN, **options)["strain"][1]
 
 
-@pytest.mark.parametrize(
-    ("periodic", "options", "expected"),
-    [
-        (ALL, {}, 0.3), (ALL, {"axis": "y"}, 0.4), (TWO, {}, 0.2), (NONE, {"strain": "cell"}, 0.3),
-        (ALL, {"strain": "boundary"}, 0.2), (NONE, {"axis": OBLIQUE}, 0.2), (None, {}, 0.2),
-        (None, {"strain": "grains"}, 0.1), (None, {"boundary": ()}, np.nan),
-    ],
-)  # fmt: skip
+STRAINS = [
+    (ALL, {}, 0.3), (ALL, {"axis": "y"}, 0.4), (TWO, {}, 0.2), (NONE, {"strain": "cell"}, 0.3),
+    (ALL, {"strain": "boundary"}, 0.2), (NONE, {"axis": OBLIQUE}, 0.2), (None, {}, 0.2),
+    (None, {"strain": "grains"}, 0.1), (None, {"boundary": ()}, np.nan),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("periodic", "options", "expected"), STRAINS)
 def test_strain_is_by_the_cell_that_repeats_else_by_the_boundary(periodic, options, expected):
     """A cell by its diagonal entry, particles by the extent of their centres along the axis."""
     assert strain(periodic, **options) == pytest.approx(expected, nan_ok=True)
 
 
-@pytest.mark.parametrize(
-    ("periodic", "options", "message"),
-    [
-        (None, {"strain": "cell"}, "the dump has no cell"),
-        (ALL, {"strain": "cell", "axis": OBLIQUE}, "the axis is not x, y or z"),
-        (
-            None,
-            {"strain": "boundary", "boundary": ()},
-            "no boundary particles: name them",
-        ),
-    ],
-)
+NOT_THERE = [
+    (None, {"strain": "cell"}, "the dump has no cell"),
+    (ALL, {"strain": "cell", "axis": OBLIQUE}, "the axis is not x, y or z"),
+    (None, {"strain": "boundary", "boundary": ()}, "no boundary particles: name them"),
+]
+
+
+@pytest.mark.parametrize(("periodic", "options", "message"), NOT_THERE)
 def test_what_is_not_there_cannot_be_measured(periodic, options, message):
     asked = f"strain: {options['strain']} was asked for.*{message}"
     with pytest.raises(SettingsError, match=asked):
         strain(periodic, **options)
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("step,strain\n0,0.0\n1000,0.05\n", [0.0, 0.05, np.nan]),
-        ("frame,strain\n0,0.0\n1,0.05\n", [0.0, 0.05, np.nan]),
-        # steps come before frames
-        ("frame,step,strain\n0,1000,0.25\n", [np.nan, 0.25, np.nan]),
-        ("\ufeff stress , step , strain \r\n 5 , 1e3 , 0.5 \r\n", [np.nan, 0.5, np.nan]),
-    ],
-)
+FILES = [
+    ("step,strain\n0,0.0\n1000,0.05\n", [0.0, 0.05, np.nan]),
+    ("frame,strain\n0,0.0\n1,0.05\n", [0.0, 0.05, np.nan]),
+    # steps come before frames
+    ("frame,step,strain\n0,1000,0.25\n", [np.nan, 0.25, np.nan]),
+    ("\ufeff stress , step , strain \r\n 5 , 1e3 , 0.5 \r\n", [np.nan, 0.5, np.nan]),
+]
+
+
+@pytest.mark.parametrize(("text", "expected"), FILES)
 def test_a_file_names_strains_by_step_or_frame(tmp_path, recwarn, text, expected):
     frames = [frame(1.0, 1.0, step=step) for step in (0, 1000, None)]
     file = write(tmp_path / "s.csv", text)
@@ -92,15 +88,15 @@ def test_a_file_names_strains_by_step_or_frame(tmp_path, recwarn, text, expected
 WRONG = ["10,high", ",0.1", "10", "10.7,0.1", "1e999,0.1", "10,0.\0", f"10,{'9' * 140_000}"]
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "expected a table"),
-        *((f"{names}\n1,2\n", "expected the columns step or frame, and strain")
-          for names in ("step,epsilon", "time,strain")),
-        *((f"step,strain\n0,0\n{row}\n", "line 3: expected") for row in WRONG),
-    ],
-)  # fmt: skip
+NO_STRAINS = [
+    ("", "expected a table"),
+    *((f"{names}\n1,2\n", "expected the columns step or frame, and strain")
+      for names in ("step,epsilon", "time,strain")),
+    *((f"step,strain\n0,0\n{row}\n", "line 3: expected") for row in WRONG),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "message"), NO_STRAINS)
 def test_a_file_that_is_no_table_of_strains_is_an_error_by_its_line(tmp_path, text, message):
     file = write(tmp_path / "s.csv", text)
     with pytest.raises(ReadError, match=rf"s\.csv(, |: ){message}.{{,100}}"):
@@ -152,9 +148,10 @@ def tilted_series(folder, tilts, edge=4.0):
     return scanfab.read_series(write(folder / "dump.txt", "".join(texts)))
 
 
-@pytest.mark.parametrize(
-    ("frames", "told"), [(":", "2 and 3"), ("::-1", "2 and 3"), ("1::2", "1 and 3"), (":3", None)]
-)
+FLIPS = [(":", "2 and 3"), ("::-1", "2 and 3"), ("1::2", "1 and 3"), (":3", None)]
+
+
+@pytest.mark.parametrize(("frames", "told"), FLIPS)
 def test_a_cell_that_is_flipped_under_way_is_a_warning(tmp_path, recwarn, frames, told):
     series = tilted_series(tmp_path, [0.0, 0.2, 0.45, -0.35, -0.2])
     compute(series, **SCAN, frames=frames, workers=2)

@@ -28,10 +28,10 @@ def repeated():
     return cube(cell=Cell([6.0] * 3))
 
 
-@pytest.mark.parametrize(
-    ("options", "tolerance"),
-    [({}, 4e-4), ({"directions": 30}, 4e-4), ({"spacing": "0.4rmin"}, 2e-3)],
-)
+AUTO = [({}, 4e-4), ({"directions": 30}, 4e-4), ({"spacing": "0.4rmin"}, 2e-3)]
+
+
+@pytest.mark.parametrize(("options", "tolerance"), AUTO)
 def test_auto_scan_meets_the_tolerance_for_every_variant(packing, options, tolerance):
     table = compute(packing, tolerance=tolerance, **options)
     assert len(table) == 4
@@ -63,17 +63,19 @@ def test_auto_directions_takes_more_axes_and_keeps_spacing_and_replicates(packin
     assert fine.spacing == coarse.spacing == pytest.approx(0.2)
 
 
-def test_scan_stops_before_it_cuts_more_chords_than_allowed(packing):
-    """Of 216 grains in a window; a chord is where a line meets a grain."""
-    cut = []
-    for most in (1e5, 1e6):
-        with pytest.warns(ScanfabWarning, match="tolerance is 1e-06: .* stopped.*`max_chords`"):
-            row = compute(packing, tolerance=1e-6, variants="a", max_chords=most)[0]
-        chords = np.pi * np.sum(packing.radius**2) / row.spacing**2 * row.directions
-        cut.append(chords)
-        assert 0.5 * most < chords <= 1.1 * most
-        assert row.alpha_vs_axial_se > 1e-6
-    assert cut[0] < cut[1]
+BUDGETS = [("packing", "a", 1e5, 0.5), ("packing", "a", 1e6, 0.5)]
+BUDGETS += [("repeated", variants, 1e6, 0.1) for variants in ("a", "abcd")]
+
+
+@pytest.mark.parametrize(("sample", "variants", "most", "least"), BUDGETS)
+def test_scan_stops_before_it_cuts_more_chords_than_allowed(request, sample, variants, most, least):
+    """Of 216 grains in a window, or periodic; a chord is where a line meets a grain."""
+    source = request.getfixturevalue(sample)
+    with pytest.warns(ScanfabWarning, match="tolerance is 1e-06: .* stopped.*`max_chords`"):
+        row = compute(source, tolerance=1e-6, variants=variants, max_chords=most)[0]
+    chords = np.pi * np.sum(source.radius**2) / row.spacing**2 * row.directions
+    assert least * most < chords <= 1.1 * most
+    assert row.alpha_vs_axial_se > 1e-6
 
 
 @pytest.mark.parametrize("variants", ["b", "ac"])
@@ -87,11 +89,7 @@ def test_periodic_whole_takes_about_as_many_lines_as_the_open_one(packing, repea
 
 
 @pytest.mark.parametrize("variants", ["a", "abcd"])
-def test_budget_holds_for_periodic_packings_too(repeated, variants):
-    with pytest.warns(ScanfabWarning, match="tolerance is 1e-06: .* stopped.*`max_chords`"):
-        row = compute(repeated, tolerance=1e-6, variants=variants, max_chords=1e6)[0]
-    chords = np.pi * np.sum(repeated.radius**2) / row.spacing**2 * row.directions
-    assert 0.1e6 < chords <= 1.1e6
+def test_a_budget_for_too_few_lines_is_refused(repeated, variants):
     with pytest.raises(SettingsError, match=r"max_chords: expected at least .*, found 10000"):
         compute(repeated, spacing=0.02, variants=variants, max_chords=1e4)
     told = "max_chords: expected at least 256, .* found 100: choose fewer `directions`"
@@ -247,20 +245,16 @@ def test_spacing_wider_than_the_sample_is_refused(packing, options):
         plan_of(packing, spacing=100.0, **options)
 
 
-@pytest.mark.parametrize(
-    ("options", "told", "values"),
-    [
-        # one replicate of few lines: no error, and some of its axes keep nothing
-        ({"spacing": 0.8, "directions": "lebedev:5", "cutoff": 0.1}, None, (True, False)),
-        ({"spacing": 0.9}, "variant c: in some direction no void segment is kept", (False, False)),
-        ({"spacing": 0.2}, r"\d% of the directions keep no void segment in a rep", (True, True)),
-        (
-            {"spacing": 0.8, "cutoff": 1000.0},
-            "no void segment reaches .*did you mean 1rmin?",
-            (False, False),
-        ),
-    ],
-)
+FEW_LINES = [
+    # one replicate of few lines: no error, and some of its axes keep nothing
+    ({"spacing": 0.8, "directions": "lebedev:5", "cutoff": 0.1}, None, (True, False)),
+    ({"spacing": 0.9}, "variant c: in some direction no void segment is kept", (False, False)),
+    ({"spacing": 0.2}, r"\d% of the directions keep no void segment in a rep", (True, True)),
+    ({"spacing": 0.8, "cutoff": 1e3}, "segment reaches .*did you mean 1rmin?", (False, False)),
+]
+
+
+@pytest.mark.parametrize(("options", "told", "values"), FEW_LINES)
 def test_few_lines_give_less_and_are_told(packing, options, told, values):
     words = {"directions": "lebedev:17", "cutoff": 1.5, "variants": "c", **options}
     with pytest.warns(ScanfabWarning, match=told) if told else nullcontext():
