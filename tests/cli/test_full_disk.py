@@ -17,10 +17,9 @@ from scanfab.cli.main import run
 from scanfab.io.writer import installed_writers
 from scanfab.testing import made_up_packings
 from tests.helpers.dumps import cubic_rows, dump_text, write
-from tests.helpers.interruptions import PROGRAM
+from tests.helpers.interruptions import FAST, PROGRAM
 
 resource = pytest.importorskip("resource", reason="limits of a process are POSIX")
-FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac"]
 
 
 @pytest.fixture

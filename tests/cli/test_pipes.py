@@ -14,9 +14,7 @@ from click.shell_completion import ShellComplete
 
 from scanfab.cli.group import cli
 from tests.helpers.dumps import cubic_rows, dump_text, write
-from tests.helpers.interruptions import PROGRAM
-
-FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac"]
+from tests.helpers.interruptions import FAST, PROGRAM
 
 
 @pytest.fixture

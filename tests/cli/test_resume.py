@@ -19,11 +19,9 @@ from scanfab.pipeline.frame import compute_frame
 from scanfab.pipeline.record import read_manifest
 from scanfab.table.formats import Json
 from tests.helpers.dumps import pairs_text, write
-from tests.helpers.interruptions import PROGRAM, interrupted_at_row
+from tests.helpers.interruptions import FAST, PROGRAM, interrupted_at_row
 from tests.helpers.truth import SAMPLE_DATA
 from tests.helpers.windows import corners_of_a_box, surface
-
-FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")
 
 
 @pytest.fixture

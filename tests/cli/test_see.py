@@ -18,9 +18,7 @@ from scanfab.viz.window3d import check_drawing
 from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.figures import save_rows
-from tests.helpers.interruptions import PROGRAM
-
-FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac"]
+from tests.helpers.interruptions import FAST, PROGRAM
 
 
 def test_a_resumed_run_draws_all_frames_and_keeps_their_files(series, tmp_path, ask):

@@ -9,14 +9,13 @@ import subprocess
 import pytest
 
 from tests.helpers.dumps import cubic_rows, dump_text, write
-from tests.helpers.interruptions import PROGRAM
+from tests.helpers.interruptions import FAST, PROGRAM
 
 pytestmark = [
     pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes"),
     # of the alarm, where the code waits
     pytest.mark.filterwarnings("error"),
 ]
-FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac"]
 
 
 @pytest.fixture(autouse=True)

@@ -8,9 +8,8 @@ import pytest
 import scanfab
 from scanfab import Column, ScanfabError, ScanfabWarning
 from scanfab.table import columns
-from scanfab.table.columns import COLUMNS, row_of, table_columns
-from scanfab.table.formats import OWN_FORMATS, read_rows
-from scanfab.table.writing import write_rows
+from scanfab.table.columns import COLUMNS
+from scanfab.table.formats import read_rows
 from tests.helpers.lattices import simple_cubic
 from tests.helpers.plugins import offer
 
@@ -50,15 +49,6 @@ def test_its_columns_are_computed_and_stand_behind_the_own_ones():
     assert all(re.search(r"_(without|half)_[1-8]$", name) for name in parts)
     assert table[0].c_fourth == pytest.approx(1.0)
     assert table[0].vs_longest > table[0].mean_length > 0
-
-
-@pytest.mark.usefixtures("cubic")
-def test_its_columns_are_written_and_read_back(tmp_path):
-    values = dict.fromkeys(COLUMNS) | {"source": "", "frame": 0, "c_fourth": 0.5}
-    values["vs_longest"] = None
-    for suffix in [one.suffix for one in OWN_FORMATS]:
-        write_rows(tmp_path / f"t{suffix}", [row_of(table_columns(), values)], table_columns())
-        assert read_rows(tmp_path / f"t{suffix}") == [values]
 
 
 class Foreign:

@@ -17,6 +17,8 @@ from tests.helpers.dumps import cubic_rows, dump_text, write
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
 PROGRAM = [sys.executable, "-c", "from scanfab.cli.main import main; main()"]
+# a rough scan of small frames
+FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")
 FRAMES = 30
 
 

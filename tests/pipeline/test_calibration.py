@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from scanfab import Packing, ScanfabWarning, SettingsError, calibrate, compute, find_contacts
 from scanfab.base.column import columns_of_fields
 from scanfab.pipeline.calibration import StepRow, first_steady, judged
-from tests.helpers.lattices import shaken_cubic, simple_cubic
+from tests.helpers.lattices import shaken_cubic
 
 QUICK = {"tolerance": 2e-3, "variants": "cd", "rv": 0.6, "workers": 1}
 
@@ -21,7 +21,8 @@ def packing():
 
 @pytest.fixture(scope="module")
 def found(packing):
-    return calibrate(packing, **QUICK)
+    """Of the last one of a stream."""
+    return calibrate(iter([packing, packing]), **QUICK)
 
 
 def ladder(found, name, variant="c"):
@@ -31,6 +32,7 @@ def ladder(found, name, variant="c"):
 def test_ladders_go_from_coarse_to_fine(found):
     values = {name: [row.value for row in ladder(found, name)] for name in ("spacing", "cutoff")}
     assert values == {"spacing": [4, 2, 1, 0.5, 0.2, 0.1], "cutoff": [k / 4 for k in range(13)]}
+    assert {row.frame for row in found.rows} == {1}
     directions = ladder(found, "directions")
     assert [row.value for row in directions] == [row.directions for row in directions]
     assert [row.degree for row in directions] == [5, 9, 11, 17, 23, 31, 41]
@@ -168,11 +170,3 @@ def test_one_ladder_is_drawn_on_the_axes_that_it_gets(found):
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["variant c", "variant d"]
     with pytest.raises(SettingsError, match=r"ladder: expected spacing, .* found 'lines'"):
         found.plot.calibration(ax=ax, ladder="lines")
-
-
-def test_packings_from_anywhere_are_calibrated():
-    packing = Packing(simple_cubic(4).position, 0.5)
-    options = {"variants": "c", "tolerance": 0.1, "rv": 0.6, "contact_tolerance": 1e-4}
-    found = calibrate(iter([packing, packing]), **options)
-    assert {row.frame for row in found.rows} == {1}
-    assert found.options == calibrate(packing, **options).options

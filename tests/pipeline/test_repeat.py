@@ -114,15 +114,6 @@ def test_the_source_is_opened_as_it_was(monkeypatch):
             record.reopen(asked_for([source], {}, Settings()))
 
 
-@pytest.mark.parametrize("text", ["{", "[]", '{"settings": {}}', "\udcff"])
-def test_what_is_no_manifest_is_an_error(tmp_path, text):
-    assert read_manifest(tmp_path / "t.csv") is None
-    path = tmp_path / "t.csv.manifest.json"
-    path.write_bytes(text.encode("utf-8", "surrogateescape"))
-    with pytest.raises(ReadError, match=r"t\.csv\.manifest\.json: "):
-        read_manifest(tmp_path / "t.csv")
-
-
 ROWS = ("--directions", "9", "--spacing", "1rmin", "--cutoff", "0.2rmin", "--frames", "0")
 
 

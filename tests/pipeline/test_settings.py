@@ -16,7 +16,7 @@ from scanfab.pipeline.options import DECLARED, MEANINGS, OPTIONS, as_options, li
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import Length
 from scanfab.scan.directions import direction_rule
-from tests.helpers.dumps import write
+from tests.helpers.truth import SHEAR
 
 NAN, INF = float("nan"), float("inf")
 
@@ -97,7 +97,7 @@ UNUSABLE = [
     ("spacing", [0, "0rmin", "-1rmin"]), ("directions", [0, -5, "many"]),
     ("tolerance", [0, -1e-3, NAN, INF, "low"]), ("max_chords", [0, -1, "many", NAN]),
     ("moment", [0, 3, 1.5, "x"]), ("min_contacts", [-1, 1.5]),
-    ("contact_tolerance", [-1e-9, INF]), ("strain", ["volume", "nowhere.csv"]),
+    ("contact_tolerance", [-1e-9, INF]), ("strain", ["volume", "nowhere.csv", SHEAR]),
     ("seed", [-1, "x"]), ("workers", [0, -2]), ("boundary", ["type", None, 5]),
     ("axis", ["", "w", "Z", "1,2", "1,2,3,4", "0,0,0", "a,b,c", "nan,0,1", (1, 2)]),
     ("frames", ["", "a", "1:2:3:4", "1.5", "::0", "1,2", "all", 1.5]),
@@ -115,25 +115,10 @@ def test_a_value_that_cannot_be_used_is_an_error_with_its_name(option, values):
             Settings(**{option: value})
 
 
-@pytest.mark.parametrize("rule", ["fibonacci:2", "equal-angle-full:90"])
-def test_directions_in_one_plane_are_refused(rule):
-    for value in (rule, direction_rule(rule)):
-        with pytest.raises(SettingsError, match=f"directions: .* of {rule} lie in one plane"):
-            Settings(directions=value)
-
-
-def test_a_strain_file_must_exist(tmp_path):
-    path = write(tmp_path / "strain.csv", "step,strain\n0,0\n")
-    assert Settings(strain=path).strain == str(path)
-    for options, told in (
-        ({"strain": tmp_path}, "a CSV file that exists"),
-        ({"strain": path, "rv_follows": "strain"}, "rv_follows: a file of strains"),
-    ):
-        with pytest.raises(SettingsError, match=told):
-            Settings(**options)
-
-
 CONTRADICTIONS = [
+    ({"directions": "fibonacci:2"}, "directions: .* of fibonacci:2 lie in one plane"),
+    ({"directions": direction_rule("equal-angle-full:90")}, "directions: .* lie in one plane"),
+    ({"strain": SHEAR / "fabric.txt", "rv_follows": "strain"}, "rv_follows: a file of strains"),
     ({"min_force": 0.5}, "min_force: .* `rattlers=.force.`"),
     ({"edge": "ends", "moment": 2}, "moment: .* choose `edge=start`"),
     ({"rv_size": "1,2,3"}, "rv_size: the shape sphere takes no sizes: choose `rv_radius`"),

@@ -238,13 +238,6 @@ def test_bias_of_a_rule_counts_over_a_tenth_of_the_tolerance(packing, tolerance,
     assert any("isotropic" in note.text for note in notes) == warns
 
 
-@pytest.mark.parametrize("options", [{"variants": "a"}, {"variants": "cd", "directions": 20}])
-def test_spacing_wider_than_the_sample_is_refused(packing, options):
-    match = r"spacing: expected a length from .* found 100: .*1rmin \(0\.4"
-    with pytest.raises(SettingsError, match=match):
-        plan_of(packing, spacing=100.0, **options)
-
-
 FEW_LINES = [
     # one replicate of few lines: no error, and some of its axes keep nothing
     ({"spacing": 0.8, "directions": "lebedev:5", "cutoff": 0.1}, None, (True, False)),
