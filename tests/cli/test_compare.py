@@ -18,7 +18,6 @@ FRAMES = (
 )
 SUMMARY = "source variant frames slope slope_origin r2 slope_se peak peak_strain final"
 DIFFERENCES = "source frame strain variants difference difference_se"
-SUFFIXES = [one.suffix for one in OWN_FORMATS]
 
 
 @pytest.fixture
@@ -39,8 +38,8 @@ def test_columns_are_the_same_in_every_format(tmp_path, ask, table, words, colum
     assert list(printed.rows[0]) == columns.split()
     assert len(printed.rows) == count
     expected = read_rows(write(tmp_path / "printed.csv", printed.out))
-    for suffix in SUFFIXES:
-        output = tmp_path / f"out{suffix}"
+    for own in OWN_FORMATS:
+        output = tmp_path / f"out{own.suffix}"
         assert ask("compare", given, *words, "-o", output).out == ""
         assert read_rows(output) == expected
 

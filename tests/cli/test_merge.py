@@ -16,7 +16,6 @@ from scanfab.table.formats import OWN_FORMATS
 from tests.helpers.interruptions import write_series
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--workers", "1")
-SUFFIXES = [one.suffix for one in OWN_FORMATS]
 
 
 def compute(source: Path, output: Path, *words: str) -> str:
@@ -186,7 +185,7 @@ def test_a_part_that_cannot_be_used_is_named(parts, refused, number, spoil, said
     assert said in message
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("suffix", [one.suffix for one in OWN_FORMATS])
 def test_a_part_that_lost_its_end_is_named(series, tmp_path, suffix, refused):
     """Copied not quite to its end: the last number of a text would read well."""
     (part,) = as_parts(series, tmp_path, 1, "--variants", "a", suffix=suffix)

@@ -4,7 +4,6 @@ import os
 import re
 import subprocess
 import sys
-from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -42,16 +41,13 @@ def test_a_table_without_void_fabric_is_written_and_not_drawn(series, tmp_path, 
     assert "there is nothing to draw" in ask("compare", table, "--plot", plot, code=1).err
 
 
-def can_draw() -> bool:
-    with suppress(ScanfabError):
+@pytest.fixture
+def drawing():
+    """VTK, if it can draw here."""
+    try:
         check_drawing()
-        return True
-    return False
-
-
-needs_drawing = pytest.mark.skipif(
-    not can_draw(), reason="VTK cannot draw here (libegl1 or libosmesa6 is missing)"
-)
+    except ScanfabError as error:
+        pytest.skip(str(error))
 
 
 @pytest.fixture
@@ -78,7 +74,7 @@ VIEWS = [
 ]
 
 
-@needs_drawing
+@pytest.mark.usefixtures("drawing")
 @pytest.mark.parametrize("words", VIEWS)
 def test_the_sample_fills_the_picture_and_its_rv_is_seen(view, words):
     source, *words = words.split()
@@ -97,7 +93,7 @@ def test_the_sample_fills_the_picture_and_its_rv_is_seen(view, words):
     assert abs(across[0] + across[-1] - 1200) < 60
 
 
-@needs_drawing
+@pytest.mark.usefixtures("drawing")
 def test_words_and_scale_are_dark_on_white_and_within_the_picture(view, tmp_path):
     """Also the title of a long path; with two RVs."""
     dumps = tmp_path.joinpath(*["m" * 30] * 5)

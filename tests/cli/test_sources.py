@@ -2,6 +2,7 @@
 
 import gzip
 import json
+from types import SimpleNamespace
 
 import pytest
 
@@ -15,20 +16,13 @@ CASES = {
 }
 
 
-class Stdin:
-    """Bytes that another program has written."""
-
-    def __init__(self, buffer):
-        self.buffer = buffer
-
-
 @pytest.fixture
 def by_stdin(tmp_path, monkeypatch, ask):
     def told(data, *words, code=0):
         file = tmp_path / "stdin"
         file.write_bytes(data)
         with open(file, "rb") as stream:
-            monkeypatch.setattr("sys.stdin", Stdin(stream))
+            monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=stream))
             return ask(*words, "-", "--format", "table", code=code)
 
     return told
