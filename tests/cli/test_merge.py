@@ -72,7 +72,7 @@ def refused(tmp_path, capsys):
     return refused
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".json", ".parquet"])
+@pytest.mark.parametrize("suffix", [".json", ".parquet"])
 def test_the_bytes_are_those_of_one_run(series, tmp_path, suffix):
     """A job that no frame was left for has a table without rows."""
     words = ("--with", "harmonics", "--digits", "9")

@@ -1,12 +1,8 @@
 """The command line among other programs: pipes, streams, completion, and how fast it starts."""
 
-import csv
 import gzip
-import io
 import os
-import shlex
 import subprocess
-import sys
 import time
 
 import pytest
@@ -23,25 +19,6 @@ def packed(tmp_path):
     texts = [dump_text(cubic_rows(squeeze=1 - 0.02 * k), step=k) for k in range(3)]
     (tmp_path / "dump.gz").write_bytes(gzip.compress("".join(texts).encode()))
     return tmp_path / "dump.gz"
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="needs a POSIX shell")
-def test_a_dump_is_computed_and_compared_in_one_pipe(packed):
-    program = shlex.join(PROGRAM)
-    line = (
-        f"gzip -dc '{packed}' | {program} compute - --format liggghts {' '.join(FAST)} "
-        f"| {program} compare - --summary"
-    )
-    done = subprocess.run(["sh", "-c", line], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    rows = list(csv.DictReader(io.StringIO(done.stdout)))
-    assert [(row["source"], row["variant"], row["frames"]) for row in rows] == [
-        ("-", variant, "3") for variant in "ac"
-    ]
-    assert all(float(row["r2"]) <= 1 for row in rows)
-    # words go past the pipe
-    for told in done.stderr.splitlines():
-        assert told.startswith(("scanfab: warning: ", "scanfab: note: "))
 
 
 TYPED = [

@@ -65,8 +65,6 @@ for kind in ("periodic", "walls", "discs"):
     assert (live.wall_forces is not None) == (kind == "walls")
     if kind == "walls":
         assert live.wall_contacts.sum() == len(live.wall_forces.row) > 10
-        for one, two in zip(live.wall_forces, file.wall_forces):
-            np.testing.assert_array_equal(one, two)
     assert live.is_periodic == (kind == "periodic")
     assert live.space.is_plane == (kind == "discs")
 O.reset()
