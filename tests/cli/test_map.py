@@ -1,4 +1,4 @@
-"""scanfab map: its table, resume, ParaView files and figure."""
+"""Several parts of a sample: scanfab map with its files and figure, and tables of several RVs."""
 
 import pytest
 import pyvista
@@ -59,3 +59,25 @@ def test_a_run_that_was_stopped_goes_on(series, table, tmp_path, monkeypatch, as
     other = ("--grid", "1,2,1", "-o", output, "--resume")
     assert "grid" in ask("map", series, *FAST, *other, code=2).err
     assert output.read_bytes() == table.read_bytes()
+
+
+def test_several_rvs_are_told_apart(series, ask, tmp_path):
+    """In the table, in its comparison, and in files for ParaView."""
+    table, both = tmp_path / "table.csv", ("--variants", "ac", "--rv", "0.7,0.5")
+    ask("compute", series, *FAST, *both, "-o", table, "--vtk", tmp_path)
+    rows = ask("compare", table, "--summary").rows
+    assert list(rows[0])[-1] == "rv"
+    assert [(row["variant"], row["rv"]) for row in rows] == [("a", ""), ("c", "0.5"), ("c", "0.7")]
+    found = scanfab.load(table).compare()
+    # each as from a table of its own
+    for rv in (0.5, 0.7):
+        (alone,) = scanfab.load(table).select(rv=rv).compare().summary
+        assert alone in list(found.summary)
+    assert "variant c RV 0.5: slope" in repr(found)
+    pairs = {row.variants for row in found.differences}
+    assert pairs == {"a-c RV 0.5", "a-c RV 0.7", "c RV 0.5-c RV 0.7"}
+    names = {path.name.rpartition("_")[0] for path in tmp_path.glob("*.vtp")}
+    for kind in ("window", "lines-c", "distribution-c", "tensors-c"):
+        assert {f"{kind}-rv0.5", f"{kind}-rv0.7"} <= names
+        assert kind not in names
+    assert "lines-a" in names

@@ -51,6 +51,7 @@ def test_no_frames_at_all_are_an_error(shrinking):
     for source, frames, told in (
         (shrinking[1:1], ":", none),
         (shrinking[0].read(), "1:", none),
+        (iter([shrinking[0].read()]), "7:9", r"no frame in 7:9: .*has 1 frame, 0"),
         ([], ":", "expected frames, found none in the source"),
     ):
         with pytest.raises(SettingsError, match=told):
