@@ -10,6 +10,9 @@ import time
 from pathlib import Path
 
 import pytest
+from click.shell_completion import ShellComplete
+
+from scanfab.cli.group import cli
 
 ROOT = Path(__file__).parents[2]
 # what is typed before the Tab key, and what the shell makes of it: a command, an option, a word
@@ -67,3 +70,26 @@ def read_until(terminal: int, words: str) -> None:
     while words not in seen:
         assert select.select([terminal], [], [], end - time.monotonic())[0], (words, seen)
         seen += os.read(terminal, 4096).decode("utf-8", "replace")
+
+
+COMPLETED = [
+    ("co", "plain,compute plain,compare plain,convert"),
+    ("compare --figure ev", "plain,evolution"), ("compute --strain ce", "plain,cell file,ce"),
+    ("compute --on-error ", "plain,stop plain,skip"),
+    ("inspect --format l", "plain,lammps plain,liggghts plain,lf-dem"),
+    ("calibrate --rv-shape c", "plain,cylinder file,c"),
+    ("compute --contacts g", "plain,geometric file,g"), ("compute --figure ro", "plain,rose"),
+    ("compute --directions le", "plain,lebedev:"),
+    ("compute --directions equal-angle:", "plain,equal-angle:"),
+    ("compare --summary --fields slope_o", "plain,slope_origin"),
+    ("compute --fields frame,alpha_c_axial_se", "plain,frame,alpha_c_axial_se"),
+    ("view --axis ", "plain,x plain,y plain,z"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("typed", "found"), COMPLETED)
+def test_commands_and_choices_are_completed(typed, found):
+    complete = ShellComplete(cli, {}, "scanfab", "_SCANFAB_COMPLETE")
+    *words, current = typed.split(" ")
+    offered = complete.get_completions(words, current)
+    assert {f"{one.type},{one.value}" for one in offered} == set(found.split())
