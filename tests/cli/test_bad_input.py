@@ -5,20 +5,12 @@ import re
 import shlex
 import shutil
 import subprocess
-from functools import partial
 from pathlib import Path
 
 import pytest
 
 from tests.helpers.dumps import cubic_rows, dump_text, write
-from tests.helpers.interruptions import PROGRAM
-
-SCAN = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin")
-
-
-@pytest.fixture
-def compute(ask):
-    return partial(ask, "compute", *SCAN, "--variants", "ac")
+from tests.helpers.interruptions import FAST, PROGRAM
 
 
 def grains(folder: Path, rows=None, name="dump_0.txt", **options) -> Path:
@@ -34,35 +26,35 @@ def changed(column: int, value: object) -> list[list[object]]:
     return rows
 
 
-def test_a_broken_frame_can_be_skipped_also_the_first(tmp_path, compute):
+def test_a_broken_frame_can_be_skipped_also_the_first(tmp_path, ask):
     """Of three frames the second one has a radius of zero, then the first one, too."""
     for frame, rows in enumerate((cubic_rows(), changed(5, 0), cubic_rows())):
         grains(tmp_path, rows, name=f"dump_{frame}.txt", step=frame)
-    answer = compute(tmp_path, "--on-error", "skip", code=1)
+    answer = ask("compute", *FAST, tmp_path, "--on-error", "skip", code=1)
     assert [row["frame"] for row in answer.rows] == list("0022")
     assert f"frame 1 skipped: {tmp_path}/dump_1.txt: grain 7" in answer.err
     grains(tmp_path, changed(5, 0), step=0)
-    answer = compute(tmp_path, "--on-error", "skip", code=1)
+    answer = ask("compute", *FAST, tmp_path, "--on-error", "skip", code=1)
     assert {row["frame"] for row in answer.rows} == {"2"}
 
 
-def test_one_grain_far_away_is_too_far_for_the_whole_alone(tmp_path, compute, ask):
+def test_one_grain_far_away_is_too_far_for_the_whole_alone(tmp_path, ask):
     file = grains(tmp_path, changed(4, 4000.0))
-    assert "far away from all others" in compute(file, code=1).err
+    assert "far away from all others" in ask("compute", *FAST, file, code=1).err
     words = ("--directions", "9", "--spacing", "1rmin", "--variants", "c")
     found, near = (ask("compute", one, *words) for one in (file, grains(tmp_path, name="near.txt")))
     assert '--boundary "id=7"' in found.err
     assert found.rows[0]["grains"] == near.rows[0]["grains"]
 
 
-def test_an_rv_at_the_surface_is_a_warning(tmp_path, compute):
+def test_an_rv_at_the_surface_is_a_warning(tmp_path, ask):
     file, told = grains(tmp_path, cubic_rows(8)), "comes closer to the sample's surface than the"
     for rv, is_told in (("0.9", True), ("0.7", False)):
-        assert (told in compute(file, "--rv", rv).err) == is_told
+        assert (told in ask("compute", *FAST, file, "--rv", rv).err) == is_told
 
 
-def test_grains_that_are_removed_leave_no_void_fabric_and_no_solid(tmp_path, compute):
-    answer = compute(grains(tmp_path), "--min-contacts", "99", "--variants", "abd")
+def test_grains_that_are_removed_leave_no_void_fabric_and_no_solid(tmp_path, ask):
+    answer = ask("compute", *FAST, grains(tmp_path), "--min-contacts", "99", "--variants", "abd")
     whole, without, inside = answer.rows
     assert whole["alpha_vs"] != ""
     assert without["alpha_vs"] == without["coordination"] == without["alpha_c"] == ""
@@ -71,7 +63,7 @@ def test_grains_that_are_removed_leave_no_void_fabric_and_no_solid(tmp_path, com
     assert "nan" not in answer.out.lower()
     assert "variant b: no grain is left, all 64 are rattlers" in answer.err
     assert "variant d: no grain is left, all 33 that reach into the RV" in answer.err
-    alone = compute(grains(tmp_path, cubic_rows()[:1]), "--variants", "abc", code=1)
+    alone = ask("compute", *FAST, grains(tmp_path, cubic_rows()[:1]), "--variants", "abc", code=1)
     assert {row["alpha_vs"] for row in alone.rows} == {""}
     assert "nan" not in alone.out.lower()
 
@@ -84,13 +76,13 @@ FORBIDDEN = [
 
 
 @pytest.mark.parametrize(("where", "words"), FORBIDDEN)
-def test_what_nobody_may_read_or_write(tmp_path, compute, monkeypatch, where, words):
+def test_what_nobody_may_read_or_write(tmp_path, ask, monkeypatch, where, words):
     def forbidden(path, *_, **__):
         raise PermissionError(errno.EACCES, "Permission denied", str(path))
 
     grains(tmp_path)
     monkeypatch.setattr(where, forbidden, raising=False)
-    answer = compute(tmp_path, *(word.format(tmp_path) for word in words), code=1)
+    answer = ask("compute", *FAST, tmp_path, *(word.format(tmp_path) for word in words), code=1)
     assert answer.out == ""
     assert re.search(rf"error: {tmp_path}.*Permission denied", answer.err)
     assert not (tmp_path / "table.csv").exists()

@@ -12,11 +12,9 @@ import pytest
 from scanfab.base.errors import ReadError
 from scanfab.cli import group, main
 from scanfab.cli.signals import interrupted_words, telling
-from tests.helpers.interruptions import PROGRAM
-from tests.helpers.truth import TRIAXIAL
+from tests.helpers.interruptions import FAST, PROGRAM
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
-FAST = ["--directions", "9", "--spacing", "1rmin", "--boundary", "mask=3", "--variants", "a"]
 
 
 def test_version_is_the_package_s(ask) -> None:
@@ -41,8 +39,8 @@ def test_debug_shows_why(tmp_path: Path) -> None:
         main.run(["compute", str(tmp_path), "--debug"])
 
 
-def test_a_closed_pipe_ends_quietly() -> None:
-    command = [*PROGRAM, "compute", str(TRIAXIAL), *FAST]
+def test_a_closed_pipe_ends_quietly(series) -> None:
+    command = [*PROGRAM, "compute", str(series), *FAST]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen(command, text=True, **pipes) as process:
         assert process.stdout is not None

@@ -128,34 +128,26 @@ def test_second_moment_is_that_of_the_slow_twin():
     assert row.mean_length == pytest.approx((rule.weights @ over) / (rule.weights @ under))
 
 
-COUNT = 6
 SPACING, CUTOFF = 0.2, 0.45
 RULE = scanfab.direction_rule("lebedev:7")
-
-
-def grains_of(periodic=False):
-    spheres = shaken_cubic(np.random.default_rng(4), COUNT)
-    cell = Cell([COUNT] * 3) if periodic else None
-    kinds = {"type": np.where(spheres.position[:, 2] < 1, 2, 1)}
-    return scanfab.find_contacts(
-        Packing(spheres.position, spheres.radius, columns=kinds, cell=cell, step=30)
-    )
 
 
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 @pytest.mark.parametrize("periodic", [False, True])
 @pytest.mark.parametrize("variants", ["abcd", "b"])
 @pytest.mark.parametrize("lines", [{"spacing": SPACING}, {"tolerance": 2e-3}])
-def test_a_scan_by_hand_is_that_of_compute(periodic, variants, lines):
+def test_a_scan_by_hand_is_that_of_compute(packing, periodic, variants, lines):
     """An auto scan is that of all its replicates, numbered from 0: none is drawn twice."""
-    one = grains_of(periodic)
+    one = packing
+    if periodic:
+        one = find_contacts(Packing(packing.position, packing.radius, cell=Cell([6.0] * 3)))
     if variants == "abcd" and "tolerance" in lines:
         variants = "cd"  # in an auto scan, the whole sample has lines of its own
     table = scanfab.compute(
-        one, boundary="type=2", variants=variants, rv_radius=2.0, directions=RULE,
+        one, boundary="id<36", variants=variants, rv_radius=2.0, directions=RULE,
         cutoff=CUTOFF, seed=3, **lines,
     )  # fmt: skip
-    sample = Sample(one, one.columns["type"] == 2)
+    sample = Sample(one, one.id < 36)
     center = SurfaceBox.of(sample.packing, sample.gathered).center
     window = None if variants == "b" else scanfab.Window(center, scanfab.sphere(2.0))
     solids = scanfab.solids_of(sample, window, variants=variants)
