@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -16,7 +15,7 @@ import scanfab
 from scanfab.base.errors import ReadError, ScanfabWarning, SettingsError
 from scanfab.cli.main import run
 from tests.helpers.dumps import cubic_rows, dump_text, pairs_text
-from tests.helpers.growing import in_halves, meanwhile, sample_frames
+from tests.helpers.growing import in_halves, meanwhile, sample_frames, until
 from tests.helpers.interruptions import PROGRAM
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--workers", "1")
@@ -97,13 +96,6 @@ def test_one_file_that_grows(folder, series):
     texts = [path.read_bytes() for path in sorted(series.iterdir())]
     halves = [half for text in texts for half in (text[: len(text) // 2], text[len(text) // 2 :])]
     assert is_followed([partial(append, half) for half in halves], 5)
-
-
-def until(is_so: Callable[[], bool]) -> None:
-    end = time.monotonic() + 60
-    while not is_so():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def has_rows(frames: int) -> bool:

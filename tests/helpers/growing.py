@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-__all__ = ["in_halves", "meanwhile", "sample_frames"]
+__all__ = ["in_halves", "meanwhile", "sample_frames", "until"]
 
 SAMPLE = Path(__file__).parents[2] / "sample_data"
 
@@ -39,3 +39,11 @@ def meanwhile(steps: Iterable[Callable[[], object]]) -> threading.Thread:
     thread = threading.Thread(target=take, daemon=True)
     thread.start()
     return thread
+
+
+def until(is_so: Callable[[], object]) -> None:
+    """Wait until something is so, for a minute at most."""
+    end = time.monotonic() + 60
+    while not is_so():
+        assert time.monotonic() < end
+        time.sleep(0.01)

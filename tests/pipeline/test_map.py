@@ -135,13 +135,6 @@ def test_dilute_blocks_within_a_surface_have_no_solid_fraction():
         assert np.isnan(table["solid_fraction"]).tolist() == [is_empty] * 3
 
 
-def test_a_frame_of_discs_among_spheres_is_refused():
-    random = np.random.default_rng(0)
-    frames = [Packing(random.uniform(0, 10, (200, k)), 0.3) for k in (3, 2)]
-    with pytest.raises(scanfab.PackingError, match="frame 1: all its centres lie in the plane x-y"):
-        mapped(frames, slices=2)
-
-
 @pytest.mark.parametrize("edge", ["clip", "start", "ends"])
 def test_the_rv_and_its_rules(packing, edge):
     """The window's blocks hold what the window holds, by each rule at its surface."""

@@ -6,7 +6,6 @@ import signal
 import socket
 import sys
 import threading
-import time
 import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -24,7 +23,7 @@ from scanfab.cli.main import run
 from scanfab.pipeline import cluster as module
 from tests.helpers.dask_cluster import DaskCluster
 from tests.helpers.dumps import shaken_cubic
-from tests.helpers.growing import SAMPLE, meanwhile
+from tests.helpers.growing import SAMPLE, meanwhile, until
 from tests.helpers.interruptions import write_series
 
 FAST = ("--directions", "9", "--variants", "ac", "--spacing", "0.5rmin", "--cutoff", "0.2rmin")
@@ -48,7 +47,7 @@ def cluster(tmp_path_factory):
 @pytest.fixture
 def executor(cluster):
     with scanfab.dask_executor(cluster.address) as found:
-        wait_until(lambda: len(found.client.nthreads()) == 2)
+        until(lambda: len(found.client.nthreads()) == 2)
         yield found
 
 
@@ -74,13 +73,6 @@ def compute(*words: str, output: str = "t.csv") -> int:
     return run(["compute", *words, "-o", output])
 
 
-def wait_until(is_so: Callable[[], bool]) -> None:
-    end = time.monotonic() + 60
-    while not is_so():
-        assert time.monotonic() < end
-        time.sleep(0.01)
-
-
 @pytest.fixture
 def after_a_row():
     """Does something in another thread once the first row is there."""
@@ -88,7 +80,7 @@ def after_a_row():
 
     def after_a_row(act: Callable[[], object]) -> None:
         part = Path("t.csv.part")
-        there = partial(wait_until, lambda: part.exists() and part.stat().st_size > 0)
+        there = partial(until, lambda: part.exists() and part.stat().st_size > 0)
         threads.append(meanwhile([there, act]))
 
     yield after_a_row
