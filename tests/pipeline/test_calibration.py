@@ -73,7 +73,7 @@ def test_directions_of_discs_are_equal_angles(monkeypatch, most):
     (row,) = compute(discs, variants="c", workers=1, **found.options)
     assert found.options["directions"] == str(row.directions)
     assert row.directions <= most
-    assert (found.options["spacing"] == "0.1rmin") == (most > 12)
+    assert (found.options["spacing"] == "0.25rmin") == (most > 12)
     assert row.alpha_vs_axial_se <= 2e-3
 
 
