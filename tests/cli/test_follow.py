@@ -162,6 +162,23 @@ def test_a_broken_file_stops_it_or_is_skipped_and_a_last_one_left_out(folder, se
     assert Path("t.csv").read_bytes() == finished_run("--on-error", "skip")
 
 
+def test_strains_that_are_added_are_taken_and_a_cut_snapshot_is_told(folder, series, capsys):
+    files = sorted(series.iterdir())[:2]
+    strains = Path("strains.csv")
+    strains.write_text("step,strain\n0,0\n")
+    shutil.copy(files[0], folder)
+    steps = [
+        partial(until, partial(has_rows, 1)),
+        partial(strains.write_text, "step,strain\n0,0\n100,0.5\n"),
+        *copied(folder, files[1:]),
+    ]
+    assert is_followed(steps, 2, "--strain", "strains.csv", "--contacts", "geometric")
+    (folder / "all.txt").write_bytes(files[0].read_bytes() + files[1].read_bytes()[:200])
+    capsys.readouterr()
+    assert run(["compute", "dumps/all.txt", *FAST, "--follow-for", "0.3"]) == 0
+    assert "the last snapshot, number 2, is incomplete and is left out" in capsys.readouterr().err
+
+
 def test_a_folder_that_vanishes_is_named_and_nothing_is_lost(folder, series, capsys):
     files = sorted(series.iterdir())
     for path in files[:2]:

@@ -64,6 +64,7 @@ LINES = [
     ("compare map.csv", 1, "a table of scanfab map, which scanfab report shows"),
     ("compare row.csv --variants ab", 1, "expected variants of the tables, c, found 'ab'"),
     ("compare row.csv --variants x", 2, "--variants: expected letters out of abcd, found 'x'"),
+    ("convert cube - --to csv", 2, "nothing is written to standard output"),
     ("view cube --screenshot x.jpg", 2, "screenshots are PNG files"),
     # what does not fit the sample
     ("compute notes", 1, "no reader knows this format"),

@@ -18,7 +18,7 @@ from scanfab.cli.main import run
 from scanfab.pipeline.frame import compute_frame
 from scanfab.pipeline.record import read_manifest
 from scanfab.table.formats import Json
-from tests.helpers.dumps import pairs_text, write
+from tests.helpers.dumps import cubic_rows, dump_text, pairs_text, write
 from tests.helpers.interruptions import FAST, PROGRAM, interrupted_at_row
 from tests.helpers.truth import SAMPLE_DATA
 from tests.helpers.windows import corners_of_a_box, surface
@@ -158,6 +158,13 @@ def test_how_far_an_interrupted_run_is_is_told(dumps, stop, compute, monkeypatch
     (dumps / "dump_200.txt").write_text("ITEM: TIMESTEP\n")
     told = "stopped after 2 of 4 frames; the same command with --resume goes on\nscanfab: error: "
     assert compute("t.csv", "--workers", "1", told=told)[0] == 1
+    others = [(number + 100, *rest) for number, *rest in cubic_rows()]
+    write(dumps / "dump_200.txt", dump_text(others, step=200))
+    words = ("--boundary", "id<=8", "--strain", "boundary", "--workers", "1", "-o", "wrong.csv")
+    assert run(["compute", "dumps", *FAST, *words]) == 1
+    told = capsys.readouterr().err
+    assert "error: --strain: boundary was asked for" in told
+    assert "goes on" not in told
 
 
 def test_where_there_are_no_locks_runs_go_on(compute, monkeypatch):

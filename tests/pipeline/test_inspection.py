@@ -71,6 +71,8 @@ def test_options_that_do_not_exist_or_fit_are_refused_at_once(tmp_path):
             function(series, boundry="type=2")
         with pytest.raises(scanfab.SettingsError, match="boundary"):
             function(series, boundary="mask")
+    with pytest.raises(TypeError, match="option 'cell': it is an option of read_series"):
+        scanfab.compute(series, cell=(1, 1, 1))
 
 
 def test_samples_are_told_apart_by_the_options_of_compute(tmp_path):
@@ -134,9 +136,21 @@ def test_a_warning_comes_once_and_its_frames_in_the_end():
     words = [one for one in found if "no contact at all" in one]
     assert [one.partition(":")[0] for one in words] == ["frame 1", "frames 1 to 2, 4"]
     assert words[1] == "frames 1 to 2, 4: as in frame 1, no contact at all by geometry"
+    found = told([dense, gas], ScanfabWarning, cutoffs="50,60,70")
+    assert [one[:16] for one in found if "as in frame 0, no void" in one] == ["frames 0 to 1, v"]
     # nothing is said of a frame that nobody asked for
     found = told([gas, dense, dense], ScanfabWarning, frames="1:")
     assert not any("no contact" in one for one in found)
+
+
+def test_other_grains_that_fly_away_are_told_again():
+    frames = [bed(), bed(), bed()]
+    for number, frame in enumerate(frames):
+        place = frame.position.copy()
+        place[:number, 0] += 50.0
+        frames[number] = Packing(place, frame.radius)
+    found = [one for one in told(frames, ScanfabWarning) if "flown away" in one]
+    assert ['"id=0"' in found[0], '"id=0,1"' in found[1], len(found)] == [True, True, 2]
 
 
 def test_the_frames_are_told_too_if_the_run_is_stopped():

@@ -172,6 +172,17 @@ def test_blocks_of_later_frames_and_of_frames_without_grains():
     table, _ = mapped([empty, frames[0]], slices=2, contact_tolerance=0.2)
     assert table["grains"].tolist()[:2] == [0, 0]
     assert (table[0].alpha_vs_axial is None, table[3].alpha_vs_axial is None) == (True, False)
+    assert [row.z for row in table[:2]] == [row.z for row in table[2:]]
+
+
+def test_what_holds_for_one_frame_is_told_for_it():
+    """The blocks of an open sample stay, and each frame scatters in a way of its own."""
+    position, radius = simple_cubic(8)
+    frames = [Packing(one * position, 0.9 * radius, contacts=[[0, 1]]) for one in (1.0, 1.1)]
+    _, told = mapped(frames, grid=(2, 2, 2))
+    (outside,) = [one for one in told if "lie outside the blocks" in one]
+    edges = ((1.1 * position < position.min()) | (1.1 * position > position.max())).any(axis=1)
+    assert outside.startswith(f"frame 1, variant a: {edges.sum()} of 512 grains")
 
 
 REFUSED = [

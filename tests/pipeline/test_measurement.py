@@ -91,6 +91,9 @@ def test_cut_offs_whose_errors_are_above_the_tolerance_are_told(packing):
     with pytest.warns(ScanfabWarning, match=told):
         low, high = compute(packing, **words)
     assert low.alpha_vs_axial_se <= 2e-3 < high.alpha_vs_axial_se
+    with pytest.warns(ScanfabWarning, match="the scan stopped after") as caught:
+        compute(packing, **{**words, "tolerance": 1e-5, "max_chords": 1e5})
+    assert not any("which holds" in str(one.message) for one in caught)
 
 
 def test_other_cut_offs_of_the_same_lines_are_those_of_a_scan_with_all_of_them(packing):

@@ -162,6 +162,9 @@ def test_settings_are_frozen_and_checked_again_where_they_are_replaced():
     again = dataclasses.replace(settings, seed=1)
     assert dataclasses.replace(again, seed=0) == settings
     assert Settings(directions=13) != Settings(directions=25)
+    # from the text of a manifest, too
+    for axis in (Settings(axis="1,1,0").axis, settings.axis):
+        assert Settings(axis=",".join(map(repr, axis))).axis == axis
     with pytest.raises(SettingsError, match=r"^cutoff: expected"):
         dataclasses.replace(settings, cutoff=Length(-1.0))
     with pytest.raises(dataclasses.FrozenInstanceError):
