@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from scanfab import direction_rule
-from scanfab.fabric.errors import BLOCKS, jackknife, jackknife_variance, variance_without_noise
+from scanfab.fabric.errors import (
+    BLOCKS,
+    homogeneity_of,
+    jackknife,
+    jackknife_variance,
+    variance_without_noise,
+)
 from scanfab.fabric.measured import BlockedSums, Measured
 from scanfab.fabric.registry import OWN_FABRICS
 from scanfab.scan.blocks import Blocks
@@ -195,3 +201,14 @@ def test_jackknife_is_the_scatter_between_independent_samples():
     assert noise.mean() < 0.3 * between
     # relative errors: of a variance of 100 numbers 14 %, of the mean of 100 variances some 5 %
     assert variance.mean() / between == pytest.approx(1.0, abs=0.4)
+
+
+def test_of_homogeneous_samples_one_in_twenty_has_a_chance_below_that():
+    """Blocks of one true value, each with its variance from eight parts."""
+    random, chances = np.random.default_rng(0), []
+    for _ in range(10_000):
+        parts = random.normal(size=(4, 8))
+        variances = parts.var(axis=1, ddof=1) / 8
+        chances.append(homogeneity_of(parts.mean(axis=1), variances, np.ones(4), 7.0).chance)
+    # three standard errors of a count
+    assert np.mean(np.array(chances) < 0.05) == pytest.approx(0.05, abs=0.0066)
