@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 import shutil
-import socket
 import subprocess
 import tempfile
-import time
-import urllib.error
 import urllib.request
 from typing import Any
 
@@ -36,14 +34,10 @@ class Browser:
 
     def __enter__(self) -> Browser:
         self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            port = free.getsockname()[1]
-        self._driver = subprocess.Popen(
-            ["chromedriver", f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
-        self._url = f"http://127.0.0.1:{port}"
-        self._wait_for_driver()
+        self._driver = subprocess.Popen(["chromedriver", "--port=0"], stdout=subprocess.PIPE)
+        # once it listens it says where
+        said = (re.search(rb"successfully on port (\d+)", line) for line in self._driver.stdout)
+        self._url = f"http://127.0.0.1:{int(next(filter(None, said))[1])}"
         flags = [f"--{flag}" for flag in (*FLAGS, f"user-data-dir={self._profile.name}")]
         binary = shutil.which("chromium") or shutil.which("chromium-browser")
         wanted = {
@@ -59,17 +53,8 @@ class Browser:
             self._ask("DELETE", "")
         finally:
             self._driver.terminate()
-            self._driver.wait(60)
+            self._driver.communicate(timeout=60)
             self._profile.cleanup()
-
-    def _wait_for_driver(self) -> None:
-        for _ in range(200):
-            try:
-                if self._ask("GET", "/status")["ready"]:
-                    return
-            except urllib.error.URLError:
-                time.sleep(0.05)
-        raise RuntimeError("chromedriver does not answer")
 
     def _ask(self, method: str, path: str, body: dict[str, Any] | None = None) -> Any:
         data = None if body is None else json.dumps(body).encode()
@@ -100,8 +85,9 @@ class Browser:
     def touch(self, *fingers: tuple[int, int, int, int]) -> None:
         """Fingers press at places of the window, move by so much, and let go."""
         touch = {"type": "pointer", "parameters": {"pointerType": "touch"}}
+        moves = [_moves(*one) for one in fingers]
         self._act(
-            *({**touch, "id": f"finger {k}", "actions": _moves(*f)} for k, f in enumerate(fingers))
+            *({**touch, "id": f"finger {k}", "actions": move} for k, move in enumerate(moves))
         )
         self._ask("DELETE", "/actions")
 

@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from scanfab.viz.report.page import Picture
 from tests.helpers.dumps import write
 
 
@@ -21,5 +22,13 @@ def table(tmp_path):
 
 @pytest.fixture
 def plain(monkeypatch):
-    """No figures are drawn, which take most of the time."""
+    """There are no figures, which take most of the time."""
     monkeypatch.setattr("scanfab.viz.report.report.make_figures", lambda *_, **__: [])
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Figures have their captions, and are not drawn."""
+    monkeypatch.setattr(
+        "scanfab.viz.report.report.picture_of", lambda figure, _: Picture("", figure.caption, 1)
+    )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 
 import pytest
 
@@ -22,12 +21,6 @@ pytestmark = [
 ]
 
 
-@pytest.fixture
-def copied(computed, tmp_path):
-    """The sample's table alone."""
-    return shutil.copy(computed.table, tmp_path / "fabric.csv")
-
-
 def test_odd_values_are_refused_by_table_row_and_column(table):
     for word in ("x", True, [], {}, float("nan")):
         rows = curve()
@@ -36,11 +29,11 @@ def test_odd_values_are_refused_by_table_row_and_column(table):
             make_report([table(rows)])
 
 
-def test_tables_of_other_programs_and_of_compare_are_refused(copied, tmp_path, capsys):
+def test_tables_of_other_programs_and_of_compare_are_refused(computed, tmp_path, capsys):
     """Those of compare were reported as made of one replicate."""
     other, page = tmp_path / "other.csv", tmp_path / "r.html"
     for words in ([], ["--summary"], ["--differences"]):
-        assert run(["compare", str(copied), *words, "-o", str(other)]) == 0
+        assert run(["compare", str(computed.table), *words, "-o", str(other)]) == 0
         assert run(["report", str(other), "-o", str(page)]) == 1
         told = capsys.readouterr().err
         assert re.search(r"other.csv: this is (a table|the \w+) of scanfab compare: ", told)
@@ -90,21 +83,19 @@ def test_one_of_several_cut_offs_is_reported(tmp_path, capsys):
 def test_labels_tell_runs_of_one_sample_apart(table, tmp_path, capsys):
     words = [str(table(curve(), "a.jsonl")), str(table(curve(factor=2.0), "b.jsonl"))]
     page = tmp_path / "r.html"
-    assert run(["report", *words, "-o", str(page)]) == 1
-    assert "--label NAME" in capsys.readouterr().err
-    labels = ["--label", "old", "--label", "new"]
-    assert run(["report", *words, *labels, "-o", str(page)]) == 0
-    text = words_of(page.read_text("utf-8"))
-    assert "Void fabric of old, new" in text
-    assert run(["report", *words, "--label", "old", "-o", str(page)]) == 2
-    assert "--label: expected one per table: 2, found 1" in capsys.readouterr().err
+    for labels, code, message in (
+        ([], 1, "--label NAME"),
+        (["--label", "old"], 2, "--label: expected one per table: 2, found 1"),
+        (["--label", "old", "--label", "new"], 0, ""),
+    ):
+        assert run(["report", *words, *labels, "-o", str(page)]) == code
+        assert message in capsys.readouterr().err
+    assert "Void fabric of old, new" in words_of(page.read_text("utf-8"))
 
 
-def test_an_empty_table_is_an_error(tmp_path, capsys):
-    path = write(tmp_path / "t.csv", "source,frame,strain,variant,alpha_vs_axial,alpha_c_axial\n")
-    page = tmp_path / "r.html"
-    page.write_text("precious")
-    assert run(["report", str(path), "-o", str(page)]) == 1
+def test_an_empty_table_is_an_error(table, tmp_path, capsys):
+    page = write(tmp_path / "r.html", "precious")
+    assert run(["report", str(table([])), "-o", str(page)]) == 1
     assert "nothing to report" in capsys.readouterr().err
     assert page.read_text() == "precious"
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import inspect
-import json
 from dataclasses import fields
-from pathlib import Path
 
 import pytest
 
@@ -18,7 +16,6 @@ from scanfab.viz.report.tables import (
     frame_table,
     overview,
     results_tables,
-    settings_table,
 )
 from tests.helpers.tables import curve, sheared
 
@@ -101,15 +98,6 @@ def test_every_setting_has_a_meaning():
     assert all(MEANINGS.values())
     reading = inspect.signature(read_series).parameters.values()
     assert set(READING) == {one.name for one in reading if one.kind is one.KEYWORD_ONLY}
-
-
-def test_every_line_of_a_manifest_is_explained(computed):
-    manifest = json.loads(Path(f"{computed.table}.manifest.json").read_text("utf-8"))
-    lines = settings_table(manifest["settings"])
-    assert len(lines) > 20
-    assert all(name and value and meaning for name, value, meaning in lines)
-    # a setting that nobody knows
-    assert settings_table({"sources": ["x"], "unheard": 3}) == [("unheard", "3", "")]
 
 
 def doubts(rows, *asked, **values):
