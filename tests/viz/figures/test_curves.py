@@ -21,6 +21,7 @@ from tests.helpers.tables import curve, sheared
 
 VOID_SAMPLE = {"alpha_vs_axial_sample_se": 2e-3}
 CONTACT_SAMPLE = {"alpha_c_axial_sample_se": 1e-2}
+SAMPLES = {**VOID_SAMPLE, **CONTACT_SAMPLE}
 TURNED = "ignore:the loading axis|shear_strain stands"
 
 
@@ -32,10 +33,8 @@ def titles_of(figure):
     return [axes.get_title(loc="left") for axes in figure.axes]
 
 
-def with_samples(rows):
-    return [
-        {**row, "alpha_vs_axial_sample_se": 2e-3, "alpha_c_axial_sample_se": 1e-2} for row in rows
-    ]
+def with_all(rows, **values):
+    return [{**row, **values} for row in rows]
 
 
 def bars_of(axes):
@@ -45,16 +44,18 @@ def bars_of(axes):
 
 
 def test_rows_of_several_cut_offs_are_no_curve():
-    rows = [{**row, "cutoff": cutoff} for cutoff in (0.1, 0.2) for row in curve()]
+    rows = [*with_all(curve(), cutoff=0.1), *with_all(curve(), cutoff=0.2)]
     with pytest.raises(SettingsError, match=r"several cut-offs.*choose one"):
         groups_of(rows)
 
 
 def with_state(rows):
-    return [
-        {**row, "p": 2.0 + k, "q": None, "acst_c": 0.1 * k, "acst_c_se": 0.02}
-        for k, row in enumerate(rows)
-    ]
+    state = {"q": None, "acst_c_se": 0.02}
+    return [{**row, **state, "p": 2.0 + k, "acst_c": 0.1 * k} for k, row in enumerate(rows)]
+
+
+def band_of(axes):
+    return axes.collections[0].get_paths()[0].vertices
 
 
 def test_curves_are_the_table_s_numbers(drawn):
@@ -69,30 +70,27 @@ def test_curves_are_the_table_s_numbers(drawn):
 
 def test_bands_are_total_errors_and_bars_the_scan_s_part(drawn):
     """Of the contacts the sample's error is the total; the legend says all of it."""
-    rows = with_samples(curve())
-    figure = drawn(rows, "evolution")
+    figure = drawn(with_all(curve(), **SAMPLES), "evolution")
     note = figure.legends[0].get_title().get_text()
     assert "one total standard error" in note
     assert "scan and sample together" in note
     assert r"the scan's part, at most $0.3\times10^{-3}$" in note
     assert bars_of(figure.axes[0]) == pytest.approx([2 * 1e3 * 3e-4] * 5)
     for axes, error in zip(figure.axes, (1e3 * np.hypot(3e-4, 2e-3), 1.0), strict=True):
-        band = axes.collections[0].get_paths()[0].vertices
+        band = band_of(axes)
         assert np.ptp(band[band[:, 0] == 0, 1]) == pytest.approx(2 * error)
 
 
 def test_without_the_scan_s_part_there_is_no_band(drawn):
     """The sample's part alone is no total: a single replicate may be off by far more."""
-    rows = [{**row, **VOID_SAMPLE, "alpha_vs_axial_se": None} for row in curve()]
-    figure = drawn(rows, "evolution")
+    figure = drawn(with_all(curve(), **VOID_SAMPLE, alpha_vs_axial_se=None), "evolution")
     assert not figure.axes[0].collections
     assert "standard error" not in figure.legends[0].get_title().get_text()
 
 
 def test_one_frame_has_its_error_as_a_bar_and_no_line(drawn):
     """An area needs two points."""
-    row = {**curve()[2], **VOID_SAMPLE, "alpha_vs_axial_se": 0.0}
-    figure = drawn([row])
+    figure = drawn(with_all(curve()[2:3], **VOID_SAMPLE, alpha_vs_axial_se=0.0))
     assert figure.axes[0].get_xlim() == pytest.approx((1.0, 3.0))
     # the band, and the scan's part of nothing
     assert bars_of(figure.axes[0]) == pytest.approx([4.0, 0.0])
@@ -100,7 +98,7 @@ def test_one_frame_has_its_error_as_a_bar_and_no_line(drawn):
 
 
 def test_without_strain_the_frame_is_the_abscissa(drawn):
-    rows = [{**row, "strain": None} for row in curve()]
+    rows = with_all(curve(), strain=None)
     assert abscissa_label(rows) == "frame"
     assert drawn(rows).axes[0].lines[0].get_xdata().tolist() == [0, 1, 2, 3, 4]
     for caption in captions(rows)[:2]:
@@ -118,12 +116,12 @@ def test_what_is_missing_or_too_large_to_draw_is_a_hole(drawn, column):
 
 
 def test_noise_does_not_fill_the_panel(drawn):
-    rows = [{**row, "alpha_vs_axial": 1e-6 * row["frame"]} for row in curve()]
-    low, high = drawn(rows, "evolution").axes[0].get_ylim()
-    assert high - low >= 1.0
-    rounded = [{**row, "p": 1e5 * (1 + 1e-13 * row["frame"])} for row in curve()]
-    low, high = drawn(rounded, "columns:p").axes[0].get_ylim()
-    assert high - low >= 1.0
+    for figure, column, middle, noise in (
+        ("evolution", "alpha_vs_axial", 0.0, 1e-6), ("columns:p", "p", 1e5, 1e-8),
+    ):  # fmt: skip
+        rows = [{**row, column: middle + noise * row["frame"]} for row in curve()]
+        low, high = drawn(rows, figure).axes[0].get_ylim()
+        assert high - low >= 1.0
 
 
 def test_names_of_sources_are_no_formulas(drawn):
@@ -176,13 +174,13 @@ def test_a_sheared_cell_has_intensities_and_coaxiality_over_its_shear_and_no_lin
     assert correlation.get_ylabel().endswith(", intensity")
 
 
-def captions(rows):
-    return [one.caption for one in make_figures(rows, "table")]
+def captions(rows, **values):
+    return [one.caption for one in make_figures(with_all(rows, **values), "table")]
 
 
 @pytest.mark.filterwarnings(TURNED)
 def test_captions_say_what_is_drawn():
-    evolution, normalised, correlation = captions(with_samples(curve()))
+    evolution, normalised, correlation = captions(curve(), **SAMPLES)
     errors = "with total standard errors of voids and contacts"
     assert evolution == (
         f"Void and contact anisotropy along the loading axis, over the axial strain; {errors}."
@@ -192,10 +190,10 @@ def test_captions_say_what_is_drawn():
         "Void against contact anisotropy along the loading axis, with fitted lines and the "
         "paper's slope."
     )
-    plain = Correlation(Table(with_samples(curve())), paper_line=False)
+    plain = Correlation(Table(curve()), paper_line=False)
     assert plain.caption.endswith("along the loading axis, with fitted lines.")
     assert ":" not in {line.get_linestyle() for line in plain.on(Page()).axes[0].lines}
-    evolution, normalised, correlation = captions(with_samples(sheared()))
+    evolution, normalised, correlation = captions(sheared(), **SAMPLES)
     assert evolution == (
         "Intensity of void and contact anisotropy, and the angle between their major axes, over "
         "the shear strain; without total errors."
@@ -208,7 +206,7 @@ def test_captions_say_what_is_drawn():
         (VOID_SAMPLE, "with total standard errors of voids"),
         (CONTACT_SAMPLE, "with total standard errors of contacts"),
     ):
-        assert captions([{**row, **errors} for row in curve()])[0].endswith(f"; {named}.")
+        assert captions(curve(), **errors)[0].endswith(f"; {named}.")
     # one frame has no line; nor is the paper's slope drawn where all contacts lie below zero
     assert captions(curve()[:1])[2].endswith(", without a line.")
     below = [{**row, "alpha_c_axial": row["alpha_c_axial"] - 1} for row in curve()]
@@ -221,8 +219,7 @@ def test_columns_have_a_panel_each_with_the_table_s_numbers(drawn):
     assert first.get_ylabel() == "p"
     assert first.lines[0].get_ydata() == pytest.approx([row["p"] for row in rows])
     assert second.lines[0].get_xdata() == pytest.approx([100 * row["strain"] for row in rows])
-    vertices = second.collections[0].get_paths()[0].vertices
-    assert vertices[:, 1].max() == pytest.approx(0.1 * (len(rows) - 1) + 0.02)
+    assert band_of(second)[:, 1].max() == pytest.approx(0.1 * (len(rows) - 1) + 0.02)
 
 
 def test_by_default_columns_are_what_was_asked_for_with_the_table():
@@ -268,10 +265,8 @@ def test_the_drawn_slope_is_the_table_s(drawn, strain_max):
 
 def test_the_slope_s_error_is_in_the_legend():
     comparison = compare_tables(curve())
-    (one,) = comparison.summary
-    assert one.slope_se is None
-    comparison = replace(comparison, summary=Table([{**one, "slope_se": 0.0123}]))
-    with drawn_page([Correlation(Table(curve()), comparison)]) as page:
+    summary = Table([{**comparison.summary[0], "slope_se": 0.0123}])
+    with drawn_page([Correlation(Table(curve()), replace(comparison, summary=summary))]) as page:
         assert r"$\pm$ 0.012" in legend_of(page.axes[1])[0]
 
 
@@ -289,11 +284,11 @@ def test_each_line_of_several_groups_is_that_of_its_curve(drawn):
 def test_errors_of_the_correlation_look_in_the_legend_as_they_are_drawn(drawn):
     """A grey line looked like the one through zero."""
     for errors, shape in (
-        ({**VOID_SAMPLE, **CONTACT_SAMPLE}, "+"),
+        (SAMPLES, "+"),
         (VOID_SAMPLE, "|"),
         ({"alpha_c_axial_se": 1e-2}, "_"),
     ):
-        margin = drawn([{**row, **errors} for row in curve()], "correlation").axes[1]
+        margin = drawn(with_all(curve(), **errors), "correlation").axes[1]
         handle = margin.get_legend().legend_handles[-1]
         assert (handle.get_marker(), handle.get_linestyle()) == (shape, "None")
         assert legend_of(margin)[-1].startswith("one total standard error")
@@ -301,11 +296,7 @@ def test_errors_of_the_correlation_look_in_the_legend_as_they_are_drawn(drawn):
 
 def test_eight_curves_of_three_rvs_look_different_and_have_room_for_their_legend(drawn):
     kinds = [("a", None), ("b", None), *((one, rv) for one in "cd" for rv in (0.4, 0.5, 0.7))]
-    rows = [
-        {**row, "rv": rv}
-        for number, (variant, rv) in enumerate(kinds)
-        for row in curve(variant=variant, factor=1.0 + number)
-    ]
+    rows = [row for variant, rv in kinds for row in with_all(curve(variant=variant), rv=rv)]
     looks = [tuple(one.look.items()) for group in groups_of(rows) for one in group.drawn]
     assert len(set(looks)) == len(looks) == 8
     page = drawn(rows)
