@@ -29,6 +29,7 @@ from scanfab.viz.figures.projection import (
 from scanfab.viz.figures.rose import contact_ring
 from scanfab.viz.scanned_frames import ScannedFrames
 from tests.conftest import ROOT, SAMPLE
+from tests.helpers.dumps import write
 from tests.helpers.figures import row_of
 from tests.helpers.lattices import unit_vectors
 
@@ -53,13 +54,23 @@ def figure_of(frames, name):
     return figure
 
 
-def test_every_figure_of_the_sample_is_drawn(scanned):
-    for figure in make_figures(scanned, "frames"):
+@pytest.fixture(scope="module")
+def figures(scanned):
+    """All of them by name, which find what they draw once."""
+    return {type(one).__name__: one for one in make_figures(scanned, "frames")}
+
+
+def points_of(axes):
+    return [line for line in axes.lines if line.get_marker() not in ("None", "_")]
+
+
+def test_every_figure_of_the_sample_is_drawn(scanned, figures):
+    for name, figure in figures.items():
         assert scanned.name in figure.caption
         assert figure.caption.endswith(".")
         with drawn_page([figure]) as page:
             titles = [axes.get_title(loc="left") for axes in page.axes[:4]]
-        if len(titles) > 1:
+        if name in ("Rose", "Projection"):
             assert [title[:3] for title in titles] == ["(a)", "(b)", "(c)", "(d)"]
             assert all("variant c, frame " in title for title in titles)
         else:
@@ -91,16 +102,14 @@ def test_frames_are_scanned_once_for_all_figures_and_when_one_needs_them(
     frames = ScannedFrames(series, settings, computed.rows)
     assert repr(frames) == f"ScannedFrames(variant c of {SAMPLE}, frames 0 and 6)"
     assert not asked
-    for _ in range(2):
-        for name in ("histogram", "projection"):
-            getattr(frames.plot, name)(ax=Figure().subplots())
+    frames.plot.rose(Figure())
+    frames.plot.projection(Figure())
     assert asked == [slice(0, 7, 6)]
 
 
 def test_the_strain_of_a_title_is_that_of_the_table(series, computed, tmp_path):
     """The file that it came from may have lost a frame since; one strain for all is none."""
-    strains = tmp_path / "strain.csv"
-    strains.write_text("frame,strain\n0,0.5\n")
+    strains = write(tmp_path / "strain.csv", "frame,strain\n0,0.5\n")
     settings = Settings(**{**WORDS, "tolerance": 1e-2}, strain=str(strains))
     for step, told in ((0.0, ("", "")), (0.01, ("0", "6"))):
         rows = [{**row, "strain": step * row["frame"]} for row in computed.rows]
@@ -132,9 +141,9 @@ def test_all_panels_are_drawn_on_the_figure_that_they_get(scanned):
     page = Figure(figsize=(12, 6))
     left, right = page.subfigures(1, 2)
     assert scanned.plot.projection(left) is left
-    assert scanned.plot.histogram(right) is right
-    # four disks, the scales of both columns, and the histogram
-    assert len(page.axes) == 7
+    assert scanned.plot.rose(right) is right
+    # four disks, the scales of both columns, and four roses
+    assert len(page.axes) == 10
     alone = Figure()
     scanned.plot.projection(alone, frame=6, of="voids")
     assert [axes.get_title(loc="left")[:16] for axes in alone.axes] == ["mean void length", ""]
@@ -175,16 +184,15 @@ def test_the_rose_is_longer_near_the_axis_and_its_legend_tells_its_circles(scann
     """The values of the rings are read off the page."""
     angles = (20, 90)
     with drawn_page([figure_of(scanned, "rose:20,90")]) as page:
-        ends = [line for line in page.axes[2].lines if line.get_marker() not in ("None", "_")]
+        ends = points_of(page.axes[2])
         steep, flat = (line.get_ydata() for line in ends)
         assert steep.min() > 1.0 > flat.max()
         assert len(flat) == len(steep) == 25
         assert flat[:12] == pytest.approx(flat[12:24])
-        first = next(line for line in page.axes[0].lines if line.get_marker() not in ("None", "_"))
-        assert np.abs(first.get_ydata() - 1).max() < 0.05
-        contacts = [line for line in page.axes[3].lines if line.get_marker() not in ("None", "_")]
-        assert contacts[0].get_ydata().mean() > 1.1
-        assert contacts[1].get_ydata().mean() < 0.9
+        assert np.abs(points_of(page.axes[0])[0].get_ydata() - 1).max() < 0.05
+        steep, flat = (line.get_ydata() for line in points_of(page.axes[3]))
+        assert steep.mean() > 1.1
+        assert flat.mean() < 0.9
         legend = page.legends[0]
         named = [handle.get_color() for handle in legend.legend_handles]
         assert named == [line.get_color() for line in ends]
@@ -233,8 +241,8 @@ def test_the_disk_is_equal_area():
     assert rho**2 == pytest.approx(1 - directions[..., 2], abs=1e-12)
 
 
-def test_the_projection_is_the_distribution(scanned, computed):
-    first, last = figure_of(scanned, "projection").deviations
+def test_the_projection_is_the_distribution(figures, computed):
+    first, last = figures["Projection"].deviations
     voids = last["voids"]
     # in the middle is z, along which the sample was compressed
     assert voids[0, 0] > 4 > np.abs(first["voids"][0, 0])
@@ -287,9 +295,9 @@ def test_lobes_below_the_noise_are_called_so():
     assert noise_note(frame, {"voids": np.array([-1.0, 0.5]), "contacts": None}) == ""
 
 
-def test_lengths_have_the_mean_of_the_table(scanned, computed):
+def test_lengths_have_the_mean_of_the_table(figures, computed):
     """The cut-off is one smallest radius, the unit of the lengths."""
-    for length, frame in zip(figure_of(scanned, "histogram").lengths, (0, 6), strict=True):
+    for length, frame in zip(figures["Histogram"].lengths, (0, 6), strict=True):
         row = row_of(computed, frame)
         assert len(length) > 10_000
         mean = length[length >= 1.0].mean()
@@ -301,19 +309,18 @@ def assert_bands_are_wider_than_bars(curve):
     assert np.all(total > column_of(curve.rows, "alpha_vs_axial_se"))
 
 
-def test_cut_offs_have_the_values_and_errors_of_the_table(scanned, computed):
+def test_cut_offs_have_the_values_and_errors_of_the_table(figures, computed):
     """At the cut-off of the table what it says there, to the last digit but for rounding."""
-    for curve, frame in zip(figure_of(scanned, "cutoffs").curves, (0, 6), strict=True):
+    figure = figures["Cutoffs"]
+    ax = figure.on(Figure().subplots())
+    for curve, line, frame in zip(figure.curves, points_of(ax), (0, 6), strict=True):
         row = row_of(computed, frame)
         (place,) = np.flatnonzero(column_of(curve.rows, "value") == 1.0)
         assert curve.chosen == pytest.approx(1.0)
         for name in ("alpha_vs_axial", "alpha_vs_axial_se", "alpha_vs_axial_sample_se"):
             assert curve.rows[place][name] == pytest.approx(row[name], rel=1e-9)
+        assert line.get_ydata()[place] == pytest.approx(1e3 * row["alpha_vs_axial"])
         assert_bands_are_wider_than_bars(curve)
-    ax = Figure().subplots()
-    assert scanned.plot.cutoffs(ax=ax, frame=6) is ax
-    at = next(line for line in ax.lines if len(line.get_xdata()) > 2)
-    assert at.get_ydata()[place] == pytest.approx(1e3 * row["alpha_vs_axial"])
     assert "bands: one total standard error" in ax.get_legend().get_title().get_text()
 
 
