@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -15,13 +16,13 @@ from scanfab.cli.main import run
 from tests.helpers.dumps import write
 from tests.helpers.interruptions import interrupted_at_row, write_series
 
-WORDS = (
-    "--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac",
-    "--workers", "2",
-)  # fmt: skip
 OPTIONS = {
     "directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "ac", "workers": 2,
 }  # fmt: skip
+
+
+def as_words(options) -> list[str]:
+    return [word for name, value in options.items() for word in (f"--{name}", str(value))]
 
 
 @pytest.fixture(scope="module")
@@ -35,8 +36,8 @@ def dumps(short_series, tmp_path):
     return shutil.copytree(short_series, tmp_path / "dumps")
 
 
-def commanded(output: Path, *words: str, sources: tuple[Path, ...]) -> int:
-    return run(["compute", *map(str, sources), *WORDS, "-o", str(output), *words])
+def commanded(output: Path, *words: str, sources: Sequence[Path]) -> int:
+    return run(["compute", *map(str, sources), *as_words(OPTIONS), "-o", str(output), *words])
 
 
 def from_python(output: Path, source, **options) -> scanfab.Table:
@@ -51,30 +52,51 @@ def manifest_of(output: Path) -> bytes:
     return Path(f"{output}.manifest.json").read_bytes()
 
 
+def assert_same(*outputs: Path) -> None:
+    """Tables and manifests, to the last byte."""
+    for file_of in (Path.read_bytes, manifest_of):
+        assert len({file_of(one) for one in outputs}) == 1
+
+
 def test_a_part_of_a_series_makes_the_files_of_its_frames(short_series, tmp_path):
     """Its first frame is not computed, but RV and rmin are of it."""
     part, frames = tmp_path / "part.csv", tmp_path / "frames.csv"
     series = scanfab.read_series(short_series)
     from_python(part, series[1:3])
     from_python(frames, series, frames="1:3")
-    assert part.read_bytes() == frames.read_bytes()
-    assert manifest_of(part) == manifest_of(frames)
+    assert_same(part, frames)
     from_python(part, series[1:], resume=True)
-    from_python(frames, series, frames="1:")
+    table = from_python(frames, series, frames="1:")
     assert part.read_bytes() == frames.read_bytes()
+    assert table == scanfab.compute(series, frames="1:", **OPTIONS)
 
 
-def test_table_and_manifest_are_those_of_the_command(short_series, tmp_path, capsys):
-    for suffix in (".jsonl", ".parquet"):
-        ours, other = tmp_path / f"ours{suffix}", tmp_path / f"other{suffix}"
-        assert commanded(other, sources=(short_series,)) == 0
-        capsys.readouterr()
-        table = from_python(ours, short_series, manifest=tmp_path / "copy.json")
-        assert (tmp_path / "copy.json").read_bytes() == manifest_of(ours)
-        assert capsys.readouterr() == ("", "")
-        assert ours.read_bytes() == other.read_bytes()
-        assert manifest_of(ours) == manifest_of(other)
-    assert table == scanfab.compute(scanfab.read_series(short_series), **OPTIONS)
+@pytest.mark.parametrize(
+    ("suffix", "sources"),
+    [(".jsonl", "folder"), (".csv", "file"), (".parquet", "files"), (".csv", "two series")],
+)
+def test_paths_open_series_and_the_command_leave_the_same_files(
+    short_series, dumps, tmp_path, capsys, suffix, sources
+):
+    """The manifest names the options by which a series was opened, so that it can be resumed."""
+    files = sorted(short_series.iterdir())
+    given = {"folder": [short_series], "file": files[:1], "files": files}.get(sources)
+    reading = {"contacts": "geometric", "cell": [4, 4, 4]}
+    words = ("--contacts", "geometric", "--cell", "4", "4", "4")
+    if given:
+        series = scanfab.read_series(given, **reading)
+    else:
+        given = [short_series, dumps]
+        series = [scanfab.read_series(one, **reading) for one in given]
+    ours, opened, other = (tmp_path / f"{name}{suffix}" for name in ("ours", "opened", "other"))
+    assert commanded(other, *words, sources=given) == 0
+    capsys.readouterr()
+    from_python(ours, given, manifest=tmp_path / "copy.json", **reading)
+    from_python(opened, series)
+    assert capsys.readouterr() == ("", "")
+    assert_same(ours, opened, other)
+    assert (tmp_path / "copy.json").read_bytes() == manifest_of(ours)
+    from_python(ours, series, resume=True)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +112,7 @@ def test_each_goes_on_with_what_the_other_has_left(
     """The bytes are those of a run that nobody interrupts; so is what both say of it."""
     output, whole = tmp_path / name, tmp_path / "whole" / name
     whole.parent.mkdir()
-    words = [word for key, value in excerpt.items() for word in (f"--{key}", str(value))]
+    words = as_words(excerpt)
     with interrupted_at_row(monkeypatch, 6):
         if begins == "Python":
             with pytest.raises(KeyboardInterrupt):
@@ -114,41 +136,16 @@ def test_each_goes_on_with_what_the_other_has_left(
     assert {path.name for path in tmp_path.iterdir()} == {name, f"{name}.manifest.json", "whole"}
 
 
-def test_an_open_series_leaves_the_files_of_its_path(short_series, tmp_path):
-    """Its manifest names the options by which it was opened, so that both can be resumed."""
-    files = sorted(short_series.iterdir())
-    reading = {"contacts": "geometric", "cell": [4, 4, 4]}
-    for number, source in enumerate([short_series, str(files[0]), files]):
-        path, opened = tmp_path / f"path{number}.csv", tmp_path / f"opened{number}.csv"
-        from_python(path, source, **reading)
-        from_python(opened, scanfab.read_series(source, **reading))
-        assert opened.read_bytes() == path.read_bytes()
-        assert manifest_of(opened) == manifest_of(path)
-        from_python(path, scanfab.read_series(source, **reading), resume=True)
-        words = ("--contacts", "geometric", "--cell", "4", "4", "4", "--resume")
-        sources = tuple(map(Path, source if isinstance(source, list) else [source]))
-        assert commanded(opened, *words, sources=sources) == 0
-
-
-def test_several_series_are_one_table(short_series, dumps, tmp_path):
-    ours, other, opened = (tmp_path / f"{name}.csv" for name in ("ours", "other", "opened"))
-    assert commanded(other, sources=(short_series, dumps)) == 0
-    from_python(ours, [short_series, dumps])
-    from_python(opened, [scanfab.read_series(one) for one in (short_series, dumps)])
-    assert ours.read_bytes() == other.read_bytes() == opened.read_bytes()
-    assert manifest_of(ours) == manifest_of(other) == manifest_of(opened)
-
-
 def test_paraview_files_are_those_of_the_command(short_series, dumps, tmp_path):
     """A resumed run adds its frames to the collections."""
-    sources, other = (short_series, dumps), tmp_path / "other"
-    assert commanded(tmp_path / "t.csv", "--vtk", str(other), sources=sources) == 0
-    for frames in (":2", ":4"):
-        options = {"vtk": tmp_path / "ours", "frames": frames, "resume": True}
+    sources, words = (short_series, dumps), ("--vtk", str(tmp_path / "other"), "--frames", ":2")
+    assert commanded(tmp_path / "t.csv", *words, "--variants", "c", sources=sources) == 0
+    for frames in (":1", ":2"):
+        options = {"vtk": tmp_path / "ours", "frames": frames, "variants": "c", "resume": True}
         from_python(tmp_path / "table.csv", list(sources), **options)
-    found = files_of(tmp_path / "ours")
-    assert found == files_of(other)
-    assert found["series-1/grains.pvd"].count(b"<DataSet ") == 4
+    found, expected = (files_of(tmp_path / name) for name in ("ours", "other"))
+    assert found == expected
+    assert found["series-1/grains.pvd"].count(b"<DataSet ") == 2
 
 
 @pytest.fixture

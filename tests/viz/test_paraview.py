@@ -24,16 +24,32 @@ ARRAYS = {
     "ellipsoids": {"kind"},
     "tensors": {"gvs", "gc"},
 }
-FRAME_KINDS = ("grains", "contacts", "window")
-KINDS = [
-    *FRAME_KINDS,
-    *(f"{kind}-{v}" for v in "abcd" for kind in ARRAYS if kind not in FRAME_KINDS),
-]
+KINDS = ["grains", "contacts", "window"]
+KINDS += [f"{kind}-{v}" for v in "abcd" for kind in ARRAYS if kind not in KINDS]
+FAST = {"variants": "c", "directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin"}
 
 
 def tensor(row, name):
     xx, yy, zz, xy, xz, yz = (row[f"{name}_{c}"] for c in ("xx", "yy", "zz", "xy", "xz", "yz"))
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def written(folder, source, **options):
+    """The rows of a computation whose files go to the folder."""
+    return list(compute_rows(source, Settings(**FAST | options), observe=VtkFolder(folder)))
+
+
+def times_of(folder, kind="grains"):
+    return pyvista.get_reader(folder / f"{kind}.pvd").time_values
+
+
+def dumps_of(folder, *steps):
+    """A series of 64 grains a frame, without any at the step 1."""
+    folder.mkdir()
+    for step in steps:
+        text = dump_text(cubic_rows() if step != 1 else [], step=step)
+        write(folder / f"dump_{step}.txt", text)
+    return scanfab.read_series(folder)
 
 
 def test_every_file_has_its_arrays_and_the_row(computed):
@@ -75,8 +91,8 @@ def test_the_surface_gives_back_the_tensor(computed):
 )
 def test_the_surface_has_the_moment_of_the_table(tmp_path):
     packing = scanfab.find_contacts(scanfab.Packing(*shaken_cubic(np.random.default_rng(0), 6)))
-    words = {"variants": "c", "tolerance": 2e-3, "moment": 2}
-    (row,) = compute_rows(packing, Settings(**words), observe=VtkFolder(tmp_path))
+    exact = {"directions": None, "spacing": None, "cutoff": "1rmin", "tolerance": 2e-3}
+    (row,) = written(tmp_path, packing, moment=2, **exact)
     mesh = pyvista.read(tmp_path / "distribution-c_000000.vtp")
     share = mesh["weight"] * mesh["mean_length"]
     assert share.sum() == pytest.approx(row.mean_length, rel=1e-2)
@@ -127,8 +143,7 @@ def test_spheres_of_clumps_have_the_number_of_their_body(tmp_path):
     spheres = shaken_cubic(np.random.default_rng(0), 4)
     number = np.where(np.arange(64) < 60, np.arange(64) // 2, -1)
     packing = scanfab.Packing(spheres.position, spheres.radius, bodies=number)
-    settings = Settings(variants="c", directions=9, spacing="1rmin", contact_tolerance=0.02)
-    (row,) = compute_rows(packing, settings, observe=VtkFolder(tmp_path))
+    (row,) = written(tmp_path, packing, contact_tolerance=0.02)
     grains = pyvista.read(tmp_path / "grains_000000.vtp")
     assert grains["body"].tolist() == number.tolist()
     inside = number[grains["in_window"] == 1]
@@ -148,58 +163,38 @@ def test_pieces_of_lines_are_kept_from_the_cut_off_on(computed):
 def test_files_of_a_cut_off_that_nothing_reaches_have_no_distribution(tmp_path):
     spheres = shaken_cubic(np.random.default_rng(0), 5)
     packing = scanfab.Packing(spheres.position, spheres.radius, step=7, contacts=[])
-    settings = Settings(variants="c", cutoff=100.0, directions=9, spacing="1rmin")
     with pytest.warns(scanfab.ScanfabWarning, match="no void segment"):
-        list(compute_rows(packing, settings, observe=VtkFolder(tmp_path)))
+        written(tmp_path, packing, cutoff=100.0)
     names = {path.name for path in tmp_path.iterdir()}
     assert "grains_000000.vtp" in names
     assert "distribution-c_000000.vtp" not in names
     mesh = pyvista.read(tmp_path / "lines-c_000000.vtp")
     assert np.isnan(mesh.field_data["alpha_vs"][0])
     assert pyvista.read(tmp_path / "contacts_000000.vtp").n_cells == 0
-    assert pyvista.get_reader(tmp_path / "grains.pvd").time_values == [7.0]
-
-
-@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
-def test_a_resumed_collection_keeps_its_frames(tmp_path):
-    for step in (3, 7):
-        write(tmp_path / f"dump_{step}.txt", dump_text(cubic_rows(), step=step))
-    series, scan = scanfab.read_series(tmp_path), {"directions": 9, "spacing": "0.5rmin"}
-    for frame, go_on, times in ((1, False, [7.0]), (0, True, [3.0, 7.0]), (1, False, [7.0])):
-        settings = Settings(variants="c", cutoff="0.2rmin", frames=frame, **scan)
-        list(compute_rows(series, settings, observe=VtkFolder(tmp_path, go_on)))
-        assert pyvista.get_reader(tmp_path / "grains.pvd").time_values == times
+    assert times_of(tmp_path) == [7.0]
 
 
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 def test_a_collection_is_kept_only_with_the_table_that_is_resumed(tmp_path):
     """Otherwise it would mix frames of two samples."""
     for name, steps in (("one", (3, 7)), ("two", (4,))):
-        (tmp_path / name).mkdir()
-        for step in steps:
-            write(tmp_path / name / f"dump_{step}.txt", dump_text(cubic_rows(), step=step))
-        vtk, scan = tmp_path / "vtk", {"directions": 9, "spacing": "0.5rmin", "variants": "c"}
-        table = tmp_path / f"{name}.csv"
-        scanfab.compute_file(tmp_path / name, table, vtk=vtk, resume=True, **scan)
-        assert pyvista.get_reader(vtk / "grains.pvd").time_values == [float(one) for one in steps]
+        series, vtk = dumps_of(tmp_path / name, *steps), tmp_path / "vtk"
+        for frames in ("-1:", ":"):
+            words = {**FAST, "vtk": vtk, "resume": True, "frames": frames}
+            scanfab.compute_file(series, tmp_path / f"{name}.csv", **words)
+        assert times_of(vtk) == list(steps)
 
 
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 def test_a_frame_without_grains_and_a_name_beyond_ascii(tmp_path):
-    folder = tmp_path / 'grüße<&">'
-    folder.mkdir()
-    for step, rows in enumerate((cubic_rows(), [], cubic_rows())):
-        write(folder / f"dump_{step}.txt", dump_text(rows, step=step))
-    settings = Settings(variants="c", directions=9, spacing="0.5rmin", cutoff="0.2rmin")
     vtk = tmp_path / "vtk"
-    series = scanfab.read_series(folder)
-    assert len(list(compute_rows(series, settings, observe=VtkFolder(vtk)))) == 3
+    assert len(written(vtk, dumps_of(tmp_path / 'grüße<&">', 0, 1, 2))) == 3
     empty = pyvista.read(vtk / "grains_000001.vtp")
     assert empty.n_points == 0
     assert empty.field_data["grains"][0] == 0
     assert empty.field_data["source"][0].endswith(r'gr\xfc\xdfe<&">')
-    assert pyvista.get_reader(vtk / "grains.pvd").time_values == [0.0, 1.0, 2.0]
-    assert pyvista.get_reader(vtk / "distribution-c.pvd").time_values == [0.0, 2.0]
+    assert times_of(vtk) == [0, 1, 2]
+    assert times_of(vtk, "distribution-c") == [0, 2]
 
 
 @pytest.fixture(scope="module")
@@ -224,8 +219,7 @@ def test_shells_of_a_map_have_their_volumes_and_values(periodic, tmp_path):
 
 def test_lines_of_a_periodic_whole_pass_through_its_images(periodic, tmp_path):
     """The middle of each piece lies in void or in a grain, as the file says."""
-    settings = Settings(variants="a", directions=9, spacing=0.4)
-    list(compute_rows(periodic, settings, observe=VtkFolder(tmp_path)))
+    written(tmp_path, periodic, variants="a")
     mesh = pyvista.read(tmp_path / "lines-a_000000.vtp")
     branch = mesh.cell_centers().points[:, None] - periodic.position
     branch -= 6.0 * np.rint(branch / 6.0)
@@ -237,8 +231,8 @@ def test_lines_of_a_periodic_whole_pass_through_its_images(periodic, tmp_path):
 
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 def test_tensors_that_one_variant_alone_has_are_in_tables_only(periodic, tmp_path):
-    settings = Settings(variants="ac", rv=0.06, with_="harmonics", directions=9, spacing=0.1)
-    whole, inner = compute_rows(periodic, settings, observe=VtkFolder(tmp_path))
+    words = {"variants": "ac", "rv": 0.06, "with_": "harmonics"}
+    whole, inner = written(tmp_path, periodic, spacing=0.1, **words)
     assert whole.c_tensor4 is not None
     assert inner.c_tensor4 is None
     fields = pyvista.read(tmp_path / "grains_000000.vtp").field_data
