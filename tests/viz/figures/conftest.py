@@ -13,18 +13,14 @@ from tests.conftest import ROOT, SAMPLE
 @pytest.fixture
 def drawn():
     """Draw a figure of a table, or the page of all."""
-    pages = []
 
     def draw(rows, name=None, strain_max=None):
         comparison = compare_tables(rows, strain_max=strain_max)
-        pages.append(drawn_page(make_figures(rows, "table", name, comparison=comparison)))
-        page = pages[-1].__enter__()
-        page.canvas.draw()
+        with drawn_page(make_figures(rows, "table", name, comparison=comparison)) as page:
+            page.canvas.draw()
         return page
 
-    yield draw
-    for page in reversed(pages):
-        page.__exit__(None, None, None)
+    return draw
 
 
 @pytest.fixture
