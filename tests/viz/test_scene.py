@@ -25,6 +25,12 @@ def sample():
 
 
 WINDOW = Window(np.array([1.0, 0.0, 0.0]), sphere(2.5))
+CELL = scanfab.Cell([10.0, 10.0, 10.0])
+
+
+def sample_of(position, radius, **options):
+    packing = scanfab.Packing(position, radius, **{"contacts": [], **options})
+    return Sample(packing, np.zeros(len(packing), bool))
 
 
 def test_grains_are_told_apart(sample):
@@ -43,9 +49,8 @@ def test_contacts_are_lines_between_centres_and_stay_short_through_a_face(sample
     assert mesh.points.reshape(-1, 2, 3)[:, :, 0].tolist() == [[0, 2], [2, 4], [4, 6]]
     assert mesh["boundary"].tolist() == [False, False, True]
     assert mesh["in_window"].tolist() == [True, True, False]
-    cell = scanfab.Cell([10.0, 10.0, 10.0])
-    packing = scanfab.Packing([[0.5, 5, 5], [9.5, 5, 5]], 0.5, contacts=[[0, 1]], cell=cell)
-    one, two = contact_mesh(Sample(packing, np.zeros(2, bool)), None).points
+    through = sample_of([[0.5, 5, 5], [9.5, 5, 5]], 0.5, contacts=[[0, 1]], cell=CELL)
+    one, two = contact_mesh(through, None).points
     assert np.linalg.norm(two - one) == pytest.approx(1.0)
 
 
@@ -61,21 +66,14 @@ def test_a_section_lies_in_one_plane_and_in_the_window(sample, axis):
 
 
 def test_a_section_has_as_many_lines_in_any_unit():
-    packing = simple_cubic(5)
-    found = []
-    for unit in (1.0, 1e-3):
-        scaled = scanfab.Packing(unit * packing.position, unit * packing.radius, contacts=[])
-        scene = scene_of(Sample(scaled, np.zeros(len(packing.radius), bool)))
-        found.append(len(np.unique(section_lines(scene, (0, 0, 1)).line)))
+    scenes = [scene_of(sample_of(*simple_cubic(5, unit))) for unit in (1.0, 1e-3)]
+    found = [len(np.unique(section_lines(scene, (0, 0, 1)).line)) for scene in scenes]
     assert found[0] == found[1] > 0
 
 
 def test_a_section_cuts_periodic_images_too():
     """A crystal looks the same about each of its grains, also one at the corner of the cell."""
-    position, radius = simple_cubic(4)
-    cell = scanfab.Cell([4.0, 4.0, 4.0])
-    packing = scanfab.Packing(position, radius, contacts=[], cell=cell)
-    sample = Sample(packing, np.zeros(len(radius), bool))
+    sample = sample_of(*simple_cubic(4), cell=scanfab.Cell([4.0, 4.0, 4.0]))
     middle, corner = (
         section_lines(scene_of(sample, Window(np.array(place), sphere(1.6))), (0, 0, 1))
         for place in ([2.5, 2.5, 2.5], [0.5, 3.5, 0.5])
@@ -86,16 +84,14 @@ def test_a_section_cuts_periodic_images_too():
 
 def test_a_section_without_window_or_grains_is_no_error(sample):
     assert section_lines(scene_of(sample), (0, 0, 1)).line.ndim == 1
-    nothing = Sample(scanfab.Packing(np.zeros((0, 3)), 1.0, contacts=[]), np.zeros(0, bool))
-    empty = Scene(grains_of(nothing, None), np.zeros(3))
+    empty = Scene(grains_of(sample_of(np.zeros((0, 3)), 1.0), None), np.zeros(3))
     assert len(section_lines(empty, (0, 0, 1)).length) == 0
 
 
 def test_grains_of_clumps_have_their_numbers_and_places_and_are_seen_whole():
     """Two of them, one through the face x = 10, and a sphere alone."""
     position = [[9.6, 5, 5], [0.8, 5, 5], [4.0, 5, 5], [5.2, 5, 5], [2.6, 5, 5]]
-    cell = scanfab.Cell([10.0, 10.0, 10.0])
-    packing = scanfab.Packing(position, 1.0, bodies=[3, 3, 8, 8, -1], cell=cell)
+    packing = scanfab.Packing(position, 1.0, bodies=[3, 3, 8, 8, -1], cell=CELL)
     sample = Sample(scanfab.find_contacts(packing), np.zeros(5, bool))
     grains = grains_of(sample, Window(np.array([0.2, 5.0, 5.0]), sphere(0.1)))
     assert grains.body.tolist() == [3, 3, 8, 8, -1]
