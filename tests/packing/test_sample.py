@@ -7,17 +7,16 @@ from scanfab import Cell, Packing, contact_fabric, find_contacts, sphere
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import Window
 from tests.helpers.lattices import shaken_cubic
+from tests.helpers.packed import along_x, sample_of
 
 A, B, C, D = (VARIANTS[name] for name in "abcd")
 
 
 def row_of_grains(count=6, boundary=(), **options):
     """Grains along x at 0, 2, 4, ..., in contact with their neighbours."""
-    position = np.zeros((count, 3))
-    position[:, 0] = 2.0 * np.arange(count)
-    pairs = np.column_stack([np.arange(count - 1), np.arange(1, count)])
-    packing = Packing(position, 1.0, contacts=pairs, **options)
-    return Sample(packing, np.isin(np.arange(count), boundary))
+    pairs = [(k, k + 1) for k in range(count - 1)]
+    packing = Packing(along_x(2 * np.arange(count)), 1.0, contacts=pairs, **options)
+    return sample_of(packing, boundary)
 
 
 def rows(mask):
@@ -25,8 +24,7 @@ def rows(mask):
 
 
 def test_grain_held_by_its_own_images_is_no_rattler():
-    packing = find_contacts(Packing([[1, 1, 1]], 0.6, cell=Cell([1.0, 4.0, 4.0])))
-    sample = Sample(packing, np.zeros(1, bool))
+    sample = sample_of(Packing([[1, 1, 1]], 0.6, cell=Cell([1.0, 4.0, 4.0])))
     assert sample.contact_numbers.tolist() == [2]
     assert rows(sample.rattlers) == []
 
@@ -71,12 +69,11 @@ def test_contacts_of_the_window_are_those_whose_point_lies_in_it(reach, contacts
 
 
 def test_contact_point_through_a_face_lies_in_the_window_on_either_side():
-    packing = find_contacts(Packing([[0.4, 5, 5], [9.4, 5, 5]], 0.51, cell=Cell([10.0, 10, 10])))
-    sample = Sample(packing, np.zeros(2, bool))
-    assert len(packing.contacts) == 1
-    for x in (0.2, 9.7):
-        assert sample.fabric_contacts(C, Window(np.array([x, 5, 5]), sphere(0.4))).sum() == 1
-    assert sample.fabric_contacts(C, Window(np.array([1.0, 5, 5]), sphere(0.4))).sum() == 0
+    position, cell = [[0.4, 5, 5], [9.4, 5, 5]], Cell([10.0, 10, 10])
+    sample = sample_of(Packing(position, 0.51, cell=cell))
+    for x, contacts in ((0.2, 1), (9.7, 1), (1.0, 0)):
+        window = Window(np.array([x, 5, 5]), sphere(0.4))
+        assert sample.fabric_contacts(C, window).sum() == contacts
 
 
 def test_window_that_holds_everything_gives_what_the_whole_gives():
