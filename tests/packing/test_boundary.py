@@ -9,6 +9,8 @@ from scanfab.base.errors import SettingsError
 from scanfab.packing.boundary import BoundaryRule, enclosing_class, select_boundary
 from scanfab.packing.packing import Packing
 from scanfab.pipeline.compute import compute
+from tests.helpers.lattices import unit_vectors
+from tests.helpers.packed import along_x
 
 COUNT = 6
 
@@ -16,7 +18,7 @@ COUNT = 6
 @pytest.fixture
 def packing():
     """Six grains with the ids 10 to 60 and some columns."""
-    position = np.column_stack([np.arange(COUNT) * 3.0, np.zeros(COUNT), np.zeros(COUNT)])
+    position = along_x(3 * np.arange(COUNT))
     return Packing(
         position,
         np.linspace(0.5, 1.0, COUNT),
@@ -50,14 +52,11 @@ def test_selecting_everything_in_every_frame_is_an_error_that_repeats_the_expres
         compute(packing, boundary=["type=1", "type>1"])
 
 
-def test_no_particles_select_nothing():
-    empty = Packing(np.zeros((0, 3)), np.zeros(0), columns={"type": []})
-    assert chosen(empty, "type=1") == []
-
-
 def test_the_radius_is_that_of_the_grains_whatever_the_file_calls_it():
+    """And no particles select nothing."""
     packing = Packing([[0, 0, 0], [5, 0, 0]], [1.0, 2.0], columns={"radius": [9.0, 9.0]})
     assert chosen(packing, "radius>1.5") == [1]
+    assert chosen(Packing(np.zeros((0, 3)), np.zeros(0)), "radius>1.5") == []
 
 
 # the class that encloses
@@ -70,9 +69,7 @@ def cloud(shell, **columns):
 
 
 def sphere_shell(count=150):
-    random = np.random.default_rng(2)
-    points = random.normal(size=(count, 3))
-    return points / np.linalg.norm(points, axis=1, keepdims=True)
+    return unit_vectors(np.random.default_rng(2), count)
 
 
 def box_shell(count=150):

@@ -8,12 +8,18 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from scanfab import Cell, ContactList, Packing, find_contacts
+from scanfab import Cell, ContactList, Packing
 from scanfab.packing.bodies import own_shares
-from scanfab.packing.sample import VARIANTS, Sample
+from scanfab.packing.sample import VARIANTS
 from scanfab.pipeline.state import _rays, contact_forces, sample_state
+from tests.helpers.packed import sample_of
 
 BALL = 4.0 / 3.0 * np.pi
+
+
+def lens(d):
+    """What two unit spheres at this distance share."""
+    return np.pi * (2 - d) ** 2 * (d * d + 4 * d) / (12 * d)
 
 
 def shares(position, radius, number, **options):
@@ -21,12 +27,10 @@ def shares(position, radius, number, **options):
 
 
 def test_what_two_spheres_of_a_clump_share_counts_once():
-    """The lens of two unit spheres at a distance d: π (2 - d)² (d² + 4 d) / 12 d."""
     for d in (0.3, 1.0, 1.7):
-        lens = np.pi * (2 - d) ** 2 * (d * d + 4 * d) / (12 * d)
         found = shares([[0, 0, 0], [d, 0, 0], [9, 9, 9]], 1.0, [2, 2, -1])
         assert found[[0, 2]].tolist() == [1.0, 1.0]
-        assert found[1] == pytest.approx(1 - lens / BALL, rel=1e-12)
+        assert found[1] == pytest.approx(1 - lens(d) / BALL, rel=1e-12)
 
 
 def test_a_sphere_in_a_sphere_and_many_at_one_place_are_the_largest():
@@ -41,17 +45,16 @@ def test_a_sphere_in_a_sphere_and_many_at_one_place_are_the_largest():
 def test_a_rod_of_overlapping_spheres(axis):
     """Equal spheres in a row share what neighbours share, and no more: n V - (n - 1) lenses."""
     d, n = 0.6, 5
-    lens = np.pi * (2 - d) ** 2 * (d * d + 4 * d) / (12 * d)
     found = shares(d * np.outer(np.arange(n), axis), 1.0, np.ones(n, int))
-    assert found.sum() == pytest.approx((n * BALL - (n - 1) * lens) / BALL, rel=1e-12)
+    assert found.sum() == pytest.approx((n * BALL - (n - 1) * lens(d)) / BALL, rel=1e-12)
 
 
 def test_a_row_of_overlapping_discs():
     d = 0.6
-    lens = 2 * np.arccos(d / 2) - d / 2 * np.sqrt(4 - d * d)
+    shared = 2 * np.arccos(d / 2) - d / 2 * np.sqrt(4 - d * d)
     row = Packing(d * np.outer(np.arange(4), [0.6, 0.8, 0]), 1.0, bodies=np.ones(4, int), dim=2)
     found = own_shares(row, partial(_rays, space=row.space))
-    assert found.sum() == pytest.approx((4 * np.pi - 3 * lens) / np.pi, rel=1e-12)
+    assert found.sum() == pytest.approx((4 * np.pi - 3 * shared) / np.pi, rel=1e-12)
 
 
 def test_what_three_spheres_share_counts_once():
@@ -81,10 +84,8 @@ def dumbbells():
     """Two of them in a cell, that press on each other at two points, each with a force of 3."""
     position = [[2, 2, 2], [2, 5, 2], [3.9, 2, 2], [3.9, 5, 2]]
     listed = ContactList([[0, 2], [3, 1]], force=[[3.0, 0.2, 0], [-3.0, 0, 0]])
-    packing = Packing(
-        position, [1.0, 0.9, 1.0, 1.1], bodies=[0, 0, 1, 1], contacts=listed, cell=Cell([9.0] * 3)
-    )
-    return Sample(packing, np.zeros(4, bool))
+    more = {"bodies": [0, 0, 1, 1], "contacts": listed, "cell": Cell([9.0] * 3)}
+    return sample_of(Packing(position, [1.0, 0.9, 1.0, 1.1], **more))
 
 
 def test_stress_and_branches_run_from_body_to_body(dumbbells):
@@ -107,7 +108,6 @@ def test_mechanical_coordination_is_of_bodies():
     inner = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]) * 1.1
     position = np.vstack([inner, inner + np.array([0, 0, 1.0]), [[3.0, 0, 0], [4.5, 0, 0]]])
     number = [0, 1, 2, 0, 1, 2, 3, 3]
-    packing = Packing(position, 1.0, bodies=number, cell=Cell([20.0] * 3), contacts=None)
-    sample = Sample(find_contacts(packing), np.zeros(8, bool))
+    sample = sample_of(Packing(position, 1.0, bodies=number, cell=Cell([20.0] * 3)))
     state = sample_state(sample, VARIANTS["a"], None)
     assert state.coordination_mechanical == pytest.approx((3 + 2 + 2) / 3)

@@ -10,7 +10,6 @@ from scanfab import (
     ContactList,
     Packing,
     PackingError,
-    Sample,
     SettingsError,
     Window,
     compute,
@@ -22,6 +21,7 @@ from scanfab.packing.sample import VARIANTS
 from scanfab.packing.search import near_pairs, overlapping_pairs
 from tests.helpers import naive
 from tests.helpers.lattices import face_centred_cubic, simple_cubic
+from tests.helpers.packed import sample_of
 
 TOLERANCE = 1e-4
 
@@ -187,16 +187,13 @@ def sample():
     random = np.random.default_rng(4)
     cell = Cell(np.array([[6.0, 0, 0], [1.5, 6.0, 0], [0, 0.5, 5.0]]))
     position = random.random((60, 3)) @ cell.vectors
-    packing = Packing(position, random.uniform(0.3, 0.6, 60), cell=cell)
-    return Sample(find_contacts(packing), boundary=np.zeros(60, bool))
+    return sample_of(Packing(position, random.uniform(0.3, 0.6, 60), cell=cell))
 
 
 def every_pair(packing, chosen, gap):
     """Overlaps, normals and middles of pairs of the chosen grains, one after the other."""
     found = []
-    shifts = [
-        np.array(one) @ packing.cell.vectors for one in itertools.product((-1, 0, 1), repeat=3)
-    ]
+    shifts = np.array(list(itertools.product((-1, 0, 1), repeat=3))) @ packing.cell.vectors
     pairs = itertools.combinations(np.flatnonzero(chosen), 2)
     for (one, two), shift in itertools.product(pairs, shifts):
         branch = packing.position[two] + shift - packing.position[one]

@@ -10,6 +10,7 @@ from scanfab.packing.window import SurfaceBox, Window, inner_ellipsoid
 from tests.helpers.lattices import ball_points, rotation
 
 CELL = Cell([10.0, 8.0, 6.0], origin=(-1.0, 2.0, 3.0))
+ONE = Packing([[0, 3, 4]], 1.0, cell=CELL)
 ALL = np.ones(4, bool)
 
 
@@ -23,9 +24,9 @@ def test_many_points_are_looked_at_some_at_a_time():
     """The 300,000th as the first."""
     window = Window(np.array([-0.5, 2.5, 3.5]), sphere(1.0))
     points = np.array([[8.9, 2.5, 3.5], [4.5, 6.5, 6.5], [-0.5, 9.8, 3.5]])
-    packing, rows = Packing([[0, 3, 4]], 1.0, cell=CELL), np.arange(300_000) % 3
-    assert np.array_equal(window.contains(points[rows], packing), rows != 1)
-    assert np.array_equal(window.may_meet(points[rows], 0.1 * rows, packing), rows != 1)
+    rows = np.arange(300_000) % 3
+    assert np.array_equal(window.contains(points[rows], ONE), rows != 1)
+    assert np.array_equal(window.may_meet(points[rows], 0.1 * rows, ONE), rows != 1)
 
 
 def test_a_centre_is_a_point():
@@ -34,22 +35,20 @@ def test_a_centre_is_a_point():
 
 
 def test_distance_is_to_the_nearest_image():
-    packing = Packing([[0, 3, 4]], 1.0, cell=CELL)
     window = Window(np.array([-0.5, 2.5, 3.5]), sphere(1.0))
     points = np.array([[8.9, 2.5, 3.5], [-0.5, 9.8, 3.5], [-0.5, 2.5, 8.9], [4.5, 6.5, 6.5]])
     expected = [0.6, 0.7, 0.6, np.sqrt(25 + 16 + 9)]
-    distance = np.linalg.norm(window.branches(points, packing), axis=1)
+    distance = np.linalg.norm(window.branches(points, ONE), axis=1)
     assert distance == pytest.approx(expected)
-    assert window.contains(points, packing).tolist() == [True, True, True, False]
+    assert window.contains(points, ONE).tolist() == [True, True, True, False]
 
 
 def test_window_must_not_meet_its_own_image():
     """It may lie across a face, and in another image of the cell."""
-    packing = Packing([[0, 3, 4]], 1.0, cell=CELL)
     for center, radius in (((4.0, 6, 6), 2.999), ((0.5, 6, 6), 1.6), ((40.0, 6, 6), 1.0)):
-        Window(np.array(center), sphere(radius)).check_fits(packing)
+        Window(np.array(center), sphere(radius)).check_fits(ONE)
     with pytest.raises(SettingsError, match="overlaps its own image"):
-        Window(np.array([4.0, 6, 6]), sphere(3.001)).check_fits(packing)
+        Window(np.array([4.0, 6, 6]), sphere(3.001)).check_fits(ONE)
 
 
 def test_room_around_the_window_is_to_the_nearest_surface_that_is_no_periodic_face():
@@ -63,12 +62,11 @@ def test_room_around_the_window_is_to_the_nearest_surface_that_is_no_periodic_fa
 
 def test_a_window_as_data_is_looked_through_periodic_faces_too():
     """A box of which no code knows, about a corner of the cell."""
-    packing = Packing([[0, 3, 4]], 1.0, cell=CELL)
     window = Window(np.array([-1.0, 2.0, 3.0]), box([1.0, 2.0, 4.0]))
     points = np.array([[8.6, 2.9, 3.0], [8.4, 2.0, 3.0], [-1.0, 9.1, 7.1], [-1.0, 8.9, 3.0]])
-    assert window.contains(points, packing).tolist() == [True, False, True, False]
-    assert window.may_meet(points, np.full(4, 0.15), packing).tolist() == [True] * 4
-    assert window.may_meet(points, np.full(4, 0.05), packing).tolist() == [True, False, True, False]
+    assert window.contains(points, ONE).tolist() == [True, False, True, False]
+    assert window.may_meet(points, np.full(4, 0.15), ONE).tolist() == [True] * 4
+    assert window.may_meet(points, np.full(4, 0.05), ONE).tolist() == [True, False, True, False]
     assert str(window) == "RV (box 1 x 2 x 4 about [-1.0, 2.0, 3.0])"
 
 
@@ -98,7 +96,7 @@ def test_room_around_a_window_is_that_of_its_own_box():
     [
         (four_grains(), [1, 1, 1, 1], [4.75, 3.625, 4.0], 9.25),
         (four_grains(), [1, 1, 0, 1], [4.75, 0.0, 4.0], 2.0),  # without one that is boundary
-        (Packing([[0, 3, 4]], 1.0, cell=CELL), [1], [4.0, 6.0, 6.0], 6.0),
+        (ONE, [1], [4.0, 6.0, 6.0], 6.0),
         # along y it is the grain: from 2 to 4
         (
             Packing([[0, 3, 4]], 1.0, cell=Cell([10.0, 80.0, 6.0], (True, False, True))),
