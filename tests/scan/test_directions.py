@@ -100,26 +100,22 @@ def test_fibonacci_has_a_small_bias():
 @pytest.mark.parametrize(
     ("text", "name", "axes"),
     [
-        ("1", "lebedev:3", 3),
-        ("3", "lebedev:3", 3),
-        ("4", "lebedev:5", 7),
-        ("25", "lebedev:11", 25),
         ("lebedev:4", "lebedev:5", 7),
         ("lebedev:13", "lebedev:15", 43),
         ("design:8", "design:9", 24),
     ],
 )
-def test_numbers_of_axes_and_degrees_are_rounded_up(text, name, axes):
+def test_degrees_are_rounded_up(text, name, axes):
     rule = direction_rule(text)
     assert (rule.name, len(rule)) == (name, axes)
 
 
-@pytest.mark.parametrize("count", [26, 44, 74, 100, 500, 1001, 2905])
+@pytest.mark.parametrize("count", [1, 3, 4, 25, 26, 44, 74, 100, 500, 1001, 2905])
 def test_number_of_axes_gives_the_next_lebedev_rule_of_positive_weights(count):
     rule = direction_rule(str(count))
     lower = [direction_rule(text) for text in LEBEDEV if int(text[8:]) < rule.degree]
     assert len(rule) >= count
-    assert max(len(other) for other in lower) < count
+    assert max((len(other) for other in lower), default=0) < count
     assert np.all(rule.weights > 0)
 
 
@@ -133,20 +129,10 @@ def test_number_beyond_the_largest_lebedev_rule_gives_a_product_rule():
 @pytest.mark.parametrize(
     "text",
     [
-        "",
-        "2.5",
-        "many",
-        "gauss:5",
-        "lebedev:x",
-        "lebedev:133",
-        "design:23",
-        "product:1001",
-        "fibonacci:0",
-        "equal-angle:7",
-        "equal-angle:0.1",
-        "equal-angle-full:100",
+        "", "2.5", "many", "gauss:5", "lebedev:x", "lebedev:133", "design:23", "product:1001",
+        "fibonacci:0", "equal-angle:7", "equal-angle:0.1", "equal-angle-full:100",
     ],
-)
+)  # fmt: skip
 def test_text_that_names_no_rule_is_an_error(text):
     with pytest.raises(SettingsError, match=r"^directions: "):
         direction_rule(text)

@@ -34,18 +34,16 @@ def test_scan_equals_the_slow_twin_for_all_variants(solids):
     for number, (triad, offset) in enumerate(zip(triads, offsets, strict=True)):
         keep = ~solids.removed
         tallies = [
-            naive.tally(naive.scan(p, r, triad, offset, 0.6, 3.0), 0.3)
-            for p, r in [
+            naive.tally(naive.scan(position, radius, triad, offset, 0.6, 3.0), 0.3)
+            for position, radius in [
                 (solids.position, solids.radius),
                 (solids.position[keep], solids.radius[keep]),
             ]
         ]
-        segments = [t.whole_kept for t in tallies] + [t.window_kept for t in tallies]
-        lines = [t.whole_lines for t in tallies] + [t.window_lines for t in tallies]
-        length = [t.whole_length for t in tallies] + [t.window_length for t in tallies]
-        assert sums.segments[0, :, number].tolist() == segments
-        assert sums.lines[0, :, number].tolist() == lines
-        assert sums.length[0, :, number] == pytest.approx(length, rel=1e-9)
+        for name, of in (("segments", "kept"), ("lines", "lines"), ("length", "length")):
+            ways = ("whole", "window")
+            expected = [getattr(tally, f"{way}_{of}") for way in ways for tally in tallies]
+            assert getattr(sums, name)[0, :, number] == pytest.approx(expected, rel=1e-9)
 
 
 def test_same_bytes_for_any_number_of_workers(solids):

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from numba import njit
 
 from scanfab import box, cylinder, direction_rule, ellipsoid, scan_lines, sphere
+from scanfab.base.jit import kernel
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.gaps import scan_gaps
 from scanfab.scan.kernels.strips import section_along, spans
@@ -53,7 +53,7 @@ def test_lines_along_the_axes_of_empty_windows_have_known_lengths():
         assert mean_lengths(sums, "c").value == pytest.approx(expected, rel=within)
 
 
-@njit
+@kernel
 def quadric_along(clip, triad):
     section = section_along(clip, triad)
     return section.level, section.a, section.b, section.c, section.rise_u, section.rise_v
@@ -74,16 +74,9 @@ def test_spans_are_those_of_the_naive_twin():
             triad, points = rotation(random), random.uniform(-2.0, 2.0, (40, 2))
             ends = np.empty((40, 2))
             spans(clip_of(window), triad, points, ends)
-            for place, (enters, leaves) in zip(points @ triad[:2], ends, strict=True):
-                low, high = naive.within(window, place, triad[2])
-                expected = (low, high) if low < high else (np.nan, np.nan)
-                assert (enters, leaves) == pytest.approx(expected, nan_ok=True, abs=1e-7)
-
-
-def packed(window):
-    random = np.random.default_rng(2)
-    spheres = poisson_spheres(random, 0.4, 2.5)
-    return solids_of(spheres, window, random.random(len(spheres.radius)) < 0.2)
+            low, high = naive.within(window, points @ triad[:2], triad[2])
+            expected = np.where(low < high, [low, high], np.nan).T
+            np.testing.assert_allclose(ends, expected, rtol=0, atol=1e-7)
 
 
 def test_a_place_just_below_a_period_lies_in_the_last_block():
@@ -92,16 +85,17 @@ def test_a_place_just_below_a_period_lies_in_the_last_block():
 
 
 def test_whole_and_window_may_have_blocks_of_their_own():
-    solids = packed(sphere(2.0))
+    spheres = poisson_spheres(np.random.default_rng(2), 0.4, 2.5)
+    solids = solids_of(spheres, 2.0, np.arange(len(spheres.radius)) % 5 == 0)
     cells = Blocks(np.full(3, -4.5), 9.0 * np.eye(3), (3, 1, 1), ENDLESS)
-    blocks = cells, Blocks.about(np.zeros(3), 3.0)
-    gaps = scan_gaps(solids, RULE, spacing=0.1, cutoffs=[0.0], blocks=blocks, replicates=[0])
+    about = Blocks.about(np.zeros(3), 3.0)
+    gaps, octants = (
+        scan_gaps(solids, RULE, spacing=0.1, cutoffs=[0.0], blocks=blocks, replicates=[0])
+        for blocks in ((cells, about), (about, about))
+    )
     found = gaps.number.sum(axis=(0, 2, 4)) > 0
     assert found[0].tolist() == [True] * 3 + [False] * 5
     assert found[2].all()
-    octants = scan_gaps(
-        solids, RULE, spacing=0.1, cutoffs=[0.0], blocks=(blocks[1], blocks[1]), replicates=[0]
-    )
     assert np.array_equal(gaps.number[:, 2:], octants.number[:, 2:])
 
 

@@ -17,34 +17,20 @@ RUNS_OF_A_KIND = 30
 REACH = 30.0
 
 
-def fast_sums(
-    spheres,
-    removed,
-    triad,
-    offset,
-    spacing,
-    window,
-    cutoffs,
-    centers,
-    *,
-    halves=True,
-    variants="abcd",
-):
+def fast_sums(line, centers, *, halves=True, variants="abcd"):
     """What the kernel adds up: shape (whole or window, set of solids, octant, bin, sum)."""
+    spheres, removed, triad, offset, spacing, window, cutoffs = line
     partition = partition_of(*(Blocks.about(center, REACH) for center in centers))
-    bins = Bins(
-        partition._replace(halves=halves or None),
-        np.array(cutoffs),
-        np.zeros((1, 2, 2, 8 * len(cutoffs), 3)),
-    )
+    sums = np.zeros((1, 2, 2, 8 * len(cutoffs), 3))
+    bins = Bins(partition._replace(halves=halves or None), np.array(cutoffs), sums)
     solids = Solids(*spheres, removed, region(window))
     tally_triads(solids, triad[None], offset[None], spacing, 0.0, variants, bins)
     return bins.sums.reshape(2, 2, 8, len(cutoffs), 3)
 
 
-def slow_sums(spheres, removed, triad, offset, spacing, window, cutoffs, centers):
+def slow_sums(line, centers):
     """The same from the list of all segments, each in the bin of the largest cut-off it reaches."""
-    position, radius = spheres
+    (position, radius), removed, triad, offset, spacing, window, cutoffs = line
     sums = np.zeros((2, 2, 8, len(cutoffs), 3))
     for which, solid in enumerate([np.ones(len(radius), bool), ~removed]):
         grid = position[solid], radius[solid], triad, offset, spacing, window
@@ -67,12 +53,12 @@ def check_random_packing(kind, random):
         np.exp(random.uniform(np.log(0.4), np.log(2.5))),
         random_window(random),
         np.sort(random.uniform(0.003, 2.0, random.integers(1, 5))),
-        random.uniform(-1.0, 1.0, (2, 3)),
     )
-    slow = slow_sums(*line)
+    centers = random.uniform(-1.0, 1.0, (2, 3))
+    slow = slow_sums(line, centers)
     # as octants, and as blocks of any number
     for halves in (True, False):
-        fast = fast_sums(*line, halves=halves)
+        fast = fast_sums(line, centers, halves=halves)
         assert np.array_equal(fast[..., 0], np.round(slow[..., 0]))
         np.testing.assert_allclose(fast, slow, rtol=1e-9, atol=1e-9)
     return slow[..., 0].sum(axis=3)
@@ -92,11 +78,11 @@ def check_only_what_is_wanted_is_added():
     random = np.random.default_rng(0)
     spheres = overlapping(random)
     removed = random.random(len(spheres.radius)) < 0.3
-    line = spheres, removed, rotation(random), random.random(2), 0.1, 2.0, [0.0]
+    line = spheres, removed, rotation(random), random.random(2), 0.3, 2.0, [0.0]
     centers = np.zeros((2, 3))
-    every = fast_sums(*line, centers)
+    every = fast_sums(line, centers)
     assert np.all(every.sum(axis=(2, 3, 4)) > 0)
     for variants in ("ab", "cd", "ac", "a", "d"):
-        alone = fast_sums(*line, centers, variants=variants)
+        alone = fast_sums(line, centers, variants=variants)
         wanted = np.isin([["a", "b"], ["c", "d"]], list(variants))[..., None, None, None]
         np.testing.assert_allclose(alone, every * wanted, rtol=1e-9, atol=1e-12)

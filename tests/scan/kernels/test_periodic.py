@@ -2,16 +2,25 @@
 
 import numpy as np
 import pytest
-from numba import njit
 
 from scanfab import Solids
+from scanfab.base.jit import kernel
 from scanfab.scan.kernels import periodic, sweep
 from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.tallies import FollowedTooFarError, Following, tally_triads
 from tests.helpers import naive
+from tests.helpers.lattices import simple_cubic, unit_vectors
 from tests.scan.kernels.test_axes import WAYS, by_lists
 
 PERIODS = [(1, 1, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (1, 0, 0), (0, 0, 1)]
+
+
+def medium_of(position, radius, vectors, removed=None, periods=(1, 1, 1)):
+    """Grains of radii of their own or of one, all of them solid unless some are removed."""
+    position = np.array(position, dtype=float)
+    radius = np.broadcast_to(np.asarray(radius, dtype=float), len(position)).copy()
+    removed = np.zeros(len(radius), bool) if removed is None else removed
+    return CellGrains(position, radius, removed, vectors, np.array(periods, dtype=bool))
 
 
 def random_cell(random):
@@ -27,8 +36,7 @@ def random_medium(random, periods=(1, 1, 1)):
     vectors = random_cell(random)
     position = random.uniform(-1, 2, (count, 3)) @ vectors
     radius = random.uniform(0.2, 0.9, count)
-    removed = random.random(count) < 0.3
-    return CellGrains(position, radius, removed, vectors, np.array(periods, dtype=bool))
+    return medium_of(position, radius, vectors, random.random(count) < 0.3, periods)
 
 
 def sparse_medium(random, periods=(1, 1, 1)):
@@ -36,17 +44,10 @@ def sparse_medium(random, periods=(1, 1, 1)):
     vectors = 1.5 * random_cell(random)
     position = random.uniform(0, 1, (40, 3)) @ vectors
     radius = np.append(random.uniform(0.1, 0.2, 39), random.uniform(1.0, 2.0))
-    return CellGrains(
-        position, radius, random.random(40) < 0.3, vectors, np.array(periods, dtype=bool)
-    )
+    return medium_of(position, radius, vectors, random.random(40) < 0.3, periods)
 
 
-def direction(random):
-    normal = random.normal(size=3)
-    return normal / np.linalg.norm(normal)
-
-
-@njit
+@kernel
 def prism_and_grid(medium, normal, offset, spacing):
     prism, _, grid, _ = periodic.cell_grid(medium, normal, offset, spacing)
     return prism, grid
@@ -74,7 +75,7 @@ def tallies_of(medium, normal, offset, spacing, cutoff, most_steps=np.inf):
 
 
 def check_equals_naive(random, periods, make=random_medium):
-    medium, normal = make(random, periods), direction(random)
+    medium, normal = make(random, periods), unit_vectors(random)
     offset, spacing, cutoff = random.random(2), random.uniform(0.3, 0.9), random.choice([0.0, 0.4])
     assert_equals_naive(medium, normal, offset, spacing, cutoff)
 
@@ -86,20 +87,9 @@ def assert_equals_naive(medium, normal, offset, spacing, cutoff):
         with by_lists(way):
             fast.append(tallies_of(medium, normal, offset, spacing, cutoff))
     for which, kept in enumerate([np.ones(len(medium.radius), bool), ~medium.removed]):
-        gaps = [
-            gap
-            for foot in feet
-            for gap in naive.periodic_gaps(
-                medium.position[kept],
-                medium.radius[kept],
-                medium.vectors,
-                medium.periodic,
-                foot,
-                normal,
-                measured,
-            )
-        ]
-        long_enough = [gap for gap in gaps if gap >= max(cutoff, 1e-300)]
+        grains = medium.position[kept], medium.radius[kept], medium.vectors, medium.periodic
+        gaps = [naive.periodic_gaps(*grains, foot, normal, measured) for foot in feet]
+        long_enough = [gap for line in gaps for gap in line if gap >= max(cutoff, 1e-300)]
         for tally in fast:
             length = pytest.approx(sum(long_enough), rel=1e-9, abs=1e-9)
             assert tally[which, sweep.KEPT] == len(long_enough)
@@ -122,10 +112,9 @@ def test_long_gaps_in_sparse_media_equal_those_of_explicit_images(periods):
 def test_a_large_grain_aside_does_not_end_a_gap_before_a_small_one():
     """It begins before what is listed ends, but on this line behind the small one, which is not."""
     fillers = [[4.0 + 0.4 * (k % 4), 3.0, 1.0 + 0.4 * (k // 4)] for k in range(36)]
-    position = np.array([[1.9, 0, 19.8], [1.9, 0, 3.6], [0, 0, 4.9], *fillers])
-    radius = np.array([0.15, 0.15, 2.0] + 36 * [0.15])
-    everywhere = np.ones(3, bool)
-    medium = CellGrains(position, radius, np.zeros(39, bool), np.diag([6.0, 6.0, 20.0]), everywhere)
+    position = [[1.9, 0, 19.8], [1.9, 0, 3.6], [0, 0, 4.9], *fillers]
+    radius = [0.15, 0.15, 2.0] + 36 * [0.15]
+    medium = medium_of(position, radius, np.diag([6.0, 6.0, 20.0]))
     assert_equals_naive(medium, np.array([0.0, 0, 1]), np.array([0.8, 0.0]), 0.5, 0.0)
 
 
@@ -133,7 +122,7 @@ def test_lines_spread_evenly_over_the_face_and_fill_the_cell():
     """Number of lines times their measured length times the area of each: the cell's volume."""
     random = np.random.default_rng(1)
     for _ in range(8):
-        medium, normal = random_medium(random), direction(random)
+        medium, normal = random_medium(random), unit_vectors(random)
         volumes = []
         for _ in range(20):
             tally = tallies_of(medium, normal, random.random(2), 0.1, 0.0)[0]
@@ -145,10 +134,9 @@ def test_lines_spread_evenly_over_the_face_and_fill_the_cell():
 def test_every_direction_crosses_its_face_steeply():
     """So that a line leaves the cell after little more than its height."""
     random = np.random.default_rng(2)
-    grain = np.zeros((1, 3)), np.ones(1), np.zeros(1, bool)
-    medium = CellGrains(*grain, np.diag([1.0, 2.0, 3.0]), np.ones(3, bool))
+    medium = medium_of(np.zeros((1, 3)), 1.0, np.diag([1.0, 2.0, 3.0]))
     for _ in range(50):
-        prism, _ = prism_and_grid(medium, direction(random), np.zeros(2), 1.0)
+        prism, _ = prism_and_grid(medium, unit_vectors(random), np.zeros(2), 1.0)
         assert prism.length <= np.sqrt(3) * 3.0 + 1e-9
         assert prism.triad @ prism.triad.T == pytest.approx(np.eye(3), abs=1e-12)
         assert prism.base_v > 0
@@ -156,24 +144,19 @@ def test_every_direction_crosses_its_face_steeply():
 
 def test_simple_cubic_along_an_edge():
     """d - 4h/3 with h = min(r, (d - c)/2); lines in channels are counted."""
-    medium = CellGrains(
-        np.array([[0.2, 0.7, 0.4]]), np.array([0.4]), np.zeros(1, bool), np.eye(3), np.ones(3, bool)
-    )
+    medium = medium_of([[0.2, 0.7, 0.4]], 0.4, np.eye(3))
     normal = np.array([0.0, 0.0, 1.0])
     for cutoff in (0.0, 0.3, 0.5):
         tally = tallies_of(medium, normal, np.array([0.3, 0.8]), 0.004, cutoff)[0]
         height = min(0.4, (1 - cutoff) / 2)
-        assert tally[sweep.LENGTH] / tally[sweep.KEPT] == pytest.approx(
-            1 - 4 / 3 * height, rel=2e-3
-        )
+        mean = tally[sweep.LENGTH] / tally[sweep.KEPT]
+        assert mean == pytest.approx(1 - 4 / 3 * height, rel=2e-3)
         lines = tally[sweep.LINES] + tally[sweep.CHANNELS]
         assert tally[sweep.CHANNELS] / lines == pytest.approx(1 - np.pi * 0.4**2, rel=5e-3)
 
 
 def test_grain_that_fills_its_cell_leaves_no_gap():
-    medium = CellGrains(
-        np.zeros((1, 3)), np.array([0.9]), np.zeros(1, bool), np.eye(3), np.ones(3, bool)
-    )
+    medium = medium_of(np.zeros((1, 3)), 0.9, np.eye(3))
     tally = tallies_of(medium, np.array([0.6, 0.0, 0.8]), np.array([0.1, 0.2]), 0.05, 0.0)[0]
     assert tally[sweep.KEPT] == 0
     assert tally[sweep.VOID] == pytest.approx(0, abs=1e-9)
@@ -183,12 +166,9 @@ def test_grain_that_fills_its_cell_leaves_no_gap():
 @pytest.fixture
 def corner():
     """A thousand grains in an eighth of their cell."""
-    lattice = np.stack(np.meshgrid(*3 * [np.arange(10.0)], indexing="ij"), -1).reshape(-1, 3)
-    position = lattice + np.random.default_rng(4).uniform(-0.2, 0.2, lattice.shape)
-    everywhere = np.ones(3, bool)
-    return CellGrains(
-        position, np.full(1000, 0.4), np.arange(1000) % 5 == 0, 20.0 * np.eye(3), everywhere
-    )
+    position = simple_cubic(10).position
+    position += np.random.default_rng(4).uniform(-0.2, 0.2, position.shape)
+    return medium_of(position, 0.4, 20.0 * np.eye(3), np.arange(1000) % 5 == 0)
 
 
 def test_following_ends_when_it_has_taken_the_steps_that_it_may(corner):
@@ -216,15 +196,14 @@ def test_without_overlap_the_mean_gap_is_that_of_stereology():
     """Porosity / (N_V π⟨r²⟩) at cut-off 0, in every direction without channels."""
     random = np.random.default_rng(3)
     vectors = np.array([[3.0, 0, 0], [1.0, 3, 0], [-1.0, 0.5, 3]])
-    grid = np.stack(np.meshgrid(*3 * [np.arange(3.0)], indexing="ij"), -1).reshape(-1, 3) / 3
-    position = grid @ vectors + random.uniform(-0.04, 0.04, (27, 3))
+    position = simple_cubic(3).position / 3 @ vectors + random.uniform(-0.04, 0.04, (27, 3))
     radius = random.uniform(0.25, 0.42, 27)
-    medium = CellGrains(position, radius, np.zeros(27, bool), vectors, np.ones(3, bool))
+    medium = medium_of(position, radius, vectors)
     volume = abs(np.linalg.det(vectors))
     porosity = 1 - 4 / 3 * np.pi * np.sum(radius**3) / volume
     expected = porosity * volume / (np.pi * np.sum(radius**2))
     total = sum(
-        tallies_of(medium, direction(random), random.random(2), 0.04, 0.0)[0] for _ in range(60)
+        tallies_of(medium, unit_vectors(random), random.random(2), 0.04, 0.0)[0] for _ in range(60)
     )
     assert total[sweep.LENGTH] / total[sweep.KEPT] == pytest.approx(expected, rel=0.01)
     assert total[sweep.VOID] / total[sweep.LINE_LENGTH] == pytest.approx(porosity, rel=0.01)
