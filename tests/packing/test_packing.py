@@ -52,6 +52,15 @@ BOX = Cell([5.7, 9, 9], (False, False, False))
         ({"contacts": ContactList([[0, 1]], force_n=[1.0, 2.0])}, r"force_n: expected shape \(1"),
         ({"contacts": ContactList([[0, 1]], image=[[0, 0]])}, r"image: expected shape \(1, 3\)"),
         ({"contacts": [[0, 0]], "bodies": [3, 3, -1]}, "grain 10: in contact with itself"),
+        (
+            {"contacts": [[0, 0]], "cell": Cell([2.0, 9, 9])},
+            r"itself; find .*own images.*`contacts=",
+        ),
+        ({"contacts": [[0, 1]], "cell": Cell([1.5, 9, 9])}, "through more than one .*geometric"),
+        (
+            {"contacts": ContactList([[0, 1]], image=[[0, 0, 1]]), "cell": BOX},
+            "passes a face that is not periodic",
+        ),
         ({"contacts": [[0, 3]]}, r"contact 0 names the rows \[0, 3\]"),
         (
             {"contacts": [[0, 2]], "cell": BOX},
