@@ -5,18 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from scanfab import (
-    Cell,
-    ContactList,
-    Packing,
-    PackingError,
-    SettingsError,
-    Window,
-    compute,
-    contact_fabric,
-    find_contacts,
-    sphere,
-)
+import scanfab
+from scanfab import Cell, ContactList, Packing, PackingError, contact_fabric, find_contacts
 from scanfab.packing.sample import VARIANTS
 from scanfab.packing.search import near_pairs, overlapping_pairs
 from tests.helpers import naive
@@ -89,7 +79,9 @@ def test_wrong_units_and_tolerances_are_told():
     with pytest.raises(PackingError, match="spans 200 periodic cells: have the cell and the radii"):
         find_contacts(Packing([[0.5, 0.5, 0.5]], 100.0, cell=Cell([1.0, 1.0, 1.0])))
     for tolerance in (-1e-9, np.inf, np.nan):
-        with pytest.raises(SettingsError, match="contact_tolerance: expected a number >= 0, found"):
+        with pytest.raises(
+            scanfab.SettingsError, match="contact_tolerance: expected a number >= 0, found"
+        ):
             find_contacts(Packing([[0, 0, 0]], 1.0), tolerance)
 
 
@@ -144,7 +136,9 @@ def test_cubic_lattices_have_their_coordination_and_the_isotropic_fabric(lattice
     assert np.abs(tensor.matrix - np.eye(3) / 3).max() < 1e-9
     assert tensor.alpha < 1e-9
     if count == 5:
-        row = compute(packing, variants="c", directions="lebedev:5", spacing=0.2, cutoff=0.1)[0]
+        (row,) = scanfab.compute(
+            packing, variants="c", directions="lebedev:5", spacing=0.2, cutoff=0.1
+        )
         assert (row.coordination, row.rattlers) == (each, 0)
         assert row.alpha_c == pytest.approx(0, abs=1e-9)
 
@@ -221,7 +215,7 @@ def test_pairs_of_a_tilted_cell(sample, variant):
 
 
 def test_pairs_of_an_rv_have_their_middles_in_it(sample):
-    window = Window(np.array([3.0, 3.0, 2.5]), sphere(2.0))
+    window = scanfab.Window(np.array([3.0, 3.0, 2.5]), scanfab.sphere(2.0))
     counted = sample.counted(VARIANTS["c"], window)
     found = near_pairs(sample.packing, sample.grains, counted, window, 0.25)
     middles = every_pair(sample.packing, sample.grains, 0.25)[:, 4:]

@@ -99,11 +99,7 @@ def test_fibonacci_has_a_small_bias():
 
 @pytest.mark.parametrize(
     ("text", "name", "axes"),
-    [
-        ("lebedev:4", "lebedev:5", 7),
-        ("lebedev:13", "lebedev:15", 43),
-        ("design:8", "design:9", 24),
-    ],
+    [("lebedev:4", "lebedev:5", 7), ("lebedev:13", "lebedev:15", 43), ("design:8", "design:9", 24)],
 )
 def test_degrees_are_rounded_up(text, name, axes):
     rule = direction_rule(text)

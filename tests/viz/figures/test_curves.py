@@ -178,39 +178,42 @@ def captions(rows, **values):
     return [one.caption for one in make_figures(with_all(rows, **values), "table")]
 
 
+BELOW = [{**row, "alpha_c_axial": row["alpha_c_axial"] - 1} for row in curve()]
+AXES = "and the angle between their major axes"
+
+
 @pytest.mark.filterwarnings(TURNED)
-def test_captions_say_what_is_drawn():
-    evolution, normalised, correlation = captions(curve(), **SAMPLES)
-    errors = "with total standard errors of voids and contacts"
-    assert evolution == (
-        f"Void and contact anisotropy along the loading axis, over the axial strain; {errors}."
-    )
-    assert normalised.endswith(f"each curve divided by its own largest absolute value; {errors}.")
-    assert correlation == (
-        "Void against contact anisotropy along the loading axis, with fitted lines and the "
-        "paper's slope."
-    )
+@pytest.mark.parametrize(
+    ("rows", "values", "number", "said"),
+    [
+        (curve(), {}, 0, "Void and contact anisotropy along the loading axis, over the axial"),
+        (curve(), {}, 0, "strain; without total errors."),
+        (curve(), SAMPLES, 0, "strain; with total standard errors of voids and contacts."),
+        (curve(), VOID_SAMPLE, 0, "strain; with total standard errors of voids."),
+        (curve(), CONTACT_SAMPLE, 0, "strain; with total standard errors of contacts."),
+        (
+            curve(),
+            SAMPLES,
+            1,
+            "largest absolute value; with total standard errors of voids and con",
+        ),
+        (curve(), {}, 2, "along the loading axis, with fitted lines and the paper's slope."),
+        (sheared(), SAMPLES, 0, f"{AXES}, over the shear strain; without total errors."),
+        (sheared(), SAMPLES, 1, "Intensity of void and contact anisotropy, over"),
+        (sheared(), SAMPLES, 2, "Void against contact intensity, without a line."),
+        # one frame has no line; nor is the paper's slope drawn where all contacts lie below zero
+        (curve()[:1], {}, 2, ", without a line."),
+        (BELOW, {}, 2, ", with fitted lines."),
+    ],
+)
+def test_captions_say_what_is_drawn(rows, values, number, said):
+    assert said in captions(rows, **values)[number]
+
+
+def test_the_paper_s_line_can_be_left_out():
     plain = Correlation(Table(curve()), paper_line=False)
     assert plain.caption.endswith("along the loading axis, with fitted lines.")
     assert ":" not in {line.get_linestyle() for line in plain.on(Page()).axes[0].lines}
-    evolution, normalised, correlation = captions(sheared(), **SAMPLES)
-    assert evolution == (
-        "Intensity of void and contact anisotropy, and the angle between their major axes, over "
-        "the shear strain; without total errors."
-    )
-    assert normalised.startswith("Intensity of void and contact anisotropy, over")
-    assert correlation == "Void against contact intensity, without a line."
-    # the errors that have bands are named
-    for errors, named in (
-        ({}, "without total errors"),
-        (VOID_SAMPLE, "with total standard errors of voids"),
-        (CONTACT_SAMPLE, "with total standard errors of contacts"),
-    ):
-        assert captions(curve(), **errors)[0].endswith(f"; {named}.")
-    # one frame has no line; nor is the paper's slope drawn where all contacts lie below zero
-    assert captions(curve()[:1])[2].endswith(", without a line.")
-    below = [{**row, "alpha_c_axial": row["alpha_c_axial"] - 1} for row in curve()]
-    assert captions(below)[2].endswith(", with fitted lines.")
 
 
 def test_columns_have_a_panel_each_with_the_table_s_numbers(drawn):
@@ -283,11 +286,7 @@ def test_each_line_of_several_groups_is_that_of_its_curve(drawn):
 
 def test_errors_of_the_correlation_look_in_the_legend_as_they_are_drawn(drawn):
     """A grey line looked like the one through zero."""
-    for errors, shape in (
-        (SAMPLES, "+"),
-        (VOID_SAMPLE, "|"),
-        ({"alpha_c_axial_se": 1e-2}, "_"),
-    ):
+    for errors, shape in ((SAMPLES, "+"), (VOID_SAMPLE, "|"), ({"alpha_c_axial_se": 1e-2}, "_")):
         margin = drawn(with_all(curve(), **errors), "correlation").axes[1]
         handle = margin.get_legend().legend_handles[-1]
         assert (handle.get_marker(), handle.get_linestyle()) == (shape, "None")

@@ -194,13 +194,6 @@ def test_the_words_of_a_figure_fit_its_width(drawn):
         assert np.all(box.max < figure.get_size_inches() + 0.02)
 
 
-def test_nothing_to_draw_is_an_error(tmp_path):
-    for rows in ([], [{**row, "alpha_vs_axial": None} for row in curve()]):
-        with pytest.raises(SettingsError, match="nothing to draw"):
-            save_rows(tmp_path / "x.png", rows)
-    assert not list(tmp_path.iterdir())
-
-
 def test_files_are_what_their_names_say_and_repeat(tmp_path):
     for suffix, begin in BYTES.items():
         one, two = tmp_path / f"one{suffix}", tmp_path / f"two{suffix}"

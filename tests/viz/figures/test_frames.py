@@ -17,15 +17,9 @@ from scanfab.fabric.distribution import direction_points, fit_even
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
 from scanfab.table.row import column_of, total_errors
+from scanfab.viz.figures import projection
 from scanfab.viz.figures.figure import drawn_page, find_figure, make_figures
 from scanfab.viz.figures.parameters import CutoffCurve, Cutoffs
-from scanfab.viz.figures.projection import (
-    contact_noise,
-    noise_note,
-    places_of,
-    smoothed_density,
-    void_noise,
-)
 from scanfab.viz.figures.rose import contact_ring
 from scanfab.viz.scanned_frames import ScannedFrames
 from tests.conftest import ROOT, SAMPLE
@@ -35,7 +29,7 @@ from tests.helpers.lattices import unit_vectors
 
 pytestmark = pytest.mark.filterwarnings("ignore:skipped:scanfab.base.errors.ScanfabNote")
 WORDS = {"boundary": "mask=3", "tolerance": 5e-4}
-DENSITY = places_of(SPACE)[1][::8, ::12]
+DENSITY = projection.places_of(SPACE)[1][::8, ::12]
 
 
 @pytest.fixture(scope="module")
@@ -230,11 +224,11 @@ def test_rings_and_density_of_isotropic_normals_are_one():
         assert np.all(np.abs(ring.value - 1) < 5 * ring.error)
         assert ring.value.mean() == pytest.approx(1, abs=0.02)
         assert ring.curve(ring.theta) == pytest.approx(1, abs=0.02)
-    assert smoothed_density(normals, DENSITY) == pytest.approx(1, abs=0.02)
+    assert projection.smoothed_density(normals, DENSITY) == pytest.approx(1, abs=0.02)
 
 
 def test_the_disk_is_equal_area():
-    places, directions = places_of(SPACE)
+    places, directions = projection.places_of(SPACE)
     assert np.linalg.norm(directions, axis=-1) == pytest.approx(1)
     # the cap within polar angle p has the share 1 - cos p of the hemisphere, as of the disk
     rho = np.linalg.norm(places, axis=-1)
@@ -249,7 +243,7 @@ def test_the_projection_is_the_distribution(figures, computed):
     assert voids[-1].max() < -1
     assert last["contacts"][0, 0] > 10
     # second harmonic of the fabric tensor: mean of (l/mean - 1)(3 z^2 - 1)/2 is alpha_vs_axial
-    _, n = places_of(SPACE)
+    _, n = projection.places_of(SPACE)
     weight = np.repeat(np.linspace(0, 1, n.shape[0])[:, None], n.shape[1] - 1, axis=1)
     value = np.average(0.01 * voids[:, :-1] * (1.5 * n[:, :-1, 2] ** 2 - 0.5), weights=weight)
     assert value == pytest.approx(row_of(computed, 6)["alpha_vs_axial"], rel=0.05)
@@ -268,18 +262,20 @@ def test_the_noise_of_the_scan_is_that_of_fits_to_noise():
         alphas.append(weights @ (deviation * second))
         deviations.append(deviation)
     row = {"alpha_vs_axial_se": float(np.std(alphas)), "alpha_vs_axial_sample_se": 0.0}
-    assert void_noise(row) == pytest.approx(100 * np.std(deviations), rel=0.25)
+    assert projection.void_noise(row) == pytest.approx(100 * np.std(deviations), rel=0.25)
 
 
 def test_the_noise_of_contacts_is_that_of_isotropic_ones():
     rng = np.random.default_rng(2)
-    deviations = [smoothed_density(unit_vectors(rng, 500), DENSITY) - 1 for _ in range(40)]
+    deviations = [
+        projection.smoothed_density(unit_vectors(rng, 500), DENSITY) - 1 for _ in range(40)
+    ]
     alone = axial_error(unit_vectors(rng, 500), (0, 0, 1))
     row = {"contacts": 500, "alpha_c_axial_se": alone}
-    noise = contact_noise({**row, "alpha_c_axial_sample_se": alone})
+    noise = projection.contact_noise({**row, "alpha_c_axial_sample_se": alone})
     assert noise == pytest.approx(100 * np.std(deviations), rel=0.1)
     # as neighbours are not independent, less of it is chance
-    half = contact_noise({**row, "alpha_c_axial_sample_se": 0.5 * alone})
+    half = projection.contact_noise({**row, "alpha_c_axial_sample_se": 0.5 * alone})
     assert half == pytest.approx(0.5 * noise)
 
 
@@ -287,12 +283,12 @@ def test_lobes_below_the_noise_are_called_so():
     row = {"alpha_vs_axial_se": 0.0, "alpha_vs_axial_sample_se": 2e-3}
     frame = SimpleNamespace(space=SPACE, row=row, number=3)
     for largest, end in ((1.0, "so they are noise."), (4.0, "is 1 %.")):
-        text = noise_note(frame, {"voids": np.array([-largest, 0.5]), "contacts": None})
+        text = projection.noise_note(frame, {"voids": np.array([-largest, 0.5]), "contacts": None})
         start = f"Frame 3: lobes of void lengths reach {largest:g} %, one standard error is 1 %"
         assert text.startswith(start)
         assert text.endswith(end)
     row["alpha_vs_axial_sample_se"] = None
-    assert noise_note(frame, {"voids": np.array([-1.0, 0.5]), "contacts": None}) == ""
+    assert projection.noise_note(frame, {"voids": np.array([-1.0, 0.5]), "contacts": None}) == ""
 
 
 def test_lengths_have_the_mean_of_the_table(figures, computed):

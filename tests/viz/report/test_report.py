@@ -288,10 +288,8 @@ def test_title_author_and_date(table, plain):
     assert "<title>Void fabric of sand</title>" in page
     assert 'class="byline">2031-02-03</p>' in page
     page = page_of([path], title="A & B", author="Ann <x>", today=date(2031, 2, 3))
-    assert "<title>A &amp; B</title>" in page
     assert "<h1>A &amp; B</h1>" in page
-    assert '<meta name="author" content="Ann &lt;x&gt;">' in page
-    assert "Ann <x>, 2031-02-03" in words_of(page).replace("&lt;", "<")
+    assert ">Ann &lt;x&gt;, 2031-02-03</p>" in page
 
 
 def test_notes_are_not_warnings(copied, plain):

@@ -11,12 +11,7 @@ from scanfab.io.sources import READING, read_series
 from scanfab.pipeline.map_settings import MapSettings
 from scanfab.pipeline.options import MEANINGS
 from scanfab.table.compare import compare_tables
-from scanfab.viz.report.tables import (
-    caveats_of,
-    frame_table,
-    overview,
-    results_tables,
-)
+from scanfab.viz.report.tables import caveats_of, frame_table, overview, results_tables
 from tests.helpers.tables import curve, sheared
 
 
