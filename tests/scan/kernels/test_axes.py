@@ -128,20 +128,12 @@ def check_random_packing(kind, random):
         spacing *= 0.2
     axis = random.integers(0, 3)
     triad = line_triads(np.eye(3))[axis] if random.random() < 0.2 else rotation(random)
-    assert_fast_equals_naive(
-        (position + random.uniform(-0.5, 0.5, 3), radius),
-        random.random(len(radius)) < random.choice([0.0, 0.3, 1.0]),
-        triad,
-        random.random(2),
-        spacing,
-        [
-            0.0,
-            random.uniform(0.01, 0.5),
-            random.uniform(0.5, 2.0),
-            2.0 * (region(window).reach if window else 0.0) + 1e-3,
-        ],
-        window,
-    )
+    spheres = position + random.uniform(-0.5, 0.5, 3), radius
+    removed = random.random(len(radius)) < random.choice([0.0, 0.3, 1.0])
+    grid = triad, random.random(2), spacing
+    cutoffs = [0.0, random.uniform(0.01, 0.5), random.uniform(0.5, 2.0)]
+    cutoffs += [2.0 * (region(window).reach if window else 0.0) + 1e-3]
+    assert_fast_equals_naive(spheres, removed, *grid, cutoffs, window)
 
 
 @kernel

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import re
 import shutil
@@ -108,10 +107,6 @@ class Browser:
 
     def _act(self, *actions: dict[str, Any]) -> None:
         self._ask("POST", "/actions", {"actions": list(actions)})
-
-    def printed(self) -> bytes:
-        """The page as PDF."""
-        return base64.b64decode(self._ask("POST", "/print", {"background": True}))
 
 
 def _moves(x: int, y: int, dx: int, dy: int) -> list[dict[str, Any]]:
