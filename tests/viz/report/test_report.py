@@ -61,6 +61,11 @@ def words_of(page):
     return re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]*>", " ", text)))
 
 
+def part_of(page, name):
+    """What a reader sees of one section."""
+    return words_of(page.partition(f'id="{name}"')[2].partition("<h2")[0])
+
+
 def test_the_sample_is_told_in_full(page):
     text = words_of(page)
     for part in (
@@ -201,7 +206,7 @@ def test_the_error_is_that_of_scan_and_sample_together(page, computed):
     parts = row["alpha_vs_axial_se"], row["alpha_vs_axial_sample_se"]
     total = f"{math.hypot(*parts):#.2g}"
     value = f"{row['alpha_vs_axial']:.{len(total) - 2}f}"
-    results = words_of(page[page.index('id="results"') : page.index('id="warnings"')])
+    results = part_of(page, "results")
     assert f"{value} ± {total}" in results
     assert f"± {parts[0]:#.2g}" not in words_of(page)
     assert "its error: scan" in results
@@ -222,20 +227,15 @@ def test_a_sheared_cell_is_told_by_its_shear(table, undrawn):
         *["Intensity of void and contact anisotropy"] * 2,
         "Void against contact intensity",
     ]
-    notes = words_of(page[page.index('id="notes"') :])
-    assert "the loading axis is not the axis of the contact fabric" in notes
-    frames = page[page.index('id="frames"') :]
-    assert re.findall(r"<th>(.*?)</th>", frames)[:3] == ["frame", "variant", "shear strain"]
-    assert "3 c 30 % " in words_of(frames)
+    assert "the loading axis is not the axis of the contact fabric" in part_of(page, "notes")
+    assert "frame variant shear strain" in part_of(page, "frames")
+    assert "3 c 30 % " in part_of(page, "frames")
 
 
 def test_sources_of_both_kinds_have_each_their_own_strain(table, plain):
     page = page_of([table(sheared(), "s.jsonl"), table(curve())])
-    frames = words_of(page[page.index('id="frames"') :])
-    assert "shear strain 0 to 40 %" in words_of(page)
-    assert "axial strain 0 to 4 %" in words_of(page)
-    assert "3 c - 30 % " in frames
-    assert "3 c 3 % - " in frames
+    for said in ("shear strain 0 to 40 %", "axial strain 0 to 4 %", "3 c - 30 % ", "3 c 3 % - "):
+        assert said in words_of(page)
 
 
 def test_a_constant_strain_names_no_end(table, plain):
@@ -246,17 +246,13 @@ def test_a_constant_strain_names_no_end(table, plain):
 
 def test_an_rv_is_told_beside_the_sample_that_it_was_made_for_and_the_one_shown(page, computed):
     """Under the heading of the last frame, in which the sample is shorter."""
-    found = re.search(
-        r"0\.7 of half the sample's smallest extent in the reference frame, "
-        r"([\d.]+) in frame 6,",
-        words_of(page),
-    )
-    assert found is not None
+    told = r"0\.7 of half the sample's smallest extent in the reference frame, ([\d.]+) in frame 6,"
+    (share,) = re.findall(told, words_of(page))
     packing = [*read_series(f"{ROOT}/sample_data/yade_triaxial")][6].read()
     grains = packing.columns["mask"] != 3
     ends = packing.position[grains], packing.radius[grains, None]
     extent = ((ends[0] + ends[1]).max(axis=0) - (ends[0] - ends[1]).min(axis=0)).min()
-    assert float(found[1]) == pytest.approx(2 * 0.008058 / extent, rel=1e-2)
+    assert float(share) == pytest.approx(2 * 0.008058 / extent, rel=1e-2)
 
 
 def test_an_rv_is_a_part_of_the_sample_without_grains_that_flew_away(tmp_path, plain):
@@ -296,12 +292,10 @@ def test_notes_are_not_warnings(copied, plain):
     words = {"notes": ["a quiet word"], "warnings": ["a loud word"]}
     change(copied, sources=["gone"], directions="equal-angle:10", **words)
     page = page_of([copied])
-    warned = page[page.index('id="warnings"') : page.index('id="notes"')]
-    noted = page[page.index('id="notes"') : page.index('id="sample"')]
-    assert "a loud word" in warned
-    assert "a sample without any anisotropy would get" in warned
-    assert "a quiet word" not in warned
-    assert "a quiet word" in noted
+    assert "a loud word" in part_of(page, "warnings")
+    assert "a sample without any anisotropy would get" in part_of(page, "warnings")
+    assert "a quiet word" not in part_of(page, "warnings")
+    assert "a quiet word" in part_of(page, "notes")
 
 
 def test_a_report_is_saved_by_one_call(table, tmp_path, plain):
