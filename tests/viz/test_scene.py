@@ -1,4 +1,4 @@
-"""Scenes and their view: what is known of each grain and contact, sections, and the camera."""
+"""Scenes and their views: what is known of grains and contacts, sections, camera, report."""
 
 from __future__ import annotations
 
@@ -11,9 +11,19 @@ from scanfab.packing.sample import Sample
 from scanfab.packing.window import Window
 from scanfab.viz.figures.style import rounded_down
 from scanfab.viz.meshes import contact_mesh
-from scanfab.viz.scene import Scene, about_window, grains_of, scene_of, section_lines
+from scanfab.viz.report.page import MOST_GRAINS, view_data
+from scanfab.viz.scene import (
+    Grains,
+    Scene,
+    about_window,
+    grains_of,
+    look_at,
+    scene_of,
+    section_lines,
+)
 from scanfab.viz.window3d import BOTTOM, SIZE, TOP, aim
 from tests.helpers.lattices import simple_cubic
+from tests.helpers.truth import SAMPLE_DATA
 
 
 @pytest.fixture
@@ -139,3 +149,30 @@ def test_all_balls_are_in_the_picture_and_fill_it(shape, size):
 def test_scales_are_round():
     for value, length in ((0.0129, 0.01), (0.49, 0.2), (0.5, 0.5), (7.0, 5.0), (1e-9, 1e-9)):
         assert rounded_down(value) == pytest.approx(length)
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
+def test_all_spheres_of_a_clump_have_its_shade():
+    series = scanfab.read_series(SAMPLE_DATA / "liggghts_clumps", contacts="geometric")
+    clumps = look_at(series, scanfab.Settings(), 2)
+    data = view_data(clumps.scene, clumps.axis)
+    body = clumps.sample.packing.bodies.number
+    away = np.linalg.norm(clumps.scene.grains.places - clumps.scene.center, axis=1)
+    numbers = body[np.argsort(away, kind="stable")].tolist()
+    shades = [one[5] for one in data["spheres"]]
+    assert len(set(zip(numbers, shades, strict=True))) == len(set(numbers))
+    assert set(shades) == {0, 1, 2}
+    assert len(data["shades"]) == 3
+
+
+def test_a_large_sample_is_thinned():
+    count = 3 * MOST_GRAINS
+    position = np.random.default_rng(0).uniform(-1, 1, (count, 3))
+    no = np.zeros(count, bool)
+    grains = Grains(position, np.full(count, 0.01), np.arange(count), no * 1, no, no, no)
+    data = view_data(Scene(grains, np.zeros(3)), (0, 0, 1))
+    assert (len(data["spheres"]), data["left_out"]) == (MOST_GRAINS, 2 * MOST_GRAINS)
+    assert max(abs(number) for sphere in data["spheres"] for number in sphere) <= 1000
+    # spheres alone have no shades
+    assert {len(sphere) for sphere in data["spheres"]} == {5}
+    assert len(data["shades"]) == 1
