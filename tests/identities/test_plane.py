@@ -16,6 +16,7 @@ from scanfab.scan.scan import scan_lines, sums_of
 from scanfab.scan.solids import Solids
 from scanfab.scan.tallies import tally_triads
 from tests.helpers import naive
+from tests.helpers.scanning import ratio
 
 XY = Space(2)
 WINDOWS = {
@@ -46,9 +47,8 @@ def along(*angles):
 
 def mean_lengths(solids, rule, spacing, cutoff, variant, replicates=32):
     """ℓ of each axis and its standard error over the replicates."""
-    sums = scan_lines(
-        solids, rule, spacing=spacing, cutoff=cutoff, variants=variant, replicates=range(replicates)
-    )
+    words = {"spacing": spacing, "cutoff": cutoff, "variants": variant}
+    sums = scan_lines(solids, rule, replicates=range(replicates), **words)
     length, number = sums.kept(variant)
     scatter = np.std(length / np.maximum(number, 1), axis=0, ddof=1) / sqrt(replicates)
     return length.sum(axis=0) / number.sum(axis=0), scatter
@@ -137,19 +137,15 @@ def test_poisson_discs(edge):
         packing = Packing(position, radius, dim=2)
         sample = Sample(find_contacts(packing), np.zeros(len(radius), bool))
         solids = solids_of(sample, Window(np.zeros(3), window), variants="c", edge=edge)
-        rule = plane_rule(8, XY)
-        sums = scan_lines(
-            solids, rule, spacing=0.2, cutoff=cutoff, variants="c", replicates=range(2)
-        )
+        words = {"spacing": 0.2, "cutoff": cutoff, "variants": "c", "replicates": range(2)}
+        sums = scan_lines(solids, plane_rule(8, XY), **words)
         found.append([one.sum() for one in sums.kept("c")])
-    length, number = np.array(found).T
+    value, error = ratio(*np.array(found).T)
     beta = density * 2 * 0.6
     expected = cutoff + 1 / beta
     if edge == "clip":
         shared, slope = window.overlap(np.eye(3)[:1], cutoff)
         expected = cutoff + shared[0] / (slope[0] + beta * shared[0])
-    value = length.sum() / number.sum()
-    error = np.std(length - value * number, ddof=1) / number.mean() / sqrt(len(number))
     assert abs(value - expected) < 4 * error
     assert error < 0.02 * expected
 

@@ -1,6 +1,6 @@
 """Blocks of every kind: a place's block, and the segments with their middle in each."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -130,10 +130,9 @@ def check_periodic_whole(random, periods):
     medium, offset, spacing = random_medium(random, periods), random.random(2), 0.4
     normal = rotation(random)[0]
     feet, measured = lines_of(medium, normal, offset, spacing)
-    segments = []
-    for foot in feet:
-        words = medium.position, medium.radius, medium.vectors, medium.periodic, foot, normal
-        segments += naive.periodic_segments(*words, measured)
+    grains = medium.position, medium.radius, medium.vectors, medium.periodic
+    found = [naive.periodic_segments(*grains, foot, normal, measured) for foot in feet]
+    segments = [one for line in found for one in line]
     cell = Cell(medium.vectors, tuple(map(bool, periods)))
     solids = Solids(np.zeros((0, 3)), np.zeros(0), np.zeros(0, bool), None, medium)
     triad = np.stack([*np.zeros((2, 3)), normal])
@@ -158,17 +157,13 @@ def check_start(random):
     triad, offset, spacing = rotation(random), random.random(2), 0.4
     solids = open_solids(*spheres, spheres.radius < 0, window, START)
     segments = []
-    for i in range(-6, 7):
-        for j in range(-6, 7):
-            foot = (i + offset[0]) * spacing * triad[0] + (j + offset[1]) * spacing * triad[1]
-            enters, leaves = naive.within(window, foot, triad[2])
-            ends = naive.union(naive.chords(*spheres, foot, triad[2]))
-            for (_, low), (high, _) in pairwise(ends):
-                segments += [
-                    (high - low, foot + place * triad[2], 0.5)
-                    for place in (low, high)
-                    if enters < place < leaves
-                ]
+    for place in product(range(-6, 7), repeat=2):
+        foot = spacing * (place + offset) @ triad[:2]
+        enters, leaves = naive.within(window, foot, triad[2])
+        solid = naive.union(naive.chords(*spheres, foot, triad[2]))
+        for (_, low), (high, _) in pairwise(solid):
+            ends = [end for end in (low, high) if enters < end < leaves]
+            segments += [(high - low, foot + end * triad[2], 0.5) for end in ends]
     for blocks in some_blocks(random):
         fast = fast_sums(solids, blocks, triad, offset, spacing, "c")[0]
         np.testing.assert_allclose(fast, kept_in(segments, blocks), rtol=1e-9, atol=1e-9)
