@@ -29,18 +29,19 @@ def test_odd_values_are_refused_by_table_row_and_column(table):
             make_report([table(rows)])
 
 
-def test_tables_of_other_programs_and_of_compare_are_refused(computed, tmp_path, capsys):
+def test_tables_of_other_programs_and_of_compare_are_refused(table, tmp_path, capsys):
     """Those of compare were reported as made of one replicate."""
     other, page = tmp_path / "other.csv", tmp_path / "r.html"
+    given = str(table([*curve(), *curve(variant="d")]))
     for words in ([], ["--summary"], ["--differences"]):
-        assert run(["compare", str(computed.table), *words, "-o", str(other)]) == 0
+        assert run(["compare", given, *words, "-o", str(other)]) == 0
         assert run(["report", str(other), "-o", str(page)]) == 1
         told = capsys.readouterr().err
         assert re.search(r"other.csv: this is (a table|the \w+) of scanfab compare: ", told)
         assert "expected a table of scanfab compute" in told
-    table = ROOT / SAMPLE / "engine.csv"
-    assert run(["report", str(table), "-o", str(page)]) == 1
-    assert f"{table}: there is no column" in capsys.readouterr().err
+    engine = ROOT / SAMPLE / "engine.csv"
+    assert run(["report", str(engine), "-o", str(page)]) == 1
+    assert f"{engine}: there is no column" in capsys.readouterr().err
     assert not page.exists()
 
 
