@@ -183,15 +183,10 @@ def without_cell(path):
     return find_contacts(Packing(packing.position, packing.radius)), packing.cell
 
 
-@pytest.mark.parametrize(
-    "path",
-    [
-        CELL,
-        truth.CELL / "dump_150000.txt.gz",
-        truth.YADE / "periodic.xml.bz2",
-        truth.PERIODIC / "precise.txt",
-    ],
-)
+OTHERS = truth.YADE / "periodic.xml.bz2", truth.PERIODIC / "precise.txt"
+
+
+@pytest.mark.parametrize("path", [CELL, truth.CELL / "dump_150000.txt.gz", *OTHERS])
 def test_the_periods_of_a_cell_that_is_lost_are_found(path):
     packing, cell = without_cell(path)
     # contacts overlap by some per cent of a radius

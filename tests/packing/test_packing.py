@@ -67,11 +67,7 @@ BOX = Cell([5.7, 9, 9], (False, False, False))
             r"10 and 30.*\(`cell` and `periodic`\).*another step",
         ),
         (
-            {
-                "position": ROW * [1, 0, 0] + [[0, 0, 0], [0, 4, 0], [0, 0, 0]],
-                "contacts": [[0, 1]],
-                "cell": Cell([5.7, 9, 9]),
-            },
+            {"position": 2 * ROW, "contacts": [[0, 1]], "cell": Cell([11.4, 9, 9])},
             "is this the contact list of another step",
         ),
     ],
@@ -116,9 +112,8 @@ def test_grains_with_the_same_centre_are_no_contact():
 def test_a_contact_may_be_open_by_half_the_smaller_grain(radius):
     for gap in (0.0, 0.49):
         Packing([[0, 0, 0], [1.5 + gap, 0, 0], [9, 0, 0]], radius, contacts=[[0, 1]])
-    with pytest.raises(
-        PackingError, match=r"centres are 2\.01 apart and their radii add up to 1.5"
-    ):
+    told = r"centres are 2\.01 apart and their radii add up to 1.5"
+    with pytest.raises(PackingError, match=told):
         Packing([[0, 0, 0], [2.01, 0, 0], [9, 0, 0]], radius, contacts=[[0, 1]])
 
 
@@ -145,14 +140,6 @@ def test_each_pair_counts_once_with_its_first_force_whichever_grain_is_first():
     np.testing.assert_array_equal(contacts.force, force[[0, 2]])
 
 
-def test_the_source_of_a_list_is_kept():
-    assert Packing(ROW, 1.0, contacts=[[0, 1]]).contacts.source == "file"
-    assert in_cell().contacts is None
-    assert in_cell().with_contacts(ContactList([], source="geometric")).contacts.source == (
-        "geometric"
-    )
-
-
 @pytest.mark.parametrize(("walls", "expected"), [(None, [1, 0, 2]), ([0, 3, 1], [0, 3, 1])])
 def test_other_contacts_keep_everything_else(walls, expected):
     """Also those with walls, unless others are named, whose forces are not known."""
@@ -161,7 +148,8 @@ def test_other_contacts_keep_everything_else(walls, expected):
         ROW, 1.0, id=[5, 6, 7], columns={"type": [1, 2, 3]}, step=4, time=0.5,
         wall_contacts=[1, 0, 2], wall_forces=forces,
     )  # fmt: skip
-    other = packing.with_contacts(ContactList([[0, 1]]), walls)
+    other = packing.with_contacts(ContactList([[0, 1]], source="geometric"), walls)
+    assert other.contacts.source == "geometric"
     np.testing.assert_array_equal(other.id, packing.id)
     np.testing.assert_array_equal(other.columns["type"], [1, 2, 3])
     np.testing.assert_array_equal(other.wall_contacts, expected)

@@ -72,9 +72,8 @@ def test_every_figure_of_the_sample_is_drawn(scanned, figures):
 
 
 def test_titles_name_variant_frame_and_strain_and_rows_are_the_table_s(scanned, computed):
-    for number, alone, frame in zip(
-        (0, 6), scanned.frames, scanned.with_lines_of_table, strict=True
-    ):
+    pairs = zip(scanned.frames, scanned.with_lines_of_table, strict=True)
+    for number, (alone, frame) in zip((0, 6), pairs, strict=True):
         row = row_of(computed, number)
         title = rf"variant c, frame {number}, $\varepsilon_a$ = {100 * row['strain']:.3g} %"
         assert alone.title == frame.title == title
