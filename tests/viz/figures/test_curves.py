@@ -43,10 +43,13 @@ def bars_of(axes):
     return [np.ptp(segment[:, 1]) for one in found for segment in one.get_segments()]
 
 
-def test_rows_of_several_cut_offs_are_no_curve():
-    rows = [*with_all(curve(), cutoff=0.1), *with_all(curve(), cutoff=0.2)]
-    with pytest.raises(SettingsError, match=r"several cut-offs.*choose one"):
-        groups_of(rows)
+def test_rows_of_several_cut_offs_or_without_void_fabric_are_no_curve():
+    several = [*with_all(curve(), cutoff=0.1), *with_all(curve(), cutoff=0.2)]
+    empty = with_all(curve(), alpha_vs_axial=None)
+    nothing = "there is nothing to draw"
+    for rows, told in ((several, "cut-offs.*choose one"), (empty, nothing), ([], nothing)):
+        with pytest.raises(SettingsError, match=told):
+            groups_of(rows)
 
 
 def with_state(rows):
