@@ -53,6 +53,7 @@ def test_lines_along_the_axes_of_empty_windows_have_known_lengths():
         assert mean_lengths(sums, "c").value == pytest.approx(expected, rel=within)
 
 
+# kept on disk with the package's kernels, so that another body needs another name
 @kernel
 def quadric_along(clip, triad):
     section = section_along(clip, triad)

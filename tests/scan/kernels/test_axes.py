@@ -136,6 +136,7 @@ def check_random_packing(kind, random):
     assert_fast_equals_naive(spheres, removed, *grid, cutoffs, window)
 
 
+# kept on disk with the package's kernels, so that another body needs another name
 @kernel
 def sorted_order(values):
     order = np.empty(values.size + 2, np.int64)

@@ -47,6 +47,7 @@ def sparse_medium(random, periods=(1, 1, 1)):
     return medium_of(position, radius, vectors, random.random(40) < 0.3, periods)
 
 
+# kept on disk with the package's kernels, so that another body needs another name
 @kernel
 def prism_and_grid(medium, normal, offset, spacing):
     prism, _, grid, _ = periodic.cell_grid(medium, normal, offset, spacing)
