@@ -250,19 +250,19 @@ def lattice_of(middles: FloatArray) -> tuple[IntArray, FloatArray]:
     numbers = np.zeros((len(middles), 3), np.int64)
     steps = np.zeros((3, 3))
     stride, free = 1, [0, 1, 2]
-    while stride < len(middles):
+    while stride < len(middles) and free:
         # blocks along one axis follow one another at equal steps
         rest = middles[::stride]
         step = rest[1] - rest[0]
         off = np.linalg.norm(np.diff(rest, axis=0) - step, axis=1) > 0.01 * np.linalg.norm(step)
         count = int(np.argmax(off)) + 1 if off.any() else len(rest)
-        if not free:
-            raise SettingsError("figure map: the blocks are no whole grid: rows are missing")
         axis = max(free, key=lambda one: abs(float(step[one])))
         free.remove(axis)
         numbers[:, axis] = np.arange(len(middles)) // stride % count
         steps[axis] = step
         stride *= count
+    if stride != len(middles):
+        raise SettingsError("figure map: the blocks are no whole grid: rows are missing")
     longest = float(np.linalg.norm(steps, axis=1).max()) or 1.0
     for axis in free:
         steps[axis, axis] = longest
