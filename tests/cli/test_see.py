@@ -91,6 +91,9 @@ def test_the_sample_fills_the_picture_and_its_rv_is_seen(view, words):
     assert blue.mean() > 0.08
     across = np.flatnonzero((pixels[115:700] < 250).any(axis=(0, 2)))
     assert abs(across[0] + across[-1] - 1200) < 60
+    # the legend has the colours of grains in the RV and of rattlers
+    assert blue[60:100].any()
+    assert (pixels[60:100, :, 0] - pixels[60:100, :, 2] > 100).any()
 
 
 @pytest.mark.usefixtures("drawing")
