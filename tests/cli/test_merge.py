@@ -94,6 +94,11 @@ def test_several_series_become_one_table(series, tmp_path):
     assert merge(*parts, output=tmp_path / "merged.csv") == both.read_bytes()
 
 
+def test_without_any_void_fabric_the_exit_code_is_1(series, tmp_path):
+    part = compute(series, tmp_path / "part.csv", "--frames", "0", "--cutoff", "100")
+    assert run(["merge", part, "--frames", "0"]) == 1
+
+
 def test_maps_are_merged_too(series, tmp_path):
     names = [tmp_path / name for name in ("whole.csv", "part_0.csv", "part_1.csv")]
     for name, frames in zip(names, (":2", "0:1", "1:2"), strict=True):
