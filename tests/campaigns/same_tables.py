@@ -273,7 +273,7 @@ def main() -> None:
             answers = [versions.answers(python, sources) for python in pythons]
             for source, *pair in zip(sources, *answers, strict=True):
                 name = f"{source.source} {source.options.get('format', '')}".strip()
-                found += differences(name, *(one.found for one in pair))
+                found += differences(name, *pair)
             print(f"read: {len(sources)} sources", flush=True)
         if "converted" in given.only:
             # files that are there unpacked as well, or are like others, are not converted
@@ -284,7 +284,7 @@ def main() -> None:
                 for k, python in enumerate(pythons)
             ]
             for (source, name), *pair in zip(listed, *answers, strict=True):
-                found += differences(f"converted: {source} {name}", *(one.found for one in pair))
+                found += differences(f"converted: {source} {name}", *pair)
             print(f"converted: {len(listed)} conversions", flush=True)
         if "commands" in given.only:
             found += held_commands(pythons[1], base, folder / "commands")

@@ -62,14 +62,9 @@ PATTERNS = (
 def mutate(data: bytes, random: Random) -> bytes:
     """The data with one to three damages."""
     for _ in range(random.randint(1, 3)):
-        data = damaged(data, random.choice([*DAMAGES]), random)
+        start, end, new = random.choice(DAMAGES)(data, random)
+        data = data[:start] + new + data[end:]
     return data
-
-
-def damaged(data: bytes, kind: str, random: Random) -> bytes:
-    """The data with one damage of a kind of ``DAMAGES``."""
-    start, end, new = DAMAGES[kind](data, random)
-    return data[:start] + new + data[end:]
 
 
 def _cut(data: bytes, random: Random) -> Damage:
@@ -112,9 +107,7 @@ def _word(data: bytes, random: Random) -> Damage:
     return *_found(WORD, data, random).span(), _found(WORD, data, random)[0]
 
 
-DAMAGES: dict[str, Callable[[bytes, Random], Damage]] = {
-    "cut": _cut, "bytes": _bytes, "words": _word, "numbers": _number, "lines": _line,
-}  # fmt: skip
+DAMAGES: tuple[Callable[[bytes, Random], Damage], ...] = (_cut, _bytes, _word, _number, _line)
 
 
 class ForbiddenError(Exception):

@@ -13,7 +13,6 @@ import json
 import signal
 import subprocess
 import sys
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -34,16 +33,8 @@ class Reading(NamedTuple):
     converted: tuple[str, str] | None = None
 
 
-class Answer(NamedTuple):
-    """The packings that were read, as digests, or the name of the error; and whether it warned."""
-
-    found: list[dict[str, str]] | str
-    warned: bool
-
-    @property
-    def is_failure(self) -> bool:
-        """Whether it ended with an error that is not scanfab's, or took too long."""
-        return self.found[:6] == "FAILED"
+Answer = list[dict[str, str]] | str
+"""The packings that were read, as digests; or the name of the error."""
 
 
 def installed_base(commit: str, kept: Path) -> Path:
@@ -67,9 +58,9 @@ def answers(python: Path, readings: Sequence[Reading]) -> list[Answer]:
             [python, "-P", __file__], input=json.dumps(readings[len(found) :]), cwd=ROOT,
             stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False,
         )  # fmt: skip
-        found += [Answer(*json.loads(line)) for line in done.stdout.splitlines()]
+        found += map(json.loads, done.stdout.splitlines())
         if done.returncode:
-            found.append(Answer(f"FAILED the process ended with {done.returncode}", False))
+            found.append(f"FAILED the process ended with {done.returncode}")
     return found
 
 
@@ -86,7 +77,8 @@ def packed(packing: Any) -> dict[str, str]:
     """All that a packing holds, as digests."""
     held = {f"column {name}": values for name, values in sorted(packing.columns.items())}
     for kind, thing, names in (
-        ("", packing, "position radius id wall_contacts step time dimension"),
+        ("", packing, "position radius id wall_contacts step time"),
+        ("", packing.space, "dimension"),
         ("contacts ", packing.contacts, "pairs image normal point force force_n source"),
         ("cell ", packing.cell, "vectors origin periodic"),
     ):
@@ -100,21 +92,17 @@ def answer(reading: Reading) -> Answer:
     import scanfab
 
     source = reading.source
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        try:
-            if reading.converted:
-                source, name = reading.converted
-                Path(source).parent.mkdir(parents=True, exist_ok=True)
-                packing = scanfab.read_series(reading.source)[-1].read()
-                scanfab.convert(packing, source, to=name)
-            frames = scanfab.read_series(source, **reading.options)
-            found: Any = [packed(frame.read()) for frame in frames]
-        except scanfab.ScanfabError as error:
-            found = type(error).__name__
-        except BaseException as error:
-            found = f"FAILED {type(error).__name__}: {error}"[:200]
-    return Answer(found, any(issubclass(one.category, scanfab.ScanfabWarning) for one in caught))
+    try:
+        if reading.converted:
+            source, name = reading.converted
+            Path(source).parent.mkdir(parents=True, exist_ok=True)
+            packing = scanfab.read_series(reading.source)[-1].read()
+            scanfab.convert(packing, source, to=name)
+        return [packed(frame.read()) for frame in scanfab.read_series(source, **reading.options)]
+    except scanfab.ScanfabError as error:
+        return type(error).__name__
+    except BaseException as error:
+        return f"FAILED {type(error).__name__}: {error}"[:200]
 
 
 def too_long(*_: object) -> None:
