@@ -12,14 +12,11 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from scipy.spatial import ConvexHull
 
-from scanfab.base.convex import Convex
-from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron, sphere
+from scanfab.base.shapes import sphere
 from scanfab.scan import tallies
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import EDGES
-from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.lines import line_triads
 from scanfab.scan.scan import ScanSums, scan_lines
 from scanfab.scan.solids import Solids
@@ -103,49 +100,20 @@ def chords(repeats: int) -> str:
     return table(["way", "ns a chord", "of the floor"], rows) + note
 
 
-def shapes() -> dict[str, Convex]:
-    """Windows of one volume, that of a sphere of ten mean radii."""
-    corners = np.random.default_rng(0).normal(size=(20, 3))
-    corners /= np.linalg.norm(corners, axis=1, keepdims=True)
-    found = {
-        "cube": box([1.0, 1.0, 1.0]),
-        "cylinder, oblique": cylinder(1.0, 4.0, [1, 2, 3]),
-        "ellipsoid": ellipsoid([1.0, 1.0, 2.0]),
-        "polyhedron of 36 faces": polyhedron(corners, ConvexHull(corners).simplices)[0],
-    }
-    volume = sphere(10.0).volume
-    return {
-        name: shape.deformed(np.cbrt(volume / shape.volume) * np.eye(3))
-        for name, shape in found.items()
-    }
-
-
 def scans(repeats: int) -> str:
-    """What a chord costs by variants, edge rule and window, and in a cell that repeats."""
-    position, radius, edge = copied(2)
-    removed = tenth(len(radius))
-    medium = CellGrains(position, radius, removed, np.diag([edge] * 3), np.ones(3, bool))
-    ball, rules = sphere(10.0), [f"RV of 10 mean radii, `{rule}`" for rule in EDGES]
-    solids = {
-        "all grains, a": (Solids(position, radius, removed), "a"),
-        "all grains, ab": (Solids(position, radius, removed), "ab"),
-        "the same in a cell that repeats, ab": (
-            Solids(position, radius, removed, None, medium), "ab",
-        ),
-        **{name: (solids_near(ball, rule), "c") for name, rule in zip(rules, EDGES, strict=True)},
-        **{f"{name} of its volume": (solids_near(one), "c") for name, one in shapes().items()},
-    }  # fmt: skip
+    """What a chord costs by each edge rule."""
+    window = sphere(10.0)
+    solids = {rule: solids_near(window, rule) for rule in EDGES}
     columns = []
     for spacing, directions in ((CLOSE, 2), (1.5, 800)):
         words: Any = {"spacing": spacing, "directions": directions}
-        ways = {name: partial(sweep, *one, **words) for name, one in solids.items()}
-        chords = {name: int(way().chords.sum()) for name, way in ways.items()}
+        ways = {rule: partial(sweep, one, **words) for rule, one in solids.items()}
         # `start` has chords beyond the window as well, which count as its cost
-        chords |= dict.fromkeys(rules, chords[rules[0]])
+        chords = int(ways[EDGES[0]]().chords.sum())
         seconds = interleaved(ways, repeats, clock=time.process_time)
-        columns.append([f"{1e9 * seconds[name] / chords[name]:.2f}" for name in ways])
-    titles = ["scan", f"ns a chord, lines {CLOSE} mean radii apart", "1.5 mean radii apart"]
-    return table(titles, list(zip(solids, *columns, strict=True)))
+        columns.append([f"{1e9 * value / chords:.2f}" for value in seconds.values()])
+    titles = ["edge", f"ns a chord, lines {CLOSE} mean radii apart", "1.5 mean radii apart"]
+    return table(titles, list(zip(EDGES, *columns, strict=True)))
 
 
 def swept(by_lists: bool, *words: Any, **options: Any) -> ScanSums:
@@ -158,30 +126,19 @@ def swept(by_lists: bool, *words: Any, **options: Any) -> ScanSums:
 
 
 def engines(repeats: int) -> str:
-    """What each kernel wins over the other that could do its work, in processor time."""
+    """What lists of chords take of the time of the dense sweep, by the processor's clock."""
     position, radius, _ = copied(2)
     solids = Solids(position, radius, tenth(len(radius)))
     rows = []
-    for spacing, directions in (
-        (CLOSE, 1),
-        (0.2, 16),
-        (0.5, 50),
-        (1.0, 100),
-        (2.0, 200),
-        (4.0, 400),
-    ):
+    for spacing, directions in ((CLOSE, 1), (0.2, 16), (0.5, 50), (1, 100), (2, 200), (4, 400)):
         words: Any = {"spacing": spacing, "directions": directions}
         ways = {
-            "dense": partial(swept, False, solids, "ab", **words),
-            "lists": partial(swept, True, solids, "ab", **words),
-            "window": partial(sweep, solids, "ab", quick=True, **words),
-            "whole": partial(sweep, solids, "ab", **words),
+            name: partial(swept, name == "lists", solids, "ab", **words)
+            for name in ("dense", "lists")
         }
         seconds = interleaved(ways, repeats, clock=time.process_time)
-        ratios = seconds["lists"] / seconds["dense"], seconds["window"] / seconds["whole"]
-        rows.append((f"{spacing:g}", *(f"{ratio:.2f}" for ratio in ratios)))
-    titles = ["lines apart, mean radii", "lists over dense sweep", "window's kernel over whole's"]
-    return table(titles, rows)
+        rows.append((f"{spacing:g}", f"{seconds['lists'] / seconds['dense']:.2f}"))
+    return table(["lines apart, mean radii", "lists over dense sweep"], rows)
 
 
 SECTIONS = {"chords": chords, "scans": scans, "engines": engines}
