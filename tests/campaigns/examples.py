@@ -23,11 +23,12 @@ from tests.helpers.interruptions import PROGRAM
 
 DECKS = Path(__file__).parent / "decks"
 POUR = Path("/usr/share/lammps/examples/pour/in.pour")
+TRIAXIAL = Path("/usr/share/doc/yade/examples/triax-tutorial/script-session1.py")
 DUMP = "dump grains all custom 1000 dump.*.pour id type x y z radius\nrun"
 MAKERS = {
     "pour": ("lmp", "-in", "in.pour"),
     "packing": ("liggghts", "-in", str(DECKS / "in.packing")),
-    "triaxial": ("yade", "-n", "-x", "-j1", str(DECKS / "triaxial.py")),
+    "triaxial": ("yade", "-n", "-x", "-j1", "triaxial.py"),
 }
 COMMANDS = {
     "table and figure": ("compute", "{0}", "-o", "{0}.csv", "--plot", "{0}.png"),
@@ -43,6 +44,11 @@ def made(folder: Path, name: str) -> None:
         # the example's own dump has no radii; the first `run` comes behind our dump
         text = POUR.read_text("utf-8").replace("\nrun", f"\n{DUMP}", 1)
         (folder / name / "in.pour").write_text(text, "utf-8")
+    if name == "triaxial":
+        # the example's own steps are comments, and its windows need a screen
+        text = TRIAXIAL.read_text("utf-8").partition("if nRead == 0:")[0]
+        steps = (DECKS / "triaxial.py").read_text("utf-8")
+        (folder / name / "triaxial.py").write_text(text + steps, "utf-8")
     with open(folder / f"{name}.log", "w") as log:
         subprocess.run(MAKERS[name], cwd=folder / name, stdout=log, stderr=log, check=True)
 
