@@ -126,7 +126,6 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=1600)
     parser.add_argument("--samples", type=int, default=100)
     parser.add_argument("--edge", nargs="+", default=EDGES[:1])
-    parser.add_argument("--scans", nargs="+", default=[*SCANS])
     given = parser.parse_args()
     warnings.simplefilter("ignore", scanfab.ScanfabWarning)
     outside = 0
@@ -135,7 +134,7 @@ def main() -> int:
             of_scans(frame, kind, given.seeds, edge)
             for frame in FRAMES
             for edge in given.edge
-            for kind in given.scans
+            for kind in SCANS
         )
     if "map" in given.only:
         outside += sum(

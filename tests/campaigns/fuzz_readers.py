@@ -42,34 +42,30 @@ def main() -> None:
     parser.add_argument("readers", nargs="*", metavar="READER", default=[])
     parser.add_argument("--runs", type=int, default=200_000, help="executions of each reader")
     parser.add_argument("--out", type=Path, default=Path("fuzz_findings"))
-    parser.add_argument("--minutes", type=float, default=1e6, help="of each reader, about")
-    parser.add_argument("--only", nargs="+", default=[""], help="endings of the files to damage")
     parser.add_argument("--process", type=Path, help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.process is not None:
-        fuzz(given.readers[0], given.runs, given.out, given.process, tuple(given.only))
+        fuzz(given.readers[0], given.runs, given.out, given.process)
         return
     from tests.helpers.fuzzing import READERS
 
     for reader in given.readers or READERS:
-        supervise(reader, given.runs, given.out / reader, given.only, given.minutes)
+        supervise(reader, given.runs, given.out / reader)
 
 
-def supervise(reader: str, runs: int, out: Path, only: list[str], minutes: float) -> None:
+def supervise(reader: str, runs: int, out: Path) -> None:
     """Fuzz one reader, with a new process after each that ends; print the summary."""
     out.mkdir(parents=True, exist_ok=True)
     began, done, ended = time.monotonic(), 0, 0
     with tempfile.TemporaryDirectory(dir=RAM if RAM.is_dir() else None) as name:
         folder = Path(name)
         (folder / "corpus").mkdir()
-        while done < runs and time.monotonic() - began < 60 * minutes:
+        while done < runs:
             (folder / "count").write_text("0")
             chunk = min(runs - done, RUNS_OF_A_PROCESS)
             command = [sys.executable, __file__, reader, f"--runs={chunk}", f"--out={out}"]
             with open(out / "log.report", "ab") as log:
-                code = subprocess.call(
-                    [*command, f"--process={folder}", "--only", *only], stdout=log, stderr=log
-                )
+                code = subprocess.call([*command, f"--process={folder}"], stdout=log, stderr=log)
             executed = int((folder / "count").read_text())
             done, ended = done + executed, ended + (code != 0)
             if executed == 0:
@@ -83,7 +79,7 @@ def supervise(reader: str, runs: int, out: Path, only: list[str], minutes: float
     )
 
 
-def fuzz(reader: str, runs: int, out: Path, folder: Path, only: tuple[str, ...]) -> None:
+def fuzz(reader: str, runs: int, out: Path, folder: Path) -> None:
     """Fuzz in this process until it has made its runs, or breaks."""
     import atheris
 
@@ -92,7 +88,7 @@ def fuzz(reader: str, runs: int, out: Path, folder: Path, only: tuple[str, ...])
         from tests.helpers import fuzzing, sound_files
 
         installed_readers()
-    _write_corpus(fuzzing, sound_files, reader, only, folder)
+    _write_corpus(fuzzing, sound_files, reader, folder)
     sound_files.companion_grains(reader)
     # the libraries that the first table loads take 1 GB of addresses, whatever stands in it
     table = folder / "table.csv"
@@ -115,14 +111,13 @@ def fuzz(reader: str, runs: int, out: Path, folder: Path, only: tuple[str, ...])
     atheris.Fuzz()
 
 
-def _write_corpus(fuzzing, sound_files, reader: str, only: tuple[str, ...], folder: Path) -> None:
+def _write_corpus(fuzzing, sound_files, reader: str, folder: Path) -> None:
     """Two bytes before each file choose its ending and the options; they mutate as well."""
     (folder / "seeds").mkdir(exist_ok=True)
-    seeds = [one for one in sound_files.seeds(reader, folder / "seeds") if one[0].endswith(only)]
     if any((folder / "corpus").iterdir()):
         return
     endings = [Path(name).suffix for name in fuzzing.NAMES]
-    for number, (name, data) in enumerate(seeds):
+    for number, (name, data) in enumerate(sound_files.seeds(reader, folder / "seeds")):
         suffix = Path(name).suffix
         place = endings.index(suffix) if suffix in endings else 0
         (folder / "corpus" / f"seed_{number}").write_bytes(bytes([place, 0]) + data)

@@ -4,10 +4,9 @@ Random mutants of scanfab, one at a time, and whether its tests catch them.
     python tests/campaigns/mutants.py REPO PYTHON NUMBER SEED [--only room,room] [--jobs N] ...
 
 REPO is a scratch copy: its files are changed and restored. PYTHON has scanfab[test] installed from
-it. The same seed gives the same mutants of the same code; shard I/K takes every K-th of them, so
-that several copies can work at once. Results are lines of JSON in --out; mutants that are there are
-not tried again. About 45 s a mutant on one core; a mutant that runs into its time limit is not
-killed yet.
+it. The same seed gives the same mutants of the same code, another seed others, so that several
+copies can work at once. Results are lines of JSON in --out; mutants that are there are not tried
+again. About 45 s a mutant on one core; a mutant that runs into its time limit is not killed yet.
 """
 
 from __future__ import annotations
@@ -24,6 +23,7 @@ import sys
 import time
 from pathlib import Path
 
+SECONDS = 240  # for the tests of a mutant; of kernels twice as many
 ROOMS = "base,scan,packing,fabric,io,table,pipeline,viz,cli"
 REACHING = ("tests/cli/test_compute.py", "tests/identities", "tests/pipeline")
 # functions that only make texts, and calls that only say something
@@ -254,24 +254,17 @@ def main():
     parser.add_argument("number", type=int)
     parser.add_argument("seed", type=int)
     parser.add_argument("--out", type=Path, default=Path("mutants.jsonl"))
-    parser.add_argument("--shard", default="0/1")
     parser.add_argument("--jobs", type=int, default=2, help="pytest -n")
-    parser.add_argument("--limit", type=float, default=240, help="seconds; of kernels twice")
     parser.add_argument("--only", default=ROOMS)
-    parser.add_argument("--list", action="store_true", help="only print the mutants")
     given = parser.parse_args()
     repo = given.repo.resolve()
-    shard, of = map(int, given.shard.split("/"))
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # restores the file
     earlier = given.out.read_text().splitlines() if given.out.exists() else []
     done = {(x["seed"], x["number"]) for x in map(json.loads, earlier)}
     mutants = drawn(repo, given.only.split(","), given.number, given.seed)
     for number, (what, text) in enumerate(mutants):
-        words = f"{number} {what['kind']} {what['file']}:{what['line']}: {what['change']}"
-        if given.list:
-            print(words)
-        elif number % of == shard and (given.seed, number) not in done:
-            path, limit = repo / what["file"], given.limit * (1 + is_kernel(what["file"]))
+        if (given.seed, number) not in done:
+            path, limit = repo / what["file"], SECONDS * (1 + is_kernel(what["file"]))
             before = path.read_text()
             try:
                 path.write_text(text)
@@ -281,7 +274,7 @@ def main():
             result = {"seed": given.seed, "number": number, **what, "verdict": verdict, "by": by}
             with given.out.open("a") as file:
                 file.write(json.dumps(result) + "\n")
-            print(verdict, spent, words, "|", by, flush=True)
+            print(spent, *result.values(), flush=True)
 
 
 if __name__ == "__main__":

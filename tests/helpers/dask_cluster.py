@@ -6,8 +6,9 @@ import json
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
+
+from tests.helpers.growing import until
 
 # without the process that starts a worker again; both end by themselves if the test is killed
 KINDS = {
@@ -26,11 +27,8 @@ class DaskCluster:
         self.file = folder / "scheduler.json"
         self.workers: list[subprocess.Popen[bytes]] = []
         self.scheduler = self._start("scheduler")
-        end = time.monotonic() + 60
         # it ends with a brace
-        while not self.file.exists() or not self.file.read_text().rstrip().endswith("}"):
-            assert time.monotonic() < end
-            time.sleep(0.05)
+        until(lambda: self.file.exists() and self.file.read_text().rstrip().endswith("}"))
         for _ in range(workers):
             self.add()
 
