@@ -14,8 +14,8 @@ error.
 
 from __future__ import annotations
 
+import argparse
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -69,4 +69,7 @@ def main(folder: Path, program: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.argv[2:] or list(PROGRAM))
+    parser = argparse.ArgumentParser(description="Examples of programs, to a report.")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("program", nargs="*", default=PROGRAM)
+    main(**vars(parser.parse_args()))
