@@ -175,8 +175,12 @@ def test_blocks_of_later_frames_and_of_frames_without_grains():
     assert [row.z for row in table[:2]] == [row.z for row in table[2:]]
 
 
-def test_what_holds_for_one_frame_is_told_for_it():
+def test_what_holds_for_one_frame_is_told_for_it(packing):
     """The blocks of an open sample stay, and each frame scatters in a way of its own."""
+    other = Packing(packing.position[::-1], packing.radius, cell=packing.cell)
+    _, told = mapped([packing, other], slices=4, spacing=0.4)
+    frames = [one[:7] for one in told if "of 4 blocks scatters" in one]
+    assert frames == ["frame 0", "frame 1"]
     position, radius = simple_cubic(8)
     frames = [Packing(one * position, 0.9 * radius, contacts=[[0, 1]]) for one in (1.0, 1.1)]
     _, told = mapped(frames, grid=(2, 2, 2))

@@ -96,7 +96,7 @@ def test_without_octants_of_all_frames_the_slope_has_no_error(column):
 
 def test_why_the_slope_has_no_error_is_told():
     rows = with_octants(curve())
-    rows[1]["alpha_vs_axial_without_1"] = None
+    rows[1]["alpha_c_axial_without_8"] = None
     for some, reason in ((rows, "some frame has no fabric"), (curve(), "the table has no parts")):
         with pytest.warns(ScanfabNote, match=f"slope_se is empty for variant .: {reason}"):
             summary_of(some)
