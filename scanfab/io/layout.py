@@ -12,7 +12,7 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import Columns
-from scanfab.io.files import first_bytes, growing
+from scanfab.io.files import Stamp, first_bytes, growing, stamp_of
 from scanfab.io.reader import Snapshot
 from scanfab.io.text import CutError, Layout, is_number, read_rows, text_of, words_of
 
@@ -186,6 +186,7 @@ class FrameFile:
         self, path: Path, names: Sequence[str], optional: Sequence[str] = (), *, positive: int = 0
     ) -> None:
         self.path, self._asked = path, (names, optional, positive)
+        self._stamp: Stamp | None = None
         self._read()
 
     def _read(self) -> None:
@@ -219,6 +220,9 @@ class FrameFile:
         number = step if self.key == "step" else frame
         if number is not None and number not in self._rows:
             # a running simulation may have added lines, of which the last may be incomplete
-            with suppress(ReadError), growing():
-                self._read()
+            with suppress(ReadError, OSError), growing():
+                # taken before the file is read: lines added meanwhile change the next stamp
+                if (stamp := stamp_of(self.path)) != self._stamp:
+                    self._read()
+                    self._stamp = stamp
         return None if number is None else self._rows.get(number)

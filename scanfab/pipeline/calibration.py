@@ -266,6 +266,7 @@ class _OneFrame:
         """Scan one step: its rows and its measurement. Without a value, rows take their cut-off."""
         begun = time.perf_counter()
         plan, sample = make_plan(settings, self.first), self.sample
+        # the first variant has the longest lines: a and b meet all grains, c and d those of the RV
         solids = sample.solids(VARIANTS[settings.variants[0]], plan.window)
         shadow = self.space.shadow(sample.packing.radius[solids])
         chords = self.space.lines(shadow, plan.spacing) * plan.replicates * len(plan.rule)

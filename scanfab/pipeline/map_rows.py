@@ -353,7 +353,7 @@ class VariantMap:
         solid = self.sample.counted(variant, self.window) & ~self.sample.removed(variant)
         grains = self.sample.number(solid)
         outside = grains - int(self.grains["grains"].sum())
-        # the corners beyond shells, and the grains of an RV that reach beyond them, are left out
+        # shells leave out the corners of the sample, and the blocks of an RV what lies outside it
         if outside and self.window is None and not self.blocks.radius:
             texts["outside"] = (
                 f"{outside} of {grains} grains lie outside the blocks, which are those of the "
