@@ -8,11 +8,11 @@ from textwrap import dedent
 
 import click
 
-from scanfab.base.column import Column, columns_of_fields
+from scanfab.base.column import Column
 from scanfab.cli.group import COMMANDS, cli
 from scanfab.cli.options import TITLES
-from scanfab.pipeline.calibration import StepRow
-from scanfab.pipeline.inspection import FrameReport
+from scanfab.pipeline.calibration import STEP_COLUMNS
+from scanfab.pipeline.inspection import REPORT_COLUMNS
 from scanfab.pipeline.options import DECLARED
 from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS, map_columns
 from scanfab.table.compare import DIFFERENCES, FRAMES, SUMMARY
@@ -38,8 +38,8 @@ COLUMNS: dict[str, tuple[Column, ...]] = {
     "`scanfab compare`": FRAMES,
     "`scanfab compare --summary`": SUMMARY,
     "`scanfab compare --differences`": DIFFERENCES,
-    "`scanfab calibrate`": columns_of_fields(StepRow),
-    "`scanfab inspect --json`": columns_of_fields(FrameReport),
+    "`scanfab calibrate`": STEP_COLUMNS,
+    "`scanfab inspect --json`": REPORT_COLUMNS,
 }
 
 

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import cache
-from types import UnionType
-from typing import get_args, get_origin, get_type_hints
 
 from scanfab.base.errors import ScanfabError
 
@@ -83,28 +80,3 @@ def no_column(name: object, known: Iterable[str], what: str = "column") -> str:
     near = get_close_matches(str(name), names, n=1)
     hint = f"did you mean {near[0]}?" if near else f"the {what}s are {', '.join(names)}"
     return f"there is no {what} {name!r}: {hint}"
-
-
-@cache
-def columns_of_fields(kind: type) -> tuple[Column, ...]:
-    """
-    The columns of a dataclass: one for each field, with the meaning and unit in its annotation.
-
-    For example: ``radius: Annotated[float, "radius of the smallest grain", LENGTH]``.
-
-    Examples
-    --------
-    >>> from scanfab.base.column import columns_of_fields
-    >>> from scanfab.pipeline.calibration import StepRow
-    >>> columns_of_fields(StepRow)[0].meaning
-    'the series as given'
-    """
-    columns = []
-    for name, hint in get_type_hints(kind, include_extras=True).items():
-        meaning, *unit = hint.__metadata__
-        # ``float | None`` becomes ``float``, and ``list[str]`` becomes ``list``
-        held = hint.__origin__
-        if isinstance(held, UnionType):
-            held = get_args(held)[0]
-        columns.append(Column(name, get_origin(held) or held, "".join(unit), meaning))
-    return tuple(columns)

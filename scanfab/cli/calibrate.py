@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -28,10 +28,6 @@ from scanfab.cli.options import (
     usage_errors,
 )
 from scanfab.pipeline.options import as_options
-
-if TYPE_CHECKING:
-    from scanfab.pipeline.calibration import StepRow
-
 
 # the quantity that each ladder changes, as the title of its first column
 CHANGED = {
@@ -75,32 +71,30 @@ def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
     On a terminal the steps are a readable table. Otherwise they are CSV on standard output, and
     the findings go to standard error.
     """
-    from scanfab.base.column import columns_of_fields
     from scanfab.base.files import refuse_inputs
-    from scanfab.pipeline.calibration import StepRow
+    from scanfab.pipeline.calibration import STEP_COLUMNS
     from scanfab.pipeline.record import asked_for, repeat_command
     from scanfab.table.writing import write_rows
 
     outputs = take_output(chosen)
-    columns = columns_of_fields(StepRow)
     reading, settings = checked(chosen, scanfab.Settings)
-    excerpt = excerpt_of(outputs, columns)
+    excerpt = excerpt_of(outputs, STEP_COLUMNS)
     series = open_one(sources, reading, "calibrated")
     with usage_errors():
         refuse_inputs([outputs.output, outputs.plot], series.files())
     announce([series], settings.workers)
     with working():
         result = scanfab.calibrate(series, frame=frame, **vars(settings))
-    rows = [replace(row, note=as_options(row.note)) for row in result.rows]
+    rows = [scanfab.Row(**{**row, "note": as_options(row.note)}) for row in result.rows]
     usual = scanfab.Settings()
     best: Any = {"max_chords": usual.max_chords, "tolerance": usual.tolerance, **result.options}
     command = repeat_command(asked_for(sources, reading, replace(settings, **best)))
     if outputs.output is not None:
-        write_rows(outputs.output, rows, columns, excerpt)
+        write_rows(outputs.output, rows, STEP_COLUMNS, excerpt)
     draw(outputs, rows, "calibration")
     tells_all = outputs.output is not None or is_readable()
     if not tells_all:
-        print_csv(rows, excerpt, columns)
+        print_csv(rows, excerpt, STEP_COLUMNS)
     elif outputs.output is None:
         if excerpt.fields:
             print_rows(rows, excerpt.fields, len(excerpt.fields), digits_of(excerpt))
@@ -112,13 +106,13 @@ def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
     return 0
 
 
-def _print(rows: list[StepRow], digits: int) -> None:
+def _print(rows: list[scanfab.Row], digits: int) -> None:
     """Print a table for each ladder."""
     steady = {None: "", 0: "no", 1: "yes"}
     for ladder, steps in groupby(rows, key=lambda row: row.ladder):
         shown = [
             {
-                **asdict(row),
+                **row,
                 CHANGED[ladder]: row.value,
                 "rule_bias": row.rule_bias if row.rule_bias > 1e-12 else 0,
                 "time": f"{row.seconds:.2g} s",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
 from typing import Any
 
 import click
@@ -38,7 +37,7 @@ def inspect(sources: tuple[str, ...], as_json: bool, **chosen: Any) -> int:
         for series in all_series:
             reports = []
             for found in scanfab.inspect(series, **vars(settings)):
-                report = asdict(found)
+                report = dict(found)
                 report["warnings"] = [as_options(text) for text in found.warnings]
                 if as_json:
                     kept = {name: report[name] for name in report if name != IN_RV}

@@ -7,11 +7,11 @@ import math
 import time
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from itertools import chain, groupby
-from typing import Annotated, Any
+from typing import Any
 
-from scanfab.base.column import LENGTH
+from scanfab.base.column import LENGTH, Column
 from scanfab.base.errors import Note, PackingError, SettingsError, tell
 from scanfab.base.spelling import counted
 from scanfab.io.options import parse_frames
@@ -24,8 +24,9 @@ from scanfab.pipeline.settings import MAX_CHORDS, OF_SAMPLE, Settings
 from scanfab.pipeline.tolerance import missing_work, variant_errors
 from scanfab.pipeline.values import SHAPES, Length
 from scanfab.scan.directions import direction_rule, rule_of, usual_rule
+from scanfab.table.columns import OWN_COLUMNS, row_of
 from scanfab.table.plots import Plots
-from scanfab.table.row import DataclassRow
+from scanfab.table.row import Row
 
 LOGGER = logging.getLogger("scanfab")
 
@@ -50,42 +51,31 @@ CHANCE, FREEDOM = 0.05, 30
 PAPER = {"spacing": " (the paper: 0.1)", "rv": " (the paper: 0.67 to 0.7)"}
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class StepRow(DataclassRow):
-    """One step of a ladder for one variant; lengths in the dump's unit."""
-
-    source: Annotated[str, "the series as given"]
-    frame: Annotated[int, "index of the frame in the series, from 0"]
-    ladder: Annotated[str, "what is varied: spacing, directions, cutoff, rv; or recommended"]
-    value: Annotated[
-        float, "spacing or cut-off in r_min, number of directions, RV over half the smallest extent"
-    ]
-    variant: Annotated[str, "as in the fabric table"]
-    rule: Annotated[str, "the direction rule"]
-    degree: Annotated[int | None, "of the polynomials that the rule integrates exactly"]
-    rule_bias: Annotated[float, "alpha_vs that the rule gives for an isotropic sample"]
-    directions: Annotated[int | None, "number of axes of the rule, in each replicate"]
-    replicates: Annotated[int | None, "number of replicates"]
-    spacing: Annotated[
-        float | None, "distance between lines of one direction, all replicates together", LENGTH
-    ]
-    cutoff: Annotated[float | None, "shortest void segment that is kept", LENGTH]
-    rv_radius: Annotated[
-        float | None, "radius of the ball that holds the RV; empty for a and b", LENGTH
-    ]
-    segments: Annotated[int | None, "number of kept void segments"]
-    seconds: Annotated[float, "time of the step for all variants (and all cut-offs)", "s"]
-    mean_length: Annotated[float | None, "mean length of the kept segments", LENGTH]
-    alpha_vs_axial: Annotated[float | None, "signed anisotropy of the void fabric along the axis"]
-    alpha_vs_axial_se: Annotated[float | None, "its standard error due to the scan"]
-    alpha_vs_axial_sample_se: Annotated[float | None, "its standard error due to the sample"]
-    steady: Annotated[
-        int | None,
-        "1 if this step agrees with all later steps within the standard errors (of the scan; for "
-        "rv also of the sample), else 0; empty for a cut-off, because alpha_vs depends on it by "
-        "definition",
-    ]
-    note: Annotated[str, "doubts about the step"]
+STEADY = (
+    "1 if this step agrees with all later steps within the standard errors (of the scan; for rv "
+    "also of the sample), else 0; empty for a cut-off, because alpha_vs depends on it by definition"
+)
+SIZE = "spacing or cut-off in r_min, number of directions, RV over half the smallest extent"
+IN_TABLES = {column.name: column for column in OWN_COLUMNS}
+STEP_COLUMNS = (
+    IN_TABLES["source"],
+    IN_TABLES["frame"],
+    Column("ladder", str, "", "what is varied: spacing, directions, cutoff, rv; or recommended"),
+    Column("value", float, "", SIZE),
+    IN_TABLES["variant"],
+    Column("rule", str, "", "the direction rule"),
+    Column("degree", int, "", "of the polynomials that the rule integrates exactly"),
+    Column("rule_bias", float, "", "alpha_vs that the rule gives for an isotropic sample"),
+    *(IN_TABLES[name] for name in ("directions", "replicates", "spacing", "cutoff")),
+    Column("rv_radius", float, LENGTH, "radius of the ball that holds the RV; empty for a and b"),
+    IN_TABLES["segments"],
+    Column("seconds", float, "s", "time of the step for all variants (and all cut-offs)"),
+    IN_TABLES["mean_length"],
+    *(IN_TABLES[f"alpha_vs_axial{error}"] for error in ("", "_se", "_sample_se")),
+    Column("steady", int, "", STEADY),
+    Column("note", str, "", "doubts about the step"),
+)
+"""Columns of a row of :func:`calibrate`: one step of a ladder for one variant."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +85,7 @@ class Calibration:
 
     Attributes
     ----------
-    rows : tuple of StepRow
+    rows : tuple of Row
         All steps of all ladders, then the recommended settings.
     findings : tuple of str
         One sentence for each ladder, and one for the recommended settings.
@@ -110,7 +100,7 @@ class Calibration:
       recommended: spacing='0.25rmin'
     """
 
-    rows: tuple[StepRow, ...]
+    rows: tuple[Row, ...]
     findings: tuple[str, ...]
     options: dict[str, str]
 
@@ -223,7 +213,7 @@ class _OneFrame:
         # these notes hold for every step
         tell(make_plan(self.settings, self.first).notes)
 
-    def ladder(self, name: str) -> list[StepRow]:
+    def ladder(self, name: str) -> list[Row]:
         """Scan the steps of a ladder; skip steps whose settings do not fit the sample."""
         settings, space = self.settings, self.space
         steps: dict[float, dict[str, Any]] = {}
@@ -242,7 +232,7 @@ class _OneFrame:
             variants = "".join(variant for variant in settings.variants if variant in "cd")
             words = {"rv_radius": None, "rv_size": (), "variants": variants}
             steps = {value: {"rv": value, **words} for value in RV_FRACTIONS}
-        rows: list[StepRow] = []
+        rows: list[Row] = []
         for value, changed in steps.items():
             try:
                 rows += self.step(name, value, replace(settings, **changed))[0]
@@ -250,7 +240,7 @@ class _OneFrame:
                 tell([Note("step_left_out", f"{name} {value:g} is skipped: {error}")])
         return judged(rows, space.dimension)
 
-    def cutoffs(self) -> list[StepRow]:
+    def cutoffs(self) -> list[Row]:
         """Scan once for all cut-offs; SettingsError if a variant has no void fabric at any."""
         lengths = tuple(Length(value, "rmin") for value in CUTOFFS)
         rows, _ = self.step("cutoff", None, replace(self.settings, cutoffs=lengths))
@@ -262,7 +252,7 @@ class _OneFrame:
 
     def step(
         self, ladder: str, value: float | None, settings: Settings
-    ) -> tuple[list[StepRow], Measurement]:
+    ) -> tuple[list[Row], Measurement]:
         """Scan one step: its rows and its measurement. Without a value, rows take their cut-off."""
         begun = time.perf_counter()
         plan, sample = make_plan(settings, self.first), self.sample
@@ -281,24 +271,22 @@ class _OneFrame:
         for row in result.rows:
             # notes on errors at other cut-offs are dropped: each row has its own error
             own = [n for n in result.notes if row.variant in n.variants and n.code != OTHER_CUTOFFS]
-            step = StepRow(
-                **{field.name: row[field.name] for field in fields(StepRow) if field.name in row},
-                ladder=ladder,
-                value=round(row.cutoff / r_min, 9) if value is None else value,
-                rule=plan.rule.name,
-                degree=plan.rule.degree,
-                rule_bias=plan.rule.bias,
-                rv_radius=plan.window.radius if plan.window and row.variant in "cd" else None,
-                seconds=seconds,
-                steady=None,
-                note="; ".join(note.text for note in own),
-            )
-            rows.append(step)
+            more = {
+                "ladder": ladder,
+                "value": round(row.cutoff / r_min, 9) if value is None else value,
+                "rule": plan.rule.name,
+                "degree": plan.rule.degree,
+                "rule_bias": plan.rule.bias,
+                "rv_radius": plan.window.radius if plan.window and row.variant in "cd" else None,
+                "seconds": seconds,
+                "note": "; ".join(note.text for note in own),
+            }
+            rows.append(row_of(STEP_COLUMNS, {**row, **more}))
         return rows, result.measurements[0]
 
     def recommended(
-        self, spacings: list[StepRow], directions: list[StepRow], target: float
-    ) -> tuple[list[StepRow], dict[str, str]]:
+        self, spacings: list[Row], directions: list[Row], target: float
+    ) -> tuple[list[Row], dict[str, str]]:
         """
         Choose steady spacing and directions, and add directions until the error is surely met.
 
@@ -328,23 +316,23 @@ class _OneFrame:
         return rows, {"spacing": f"{spacing:g}rmin", "directions": rule.name}
 
 
-def judged(rows: Sequence[StepRow], dimension: int = 3) -> list[StepRow]:
+def judged(rows: Sequence[Row], dimension: int = 3) -> list[Row]:
     """Fill in ``steady`` in the rows of a ladder, variant by variant."""
     from scipy.special import stdtrit
 
     # standard errors by which steps may differ by chance, by Bonferroni's rule for all pairs
     pairs = sum(math.comb(count, 2) for count in Counter(row.variant for row in rows).values())
     most = float(stdtrit(FREEDOM, 1.0 - 0.5 * CHANCE / max(pairs, 1)))
-    judged_rows: list[StepRow] = []
+    judged_rows: list[Row] = []
     for row in reversed(rows):
         later = [step for step in judged_rows if step.variant == row.variant]
         is_sound = None not in (row.alpha_vs_axial, row.alpha_vs_axial_se) and not row.note
         agree = all(step.steady and _agree(row, step, most, dimension) for step in later)
-        judged_rows.append(replace(row, steady=int(is_sound and agree)))
+        judged_rows.append(Row(**{**row, "steady": int(is_sound and agree)}))
     return judged_rows[::-1]
 
 
-def _agree(row: StepRow, later: StepRow, most: float, dimension: int) -> bool:
+def _agree(row: Row, later: Row, most: float, dimension: int) -> bool:
     """
     Whether two values differ by at most ``most`` standard errors of their difference.
 
@@ -361,10 +349,10 @@ def _agree(row: StepRow, later: StepRow, most: float, dimension: int) -> bool:
         more = (later.rv_radius / row.rv_radius) ** dimension
         nested = (later.alpha_vs_axial_sample_se or 0.0) * math.sqrt(more - 1.0)
     error = math.hypot(row.alpha_vs_axial_se or 0.0, later.alpha_vs_axial_se or 0.0, nested)
-    return abs(row.alpha_vs_axial - later.alpha_vs_axial) <= most * error
+    return bool(abs(row.alpha_vs_axial - later.alpha_vs_axial) <= most * error)
 
 
-def first_steady(rows: Sequence[StepRow]) -> float | None:
+def first_steady(rows: Sequence[Row]) -> float | None:
     """
     The first value of a ladder at which all variants are steady; None if there is none.
 
@@ -374,11 +362,11 @@ def first_steady(rows: Sequence[StepRow]) -> float | None:
     return next((step[0].value for step in steps[:-1] if all(row.steady for row in step)), None)
 
 
-def _largest(rows: Sequence[StepRow], name: str) -> float | None:
+def _largest(rows: Sequence[Row], name: str) -> float | None:
     return max((row[name] for row in rows if row[name] is not None), default=None)
 
 
-def _finding(ladder: str, rows: list[StepRow]) -> str:
+def _finding(ladder: str, rows: list[Row]) -> str:
     """Describe the result of a ladder in one sentence."""
     if ladder != "cutoff":
         steady = first_steady(rows)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from dataclasses import replace
+from typing import Any
 
-from scanfab.base.column import LENGTH
+from scanfab.base.column import LENGTH, Column
 from scanfab.base.errors import Note, PackingError, ReadError, ScanfabNote, collected, note, tell
 from scanfab.base.option import unusable
 from scanfab.io.frame import Frame
@@ -19,41 +19,39 @@ from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import Frames, doubts_of_frame, sample_of
 from scanfab.pipeline.rv import rvs_of
 from scanfab.pipeline.settings import Settings
-from scanfab.table.row import DataclassRow
+from scanfab.table.row import Row
+
+REPORT_COLUMNS = (
+    Column("source", str, "", "the series as given"),
+    Column("frame", int, "", "index of the frame in the series, from 0"),
+    Column("step", int, "", "time step of the dump"),
+    Column("time", float, "", "time"),
+    Column("format", str, "", "name of the reader"),
+    Column("grains", int, "", "number of grains, without boundary particles; a clump is one grain"),
+    Column("boundary", int, "", "number of boundary particles"),
+    Column("radius_min", float, LENGTH, "smallest radius of a grain"),
+    Column("radius_max", float, LENGTH, "largest radius of a grain"),
+    Column("contacts", int, "", "number of contacts, including those with boundary particles"),
+    Column("contacts_from", str, "", "file: listed in the dump; geometric: found by geometry"),
+    Column("rattlers", int, "", "number of grains with too few contacts (clumps: neighbours)"),
+    Column("coordination", float, "", "mean number of contacts (clumps: neighbours) per grain"),
+    Column("cell", list, LENGTH, "lattice vectors as rows"),
+    Column("periodic", list, "", "whether the sample repeats along each lattice vector"),
+    Column("columns", list, "", "names of the particle columns, standard columns first"),
+    Column("warnings", list, "", "doubts about the frame"),
+    Column("low", list, LENGTH, "lower corner of the box around the grains"),
+    Column("high", list, LENGTH, "upper corner of the box around the grains"),
+    Column("rv_center", list, LENGTH, "centre of the RV of the series"),
+    Column("rv_radius", float, LENGTH, "radius of the ball that holds the RV"),
+    Column("rv_shape", str, "", "shape and size of the RV in words"),
+    Column("clumps", int, "", "number of grains that are bodies of several spheres"),
+    Column("spheres", int, "", "number of spheres that the grains consist of"),
+    Column("grains_in_rv", int, "", "number of grains whose centre lies in the RV"),
+)
+"""Columns of a row of :func:`inspect`: one frame as the reader sees it."""
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class FrameReport(DataclassRow):
-    """One frame as the reader sees it; lengths in the dump's unit."""
-
-    source: Annotated[str, "the series as given"]
-    frame: Annotated[int, "index of the frame in the series, from 0"]
-    step: Annotated[int | None, "time step of the dump"]
-    time: Annotated[float | None, "simulation time of the dump", "time"]
-    format: Annotated[str, "name of the reader"]
-    grains: Annotated[int, "number of grains, without boundary particles; a clump is one grain"]
-    boundary: Annotated[int, "number of boundary particles"]
-    radius_min: Annotated[float | None, "smallest radius of a grain", LENGTH]
-    radius_max: Annotated[float | None, "largest radius of a grain", LENGTH]
-    contacts: Annotated[int, "number of contacts, including those with boundary particles"]
-    contacts_from: Annotated[str, "file: listed in the dump; geometric: found by geometry"]
-    rattlers: Annotated[int, "number of grains with too few contacts (clumps: neighbours)"]
-    coordination: Annotated[float | None, "mean number of contacts (clumps: neighbours) per grain"]
-    cell: Annotated[list[list[float]] | None, "lattice vectors as rows", LENGTH]
-    periodic: Annotated[list[bool] | None, "whether the sample repeats along each lattice vector"]
-    columns: Annotated[list[str], "names of the particle columns, standard columns first"]
-    warnings: Annotated[list[str], "doubts about the frame"]
-    low: Annotated[list[float] | None, "lower corner of the box around the grains", LENGTH]
-    high: Annotated[list[float] | None, "upper corner of the box around the grains", LENGTH]
-    rv_center: Annotated[list[float] | None, "centre of the RV of the series", LENGTH]
-    rv_radius: Annotated[float | None, "radius of the ball that holds the RV", LENGTH]
-    rv_shape: Annotated[str | None, "shape and size of the RV in words"]
-    clumps: Annotated[int, "number of grains that are bodies of several spheres"]
-    spheres: Annotated[int, "number of spheres that the grains consist of"]
-    grains_in_rv: Annotated[int | None, "number of grains whose centre lies in the RV"]
-
-
-def inspect(series: Series, **options: Any) -> Iterator[FrameReport]:
+def inspect(series: Series, **options: Any) -> Iterator[Row]:
     """
     Report what a reader finds in each frame of a series, without computing the fabric.
 
@@ -67,7 +65,7 @@ def inspect(series: Series, **options: Any) -> Iterator[FrameReport]:
 
     Yields
     ------
-    FrameReport
+    Row
         One for each chosen frame. Its attributes are the columns of ``scanfab inspect --json``,
         among them ``grains``, ``contacts``, ``rattlers``, ``cell`` and ``warnings``, and the box
         around the grains. Lengths are in the dump's unit.
@@ -94,7 +92,7 @@ def inspect(series: Series, **options: Any) -> Iterator[FrameReport]:
     return inspect_series(series, Settings(**options))
 
 
-def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
+def inspect_series(series: Series, settings: Settings) -> Iterator[Row]:
     """
     Read the chosen frames and report what is in them.
 
@@ -163,12 +161,12 @@ def _rv(frames: Frames, sample: Sample) -> Window | None:
 
 def _report(
     source: str, number: int, frame: Frame, sample: Sample, doubts: list[str], window: Window | None
-) -> FrameReport:
+) -> Row:
     packing, grains, cell = sample.packing, sample.grains, sample.packing.cell
     radius = packing.radius[grains]
     box = SurfaceBox.of(packing, sample.gathered) if grains.any() else None
     in_rv = None if window is None else sample.number(sample.counted(VARIANTS["c"], window))
-    return FrameReport(
+    return Row(
         source=source,
         frame=number,
         step=packing.step,

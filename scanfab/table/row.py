@@ -6,7 +6,6 @@ import html
 import math
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -39,23 +38,6 @@ ANISOTROPIES = ("alpha_vs_axial", "alpha_c_axial")
 OFTEN_SAME = ("source", "strain", "shear_strain", "cutoff")
 # number of columns shown, and number of rows shown at each end of a long table
 MOST_COLUMNS, ENDS = 8, 5
-
-
-class DataclassRow(Mapping[str, Any]):
-    """Base class of dataclasses that are rows: their fields are the columns."""
-
-    __slots__ = ()
-
-    def __getitem__(self, name: str) -> Any:
-        if name not in list(self):
-            raise NoColumnError(name, tuple(self))
-        return getattr(self, name)
-
-    def __iter__(self) -> Iterator[str]:
-        return (field.name for field in fields(self))  # type: ignore[arg-type]
-
-    def __len__(self) -> int:
-        return len(fields(self))  # type: ignore[arg-type]
 
 
 class Row(Mapping[str, Any]):

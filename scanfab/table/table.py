@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import is_dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.column import DEFAULT_DIGITS, Column, NoColumnError, columns_of_fields
+from scanfab.base.column import DEFAULT_DIGITS, Column, NoColumnError
 from scanfab.base.errors import ReadError, SettingsError
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.tensor import COMPONENTS
@@ -93,10 +92,7 @@ class Table(Sequence[Row]):
     def __init__(
         self, rows: Iterable[Mapping[str, Any]] = (), columns: Sequence[Column] | None = None
     ) -> None:
-        given = list(rows)
-        values = [{name: plain(value) for name, value in row.items()} for row in given]
-        if columns is None and given and is_dataclass(given[0]):
-            columns = columns_of_fields(type(given[0]))
+        values = [{name: plain(value) for name, value in row.items()} for row in rows]
         self.columns = _columns(values) if columns is None else tuple(columns)
         self._frame = data_frame(values, self.columns)
 

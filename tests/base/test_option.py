@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
 
 import pytest
 
-from scanfab.base.column import LENGTH, Column, NoColumnError, columns_of_fields
+from scanfab.base.column import NoColumnError
 from scanfab.base.errors import Note, SettingsError, SkippedFrameWarning, joined, tell
 from scanfab.base.option import number, one_of, option, optional, options_of, takes_options, whole
 
@@ -64,21 +63,6 @@ def test_an_unusable_value_is_named_with_what_was_expected(parse, expected, valu
 def test_usable_values_stay_as_they_are():
     assert (WORD("on_error", "skip"), WORD("on_error", None)) == ("skip", None)
     assert DAYS("seed", 2**60 + 1) == 2**60 + 1
-
-
-@dataclass
-class Disc:
-    name: Annotated[str, "what it is called"]
-    radius: Annotated[float | None, "of its rim", LENGTH]
-    corners: Annotated[list[list[float]] | None, "if it has any"]
-
-
-def test_fields_are_columns_with_kind_unit_and_meaning():
-    assert columns_of_fields(Disc) == (
-        Column("name", str, "", "what it is called"),
-        Column("radius", float, "length", "of its rim"),
-        Column("corners", list, "", "if it has any"),
-    )
 
 
 def test_a_column_that_does_not_exist_is_told_without_quotes_with_those_that_do():

@@ -1,25 +1,24 @@
 """scanfab calibrate: rows or a table, words, and a command line that runs."""
 
 import shlex
-from dataclasses import replace
 
 import pytest
 
-from scanfab.base.column import columns_of_fields
-from scanfab.pipeline.calibration import Calibration, StepRow
+from scanfab.pipeline.calibration import STEP_COLUMNS, Calibration
 from scanfab.table.formats import read_rows
+from scanfab.table.row import Row
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.truth import TRIAXIAL
 from tests.helpers.windows import corners_of_a_box, surface
 
 QUICK = ("--boundary", "mask=3", "--tolerance", "1e-2", "--max-chords", "3e6", "--workers", "1")
-STEP = StepRow(
+STEP = Row(
     source="s", frame=0, ladder="spacing", value=0.1, variant="c", rule="icosahedral:9", degree=5,
     rule_bias=1.2e-4, directions=46, replicates=16, spacing=1e-4, cutoff=1e-3, rv_radius=None,
     segments=123456789, seconds=1.234, mean_length=1e-3, alpha_vs_axial=0.123456,
     alpha_vs_axial_se=0.00123456, alpha_vs_axial_sample_se=0.0123456, steady=1, note="",
 )  # fmt: skip
-FOUND = Calibration((STEP, replace(STEP, ladder="cutoff")), ("nothing found",), {})
+FOUND = Calibration((STEP, Row(**{**STEP, "ladder": "cutoff"})), ("nothing found",), {})
 
 
 @pytest.mark.parametrize("width", [70, 100, 160])
@@ -65,7 +64,7 @@ def test_with_a_file_the_words_are_the_output(ask, cube, tmp_path):
         assert one in command
     assert "--verbose" not in out
     rows = read_rows(table)
-    assert list(rows[0]) == [column.name for column in columns_of_fields(StepRow)]
+    assert list(rows[0]) == [column.name for column in STEP_COLUMNS]
     assert {row["ladder"] for row in rows} == {"spacing", "directions", "cutoff", "recommended"}
     (best,) = (row for row in rows if row["ladder"] == "recommended")
     program, *words = shlex.split(command)

@@ -1,14 +1,13 @@
 """Calibration: ladders, from where on they are steady, and recommended settings that hold."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from scanfab import Packing, ScanfabWarning, SettingsError, calibrate, compute, find_contacts
-from scanfab.base.column import columns_of_fields
-from scanfab.pipeline.calibration import StepRow, first_steady, judged
+from scanfab.pipeline.calibration import STEP_COLUMNS, first_steady, judged
+from scanfab.table.columns import row_of
+from scanfab.table.row import Row
 from tests.helpers.lattices import shaken_cubic
 
 QUICK = {"tolerance": 2e-3, "variants": "cd", "rv": 0.6, "workers": 1}
@@ -79,8 +78,7 @@ def test_directions_of_discs_are_equal_angles(monkeypatch, most):
 
 def step(value, alpha, error, **more):
     words = {"value": value, "variant": "c", "alpha_vs_axial": alpha, "alpha_vs_axial_se": error}
-    empty = {column.name: None for column in columns_of_fields(StepRow)}
-    return StepRow(**{**empty, "note": "", **words, **more})
+    return row_of(STEP_COLUMNS, {"note": "", **words, **more})
 
 
 def test_steady_is_what_differs_from_later_steps_by_no_more_than_chance():
@@ -90,7 +88,7 @@ def test_steady_is_what_differs_from_later_steps_by_no_more_than_chance():
     far = [step(9, 0.0129, 0.001), *steps[:2], steps[4]]
     assert [row.steady for row in judged(far)] == [0, 0, 1, 1]
     for doubt in ({"alpha_vs_axial_se": None}, {"note": "few"}, {"alpha_vs_axial": None}):
-        found = judged([steps[4], replace(steps[4], **doubt), steps[4]])
+        found = judged([steps[4], Row(**{**steps[4], **doubt}), steps[4]])
         assert [row.steady for row in found] == [0, 0, 1]
         assert first_steady(found) is None  # there is nothing that the last one agrees with
 

@@ -7,10 +7,9 @@ import re
 
 import pytest
 
-from scanfab.base.column import columns_of_fields
 from scanfab.base.errors import ScanfabNote, ScanfabWarning, SettingsError
-from scanfab.pipeline.calibration import StepRow
-from scanfab.pipeline.inspection import FrameReport
+from scanfab.pipeline.calibration import STEP_COLUMNS
+from scanfab.pipeline.inspection import REPORT_COLUMNS
 from scanfab.table import curves
 from scanfab.table.compare import DIFFERENCES, FRAMES, SUMMARY
 from scanfab.table.row import number_of
@@ -168,7 +167,7 @@ def test_a_value_of_another_kind_is_named_by_table_row_and_column(column, value,
 
 
 OTHERS = [(FRAMES, "a table"), (SUMMARY, "the summary"), (DIFFERENCES, "the differences")]
-OTHERS += [(columns_of_fields(kind), "no column strain") for kind in (StepRow, FrameReport)]
+OTHERS += [(columns, "no column strain") for columns in (STEP_COLUMNS, REPORT_COLUMNS)]
 REFUSED = [
     *(([dict.fromkeys(one.name for one in columns)], {}, name) for columns, name in OTHERS),
     ([{f"column_{k}": k for k in range(100)}], {}, "no column source"),

@@ -36,7 +36,7 @@ class Figure:
 
     Parameters
     ----------
-    data : Table, ScannedFrames or sequence of StepRow
+    data : Table, ScannedFrames or steps of a calibration
         The data, of the type that ``kind`` names. A subclass may take further options by keyword.
 
     Examples
@@ -268,7 +268,7 @@ def make_figures(data: Any, kind: str, text: str | None = None, **offered: Any) 
 
     Parameters
     ----------
-    data : Table, rows of one, ScannedFrames or sequence of StepRow
+    data : Table, rows of one, ScannedFrames or steps of a calibration
         The data to be drawn.
     kind : str
         ``table``, ``frames``, ``calibration`` or ``map``.

@@ -210,7 +210,7 @@ class Ladders(Figure):
 
     Parameters
     ----------
-    data : sequence of StepRow
+    data : steps of a calibration
         The steps of :func:`scanfab.calibrate`. Spacings and cut-offs are divided by r_min.
     ladder : str, optional
         The ladder to draw on one Axes: ``"spacing"``, ``"directions"``, ``"cutoff"`` or ``"rv"``.
