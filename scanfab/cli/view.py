@@ -13,7 +13,7 @@ from scanfab.cli.console import announce
 from scanfab.cli.options import SourceCommand, checked, open_one, options, usage_errors
 
 # letters of the source in the title, which also names frame and strain
-LONGEST_SOURCE = 60
+LONGEST_SOURCE = 40
 
 
 @click.command(cls=SourceCommand)

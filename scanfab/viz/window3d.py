@@ -12,13 +12,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pyvista
-from vtkmodules.vtkRenderingCore import vtkActor2D, vtkCoordinate, vtkPolyDataMapper2D
 
 from scanfab.base.convex import Convex
 from scanfab.base.errors import ScanfabError
 from scanfab.base.files import whole_file
 from scanfab.base.typing import BoolArray, FloatArray
-from scanfab.viz.figures.style import COLOURS, rounded_down
+from scanfab.viz.figures.style import COLOURS
 from scanfab.viz.meshes import lines_mesh, window_mesh
 from scanfab.viz.scene import OUTSIDE, SHADES, Scene, towards_viewer
 
@@ -31,12 +30,6 @@ SIZE = (1200, 900)
 # Shares of the picture's height for the words above the sample, and for the scale below it.
 TOP, BOTTOM = 0.13, 0.07
 MARGIN = 0.02
-# Smallest size of legible letters.
-SMALLEST = 12
-# A disk of the legend, and the bar of the scale, in shares of the picture.
-AROUND = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
-DISK = 0.0075 * np.column_stack([np.cos(AROUND), SIZE[0] / SIZE[1] * np.sin(AROUND)])
-BAR = np.array([[0.0, 0.03], [1.0, 0.03], [1.0, 0.036], [0.0, 0.036]])
 
 
 def check_screen() -> None:
@@ -126,7 +119,6 @@ def _draw(plotter: Any, scene: Scene, up: FloatArray, title: str) -> None:
         points, radius = np.vstack([points, scene.center]), np.append(radius, window.reach)
     aim(plotter, points, radius, up, look)
     add_words(plotter, title, names)
-    _add_scale(plotter)
     plotter.enable_anti_aliasing("ssaa")
     plotter.add_axes(line_width=3, color="black", viewport=(0.0, 0.0, 0.16, 0.2))
 
@@ -239,57 +231,13 @@ def aim(
 
 
 def add_words(plotter: Any, title: str, names: Mapping[str, str]) -> None:
-    """Write title and legend above the sample; each name stands beside a disk of its colour."""
-    words = _write(plotter, title, MARGIN, 1.0 - 0.055, 12)
-    font, box = words.GetTextProperty(), [0.0] * 4
-    words.GetBoundingBox(plotter.renderer, box)
-    while box[1] - box[0] > (1.0 - 2.0 * MARGIN) * SIZE[0] and font.GetFontSize() > SMALLEST:
-        font.SetFontSize(font.GetFontSize() - 1)
-        words.GetBoundingBox(plotter.renderer, box)
+    """Write title and legend above the sample, and a ruler in the dump's unit below it."""
+    look: Any = {"viewport": True, "font": "arial"}
+    plotter.add_text(title, (MARGIN, 1.0 - 0.055), font_size=12, color="black", **look)
     place = MARGIN
     for name, colour in names.items():
-        _fill(plotter, DISK + np.array([place + 0.008, 1.0 - 0.088]), colour)
-        _write(plotter, name, place + 0.022, 1.0 - 0.1, 10)
+        plotter.add_text("\u2022", (place, 1.0 - 0.112), font_size=22, color=colour, **look)
+        plotter.add_text(name, (place + 0.022, 1.0 - 0.1), font_size=10, color="black", **look)
         place += 0.045 + 0.0118 * len(name)
-
-
-def _add_scale(plotter: Any) -> None:
-    """Draw a bar with its length in the dump's unit, which follows the zoom of a window."""
-    words = _write(plotter, "", 0.0, 0.055, 10)
-    bar = _fill(plotter, BAR, "black")
-
-    def update(*_: object) -> None:
-        across = 2.0 * plotter.camera.parallel_scale * SIZE[0] / SIZE[1]
-        length = rounded_down(0.2 * across)
-        left = 1.0 - MARGIN - length / across
-        bar.points[:, 0] = left + BAR[:, 0] * length / across
-        bar.Modified()
-        words.SetInput(f"{length:g}")
-        words.SetPosition(left, 0.045)
-
-    update()
-    plotter.camera.AddObserver("ModifiedEvent", update)
-
-
-def _write(plotter: Any, text: str, x: float, y: float, size: int) -> Any:
-    """Write words at a place in shares of the window, from the lower left."""
-    look: Any = {"font_size": size, "color": "black", "font": "arial"}
-    return plotter.add_text(text, position=(x, y), viewport=True, **look)
-
-
-def _fill(plotter: Any, corners: FloatArray, colour: str) -> Any:
-    """Draw a polygon in shares of the window; gives it back, so that it can be moved."""
-    shape = pyvista.PolyData(
-        np.column_stack([corners, np.zeros(len(corners))]),
-        faces=[len(corners), *range(len(corners))],
-    )
-    shares = vtkCoordinate()
-    shares.SetCoordinateSystemToNormalizedViewport()
-    mapper = vtkPolyDataMapper2D()
-    mapper.SetInputData(shape)
-    mapper.SetTransformCoordinate(shares)
-    actor = vtkActor2D()
-    actor.SetMapper(mapper)
-    actor.GetProperty().SetColor(*pyvista.Color(colour).float_rgb)
-    plotter.renderer.AddActor(actor)
-    return shape
+    hidden = {f"{side}_axis_visibility": False for side in ("top", "left", "right")}
+    plotter.add_legend_scale(color="black", legend_visibility=False, **hidden)

@@ -103,14 +103,14 @@ def test_words_and_scale_are_dark_on_white_and_within_the_picture(view, tmp_path
     dumps.mkdir(parents=True)
     write(dumps / "dump_0.txt", dump_text(cubic_rows()))
     dark = (drawn(view(dumps, "--rv", "0.7,0.5")) < 90).all(axis=2)
-    title, legend, scale = dark[20:60], dark[60:100], dark[860:875, 700:]
+    title, legend, ruler = dark[20:60], dark[60:100], dark[875:]
     assert title.sum() > 400
     assert legend.sum() > 300
     words = dark[20:100].any(axis=0)
     assert not (words[:20] | words[-20:]).any()
-    bar = scale.any(axis=0).nonzero()[0]
-    assert 100 < len(bar) < 260
-    assert bar[-1] == pytest.approx(0.98 * 1200 - 700, abs=2)
+    numbers = ruler.any(axis=0).nonzero()[0]
+    assert 10 < numbers[0] < 100
+    assert 1100 < numbers[-1] < 1190
 
 
 @pytest.fixture
@@ -149,7 +149,7 @@ def test_a_long_path_leaves_both_ends_of_the_source_and_the_strain(tmp_path, vie
     dumps.symlink_to(f"{ROOT}/sample_data/lammps_shear")
     view(dumps, "--frame", "5")
     ((_, _, title, _),) = scenes
-    assert title.startswith(str(dumps)[:20])
+    assert title.startswith(str(dumps)[:15])
     assert re.search(r"/shear, frame 5, shear strain [\d.]+ %$", title)
 
 
