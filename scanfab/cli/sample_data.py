@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from pathlib import Path
 
 import click
 
 import scanfab
-from scanfab.base.errors import SettingsError, note
-from scanfab.base.files import check_folder, named_errors
+from scanfab.base.errors import note
+from scanfab.base.files import named_errors
 from scanfab.cli.console import Command
-from scanfab.cli.options import usage_errors
 
 
 @click.command("sample-data", cls=Command)
@@ -30,8 +28,8 @@ def sample_data(folder: Path) -> int:
     samples = next((place for place in places if place.is_dir()), None)
     if samples is None:
         raise scanfab.ScanfabError(f"{places[0]}: the samples are missing: install scanfab again")
-    with usage_errors():
-        _check_target(folder)
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise click.UsageError(f"{folder}: holds something already: name a new or an empty folder")
     # pip compiles the scripts among the samples
     paths = [path for path in samples.rglob("*") if path.parent.name != "__pycache__"]
     for source in sorted(path for path in paths if path.is_file()):
@@ -44,15 +42,3 @@ def sample_data(folder: Path) -> int:
         f"copied {names} to {folder}: try scanfab compute {folder}/yade_triaxial --boundary mask=3"
     )
     return 0
-
-
-def _check_target(folder: Path) -> None:
-    """Raise SettingsError unless the folder is empty, or can be made."""
-    if not folder.exists():
-        check_folder(folder)
-    elif not folder.is_dir():
-        raise SettingsError(f"{folder}: is a file: name a new or an empty folder")
-    elif any(folder.iterdir()):
-        raise SettingsError(f"{folder}: is not empty: name a new or an empty folder")
-    elif not os.access(folder, os.W_OK):
-        raise SettingsError(f"{folder}: the folder cannot be written to")
