@@ -21,4 +21,4 @@ from scanfab.io.reader import Snapshot as Snapshot
 from scanfab.io.writer import Left as Left
 from scanfab.io.writer import Writer as Writer
 from scanfab.io.writer import more_columns as more_columns
-from scanfab.packing.contacts import ListedWallForces as ListedWallForces
+from scanfab.packing.contacts import WallForces as WallForces

@@ -15,7 +15,7 @@ from scanfab.io.families import are_tied
 from scanfab.io.files import unpacking_up_to
 from scanfab.io.formats.own import FrameData, check_contacts_are_there, companion_kind, with_columns
 from scanfab.io.reader import Carries, GrainTable, JoinedContacts, Reader, ReadOptions, Snapshot
-from scanfab.packing.contacts import ListedWallForces
+from scanfab.packing.contacts import WallForces
 from scanfab.packing.packing import Packing, check_lengths
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ class Frame:
         walls = [part.wall_forces for part in parts if part.wall_contacts.any()]
         known = [part for part in walls if part is not None]
         joined = [*zip(*known, strict=True)] if len(known) == len(walls) else []
-        wall_forces = ListedWallForces(*map(np.concatenate, joined)) if joined else None
+        wall_forces = WallForces(*map(np.concatenate, joined)) if joined else None
         return Packing(
             grains.position,
             grains.radius,
@@ -180,7 +180,7 @@ class Frame:
             cell=grains.cell,
             step=self.step,
             time=self.snapshot.time,
-            dim=series.space_of(self.number, grains.position, grains.id),
+            dim=series.space_of(self.number, grains.position, grains.id).dimension,
         )
 
     def _contacts(self, grains: GrainTable) -> tuple[list[Path], list[JoinedContacts]]:
@@ -240,11 +240,6 @@ class Frame:
         """Whether the user names a cell, or along which axes it repeats."""
         options = self.series.options
         return bool(self.series.cells or options.cell or options.periodic)
-
-    @property
-    def bodies_are_named(self) -> bool:
-        """Whether the user names the column of bodies."""
-        return self.series.options.bodies is not None
 
     def _options(self) -> ReadOptions:
         """The options for this frame, with its own cell if a file lists a cell for each frame."""

@@ -13,7 +13,7 @@ from scanfab.base.errors import ReadError, UnknownFormatError
 from scanfab.base.plugins import Offer, having, load_plugins
 from scanfab.base.typing import AnyArray, FloatArray, IntArray
 from scanfab.packing.cell import Cell
-from scanfab.packing.contacts import ContactList, ListedWallForces
+from scanfab.packing.contacts import ContactList, WallForces
 
 GROUP = "scanfab.readers"
 """The entry point group under which packages register readers."""
@@ -97,7 +97,7 @@ class GrainTable(NamedTuple):
     """Number of contacts with walls of each grain, shape (N,), if the grain file lists them."""
     bodies: IntArray | None = None
     """Number of each sphere's body, shape (N,), if the format defines it."""
-    wall_forces: ListedWallForces | None = None
+    wall_forces: WallForces | None = None
     """The forces of all contacts with walls, if the grain file lists them."""
 
 
@@ -108,7 +108,7 @@ class JoinedContacts(NamedTuple):
     """None if the file lists contacts with walls only."""
     wall_contacts: IntArray
     """Number of contacts with walls of each grain, shape (N,)."""
-    wall_forces: ListedWallForces | None = None
+    wall_forces: WallForces | None = None
     """The forces of all these contacts with walls, if the file lists them."""
 
 

@@ -60,11 +60,6 @@ class Bodies:
         """Whether a sphere is the first one of its body, shape (N,)."""
         return np.asarray(self.head == np.arange(len(self.head)))
 
-    @property
-    def has_many(self) -> BoolArray:
-        """Whether the body of a sphere has several spheres, shape (N,)."""
-        return np.asarray(np.bincount(self.head, minlength=len(self.head))[self.head] > 1)
-
     def count(self, chosen: BoolArray) -> int:
         """Number of bodies with a chosen sphere; ``chosen`` has shape (N,)."""
         return len(np.unique(self.head[chosen]))

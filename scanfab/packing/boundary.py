@@ -102,15 +102,6 @@ def select_boundary(packing: Packing, rules: Sequence[BoundaryRule]) -> BoolArra
     return np.asarray(np.any([none, *(rule.select(packing) for rule in rules)], axis=0))
 
 
-def unnamed_boundary(packing: Packing) -> list[Note]:
-    """A note on particles that look like a boundary, in a packing for which none is named."""
-    expression = enclosing_class(packing)
-    if expression is None:
-        return []
-    text = f"the particles with {expression} enclose the others: if they are a boundary, "
-    return [Note("unnamed_boundary", f'{text}name them: `boundary="{expression}"`')]
-
-
 def spelt_rules(rules: Sequence[BoundaryRule], packing: Packing) -> str:
     """Spell rules, and the values that a packing has in their columns."""
     named = " or ".join(rule.text for rule in rules)
@@ -124,9 +115,9 @@ def spelt_rules(rules: Sequence[BoundaryRule], packing: Packing) -> str:
     return f"{named}: {'; '.join(told)}"
 
 
-def enclosing_class(packing: Packing) -> str | None:
+def unnamed_boundary(packing: Packing) -> list[Note]:
     """
-    The class of particles that encloses the others, as an expression; None if there is none.
+    A note on a class of particles that encloses the others, in a packing without a boundary.
 
     All its particles are farther from the centre than 98 % of the others. Distances are in half the
     sample's extents, and either Euclidean or the largest coordinate, for round or square samples.
@@ -138,7 +129,7 @@ def enclosing_class(packing: Packing) -> str | None:
             found = np.unique(values[values == values])
             classes += [(name, values, found)] if 2 <= found.size <= MOST_CLASSES else []
     if len(packing) < FEWEST or not classes:
-        return None
+        return []
     low, high = packing.position.min(axis=0), packing.position.max(axis=0)
     scaled = (packing.position - 0.5 * (low + high)) / np.maximum(high - low, 1e-300)
     distances = np.linalg.norm(scaled, axis=1), np.abs(scaled).max(axis=1)
@@ -146,8 +137,10 @@ def enclosing_class(packing: Packing) -> str | None:
         for value in found:
             inside = values != value
             if any(d[~inside].min() > np.quantile(d[inside], 0.98) for d in distances):
-                return f"{name}={value:g}"
-    return None
+                named = f"{name}={value:g}"
+                text = f"the particles with {named} enclose the others: if they are a boundary, "
+                return [Note("unnamed_boundary", f'{text}name them: `boundary="{named}"`')]
+    return []
 
 
 def _range(text: str) -> tuple[float, float]:

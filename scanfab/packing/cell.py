@@ -8,11 +8,11 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.arrays import MOST, all_within
+from scanfab.base.arrays import MOST, all_within, cast
 from scanfab.base.errors import PackingError
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import spelt_place
-from scanfab.base.typing import BoolArray, FloatArray, IntArray
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.lattice import Lattice
 
 # The longest periodic edge over the smallest height; the search for images can count so far.
@@ -48,9 +48,6 @@ class Cell:
     array([[0.5, 2.5, 9. ]])
     """
 
-    vectors: FloatArray
-    origin: FloatArray
-
     def __init__(
         self,
         vectors: npt.ArrayLike,
@@ -58,24 +55,12 @@ class Cell:
         origin: npt.ArrayLike = (0.0, 0.0, 0.0),
         space: Space = SPACE,
     ) -> None:
-        try:
-            self.vectors = np.asarray(vectors, dtype=np.float64)
-            self.origin = np.asarray(origin, dtype=np.float64)
-        except (TypeError, ValueError):
-            self.vectors = self.origin = np.zeros(0)
-        if self.vectors.shape == (3,):
-            self.vectors = np.diag(self.vectors)
-        if self.vectors.shape != (3, 3) or self.origin.shape != (3,):
-            raise PackingError(
-                f"a cell needs vectors of shape (3, 3) or (3,) and an origin of shape (3,), "
-                f"found {vectors!r} and {origin!r}"
-            )
-        if isinstance(periodic, str) or np.shape(periodic) != (3,):
-            raise PackingError(
-                f"periodic: expected three truth values, such as (True, True, False), "
-                f"found {periodic!r}"
-            )
-        self.periodic = bool(periodic[0]), bool(periodic[1]), bool(periodic[2])
+        edges = cast("cell: vectors", vectors, np.float64, (3, ...))
+        edges = np.diag(edges) if edges.ndim == 1 else edges
+        self.vectors: FloatArray = cast("cell: vectors", edges, np.float64, (3, 3))
+        self.origin: FloatArray = cast("cell: origin", origin, np.float64, (3,))
+        x, y, z = cast("cell: periodic", periodic, np.bool_, (3,)).tolist()
+        self.periodic: tuple[bool, bool, bool] = (x, y, z)
         self.space = space
         if not all(all_within(one, -MOST, MOST) for one in (self.vectors, self.origin)):
             raise PackingError(
@@ -268,20 +253,11 @@ class Cell:
         periodic = list(self.periodic)
         fractions, reach = self.fractional(position)[:, periodic], margin / self.heights[periodic]
         # only points near a face have images near the cell
-        is_near = np.zeros(len(position), np.bool_)
-        for along, most in zip(fractions.T, reach, strict=True):
-            is_near |= (along <= most) | (along >= 1.0 - most)
-        near = np.flatnonzero(is_near)
-        # along each periodic vector: which points a number of steps brings near enough
-        fits: list[dict[int, BoolArray]] = []
-        for along, most in zip(fractions[near].T, reach, strict=True):
-            steps = range(-int(most) - 1, int(most) + 2)
-            fits.append({n: (along + n >= -most) & (along + n <= 1.0 + most) for n in steps})
-        shifts = [shift for shift in product(*fits) if any(shift)]
-        rows = [
-            near[np.all([fit[n] for fit, n in zip(fits, shift, strict=True)], axis=0)]
-            for shift in shifts
-        ]
+        near = np.flatnonzero(((fractions <= reach) | (fractions >= 1.0 - reach)).any(axis=1))
+        steps = [range(-int(most) - 1, int(most) + 2) for most in reach]
+        shifts = [shift for shift in product(*steps) if any(shift)]
+        moved = (fractions[near] + shift for shift in shifts)
+        rows = [near[((one >= -reach) & (one <= 1.0 + reach)).all(axis=1)] for one in moved]
         row = np.concatenate(rows)
         image = np.zeros((len(row), 3), np.int64)
         image[:, periodic] = np.repeat(shifts, [len(some) for some in rows], axis=0)

@@ -356,31 +356,17 @@ def _first_of_each(pairs: RowArray, image: RowArray) -> npt.NDArray[np.intp]:
     return np.sort(first)
 
 
-class ListedWallForces(NamedTuple):
-    """
-    Forces of walls on grains, as a source lists them; a wall is a body that is not in the table.
-
-    Parameters
-    ----------
-    row : array_like of int, shape (K,)
-        Row of the grain.
-    point : array_like, shape (K, 3)
-        Where the wall is touched, dump's length unit; at any of its periodic images.
-    force : array_like, shape (K, 3)
-        Force on the grain, dump's force unit.
-    """
-
-    row: npt.ArrayLike
-    point: npt.ArrayLike
-    force: npt.ArrayLike
-
-
 class WallForces(NamedTuple):
-    """The forces of walls on grains, K of them."""
+    """
+    Forces of walls on grains, K of them; a wall is a body that is not in the table.
+
+    A source may give the points at any of their periodic images. In a packing, a point is next to
+    the grain in the cell.
+    """
 
     row: IntArray
     """Row of the grain (of a clump the row of the sphere that touches), shape (K,)."""
     point: FloatArray
-    """Where the grain in the cell touches the wall, shape (K, 3); dump's length unit."""
+    """Where the grain touches the wall, shape (K, 3); dump's length unit."""
     force: FloatArray
     """Force on the grain, shape (K, 3); dump's force unit."""

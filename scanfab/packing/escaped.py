@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.errors import Note
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.packing import Packing
-from scanfab.packing.window import SurfaceBox
 
 # A gap between surfaces is wide if it is above RADII largest radii, and above TIMES the usual gap.
 # The usual gap is the one to the nearest neighbour that only a share LONELY of the grains exceeds.
@@ -22,28 +19,16 @@ FEWEST = 50
 # At most this share of the grains is left out, and at most so many that flew away together. More
 # grains may be a part of the sample, which the user has to decide.
 SHARE, TOGETHER = 0.01, 20
-# A message names so many spheres.
-MOST_NAMED = 20
 # The usual gap is measured at so many grains.
 SOME = 10_000
 
 
-class Escaped(NamedTuple):
-    """Which particles lie far away from all others."""
-
-    grains: BoolArray
-    """Shape (N,)."""
-    gap: float
-    """The smallest gap between one of them and the rest, dump's length unit; 0 without any."""
-    are_many: bool
-    """Whether they are too many to be left out; the search stopped, so there may be more."""
-
-
-def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
+def escaped_grains(packing: Packing, grains: BoolArray) -> BoolArray:
     """
     Find the grains that lie far outside the others, by their positions and radii.
 
-    Only grains that widen the sample along a direction that does not repeat count.
+    Only grains that widen the sample along a direction that does not repeat count. The search ends
+    when they are more than one in a hundred.
 
     Parameters
     ----------
@@ -52,6 +37,10 @@ def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
     grains : ndarray of bool, shape (N,)
         Which of its particles are grains.
 
+    Returns
+    -------
+    ndarray of bool, shape (N,)
+
     Examples
     --------
     >>> import numpy as np
@@ -59,9 +48,8 @@ def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
     >>> from scanfab.packing.escaped import escaped_grains
     >>> grid = np.stack(np.meshgrid(*3 * [np.arange(5.0)]), axis=-1).reshape(-1, 3)
     >>> packing = Packing(np.vstack([grid, [20.0, 2.0, 2.0]]), 0.5)
-    >>> found = escaped_grains(packing, np.ones(126, bool))
-    >>> np.flatnonzero(found.grains).tolist(), found.gap
-    ([125], 15.0)
+    >>> np.flatnonzero(escaped_grains(packing, np.ones(126, bool))).tolist()
+    [125]
     """
     rows, left = np.flatnonzero(grains), grains.copy()
     count = _number(packing, rows)
@@ -74,57 +62,24 @@ def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
     far = RADII * float(packing.radius[rows].max(initial=0.0))
     # This quick test nearly always finds nothing, which spares loading SciPy.
     if any(_group_at_end(packing, left, *end, far) for end in ends):
-        far = max(far, TIMES * _usual_gap(packing, rows))
+        from scipy.spatial import KDTree
+
+        some = rows[:: len(rows) // SOME + 1]
+        distance, near = KDTree(packing.position[rows]).query(packing.position[some], k=2)
+        gaps = distance[:, 1] - packing.radius[some] - packing.radius[rows[near[:, 1]]]
+        far = max(far, TIMES * float(np.quantile(gaps, 1.0 - LONELY)))
         for axis, sign in ends:
             while _number(packing, flown) <= most and (
                 group := _group_at_end(packing, left, axis, sign, far)
             ):
                 left[group] = False
                 flown += group
-    rest = np.flatnonzero(left)
-    gap = min((float(_gaps(packing, row, rest).min()) for row in flown), default=0.0)
-    return Escaped(grains & ~left, gap, _number(packing, flown) > most)
-
-
-def notes_of_escaped(packing: Packing, grains: BoolArray, escaped: Escaped) -> list[Note]:
-    """The note on grains that have escaped; an empty list if there are none."""
-    rows = np.flatnonzero(escaped.grains)
-    if not rows.size:
-        return []
-    more = _number(packing, rows) - 1
-    place = ", ".join(f"{x:g}" for x in packing.position[rows[0]])
-    grain = f"grain {packing.id[rows[0]]} at ({place}){f' and {more} more' if more else ''}"
-    ids = ",".join(str(one) for one in packing.id[rows[:MOST_NAMED]])
-    cure = f'`boundary="id={ids}{",..." if len(rows) > MOST_NAMED else ""}"`'
-    text = (
-        f", so the sample's extents, RV and octants leave out what has flown away; "
-        f"in a and b it is still solid: {cure} takes it out"
-    )
-    if escaped.are_many:
-        boxes = [SurfaceBox.of(packing, chosen) for chosen in (grains, grains & ~escaped.grains)]
-        wide, narrow = (" x ".join(f"{x:.4g}" for x in box.high - box.low) for box in boxes)
-        text = (
-            f"; these are too many to be left out, so they widen the sample's extents, RV "
-            f"and octants: {wide} with them, {narrow} without; if they have flown away, {cure} "
-            f"takes them out"
-        )
-    code = "too_many_escaped" if escaped.are_many else f"escaped {ids}"
-    return [Note(code, f"{grain}: {escaped.gap:g} away from all others{text}")]
+    return grains & ~left
 
 
 def _number(packing: Packing, rows: IntArray | list[int]) -> int:
     """How many grains some spheres are, by their rows."""
     return len(rows) if packing.bodies is None else len(np.unique(packing.bodies.head[rows]))
-
-
-def _usual_gap(packing: Packing, rows: IntArray) -> float:
-    """The gap to the nearest neighbour that only a few grains exceed."""
-    from scipy.spatial import KDTree
-
-    some = rows[:: len(rows) // SOME + 1]
-    distance, near = KDTree(packing.position[rows]).query(packing.position[some], k=2)
-    gaps = distance[:, 1] - packing.radius[some] - packing.radius[rows[near[:, 1]]]
-    return float(np.quantile(gaps, 1.0 - LONELY))
 
 
 def _group_at_end(

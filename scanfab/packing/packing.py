@@ -17,13 +17,7 @@ from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.bodies import Bodies, bodies_of
 from scanfab.packing.cell import Cell
-from scanfab.packing.contacts import (
-    ContactList,
-    Contacts,
-    ListedWallForces,
-    WallForces,
-    resolve_contacts,
-)
+from scanfab.packing.contacts import ContactList, Contacts, WallForces, resolve_contacts
 
 # grains that a message names, and the share of centres that may lie off the plane of all others
 MOST_NAMED, OFF_PLANE = 5, 0.01
@@ -54,7 +48,7 @@ class Packing:
         Pairs of rows. Without them, :func:`scanfab.find_contacts` finds contacts by geometry.
     wall_contacts : array_like of int, shape (N,), optional
         Number of contacts of each grain with walls, which are not in the table.
-    wall_forces : ListedWallForces, optional
+    wall_forces : WallForces, optional
         The forces of these contacts, if the source lists them.
     cell : Cell, optional
         The (periodic) cell.
@@ -62,8 +56,7 @@ class Packing:
         Time step and simulation time of the dump.
     dim : {2, 3}, optional
         2 for discs, whose centres share one coordinate. The default is 3, or 2 if positions have
-        two coordinates. The cell of discs does not repeat across their plane. A series gives the
-        :class:`~scanfab.base.space.Space` of its first frame.
+        two coordinates. The cell of discs does not repeat across their plane.
 
     Raises
     ------
@@ -90,15 +83,15 @@ class Packing:
         bodies: npt.ArrayLike | None = None,
         contacts: npt.ArrayLike | ContactList | None = None,
         wall_contacts: npt.ArrayLike | None = None,
-        wall_forces: ListedWallForces | None = None,
+        wall_forces: WallForces | None = None,
         cell: Cell | None = None,
         step: int | None = None,
         time: float | None = None,
-        dim: int | Space | None = None,
+        dim: int | None = None,
     ) -> None:
         if not isinstance(cell, Cell | None):
             raise PackingError(f"cell: expected a Cell, such as Cell([1, 1, 1]), found {cell!r}")
-        centres, space = _centres(position, dim)
+        centres, plane = _centres(position, dim)
         count = len(centres)
         radii = np.asarray(radius)
         self.radius: FloatArray = cast(
@@ -107,11 +100,7 @@ class Packing:
         self.id: IntArray = cast("id", np.arange(count) if id is None else id, np.int64, (count,))
         check_lengths(centres, self.radius, self.id)
         _refuse_twice(self.id)
-        if isinstance(space, Space):
-            _refuse_outside(centres, space)
-        else:
-            space = flat_space(centres, self.id) if space == 2 else SPACE
-        self.space: Space = space
+        self.space: Space = flat_space(centres, self.id) if plane == 2 else SPACE
         if cell is not None and self.space.is_plane:
             cell = _cell_in_plane(cell, self.space)
         self.cell, turns = cell, None
@@ -164,36 +153,29 @@ class Packing:
         """Whether the packing repeats along any direction."""
         return self.cell is not None and self.cell.is_periodic
 
-    def with_contacts(
-        self, contacts: ContactList | Contacts, wall_contacts: npt.ArrayLike | None = None
-    ) -> Packing:
+    def with_contacts(self, contacts: ContactList | Contacts) -> Packing:
         """
-        The same grains with other contacts.
+        The same grains with other contacts, and the same contacts with walls.
 
         Parameters
         ----------
         contacts : ContactList or Contacts
             The images in a list count from the wrapped positions. Contacts are taken as they are.
-        wall_contacts : array_like of int, shape (N,), optional
-            Without it the packing keeps its wall contacts. The forces of others are not known.
 
         Returns
         -------
         Packing
         """
         other = copy.copy(self)
-        if wall_contacts is not None:
-            other.wall_contacts = _wall_contacts(wall_contacts, len(self))
-            other.wall_forces = None
         if isinstance(contacts, ContactList):
             contacts = resolve_contacts(contacts, self, None)
         other.contacts = contacts
         return other
 
 
-def _centres(position: npt.ArrayLike, dim: int | Space | None) -> tuple[FloatArray, int | Space]:
-    """Positions with three coordinates (z = 0 of discs), and 2, 3 or the space they lie in."""
-    if dim not in (None, 2, 3) and not isinstance(dim, Space):
+def _centres(position: npt.ArrayLike, dim: int | None) -> tuple[FloatArray, int]:
+    """Positions with three coordinates (z = 0 of discs), and 2 or 3."""
+    if dim not in (None, 2, 3):
         raise PackingError(f"dim: expected 2 or 3, found {dim!r}")
     with suppress(ValueError):  # rows of different lengths
         if np.shape(position)[1:] == (2,):
@@ -214,7 +196,7 @@ def _wall_contacts(values: npt.ArrayLike | None, count: int) -> IntArray:
     return numbers
 
 
-def _wall_forces(listed: ListedWallForces, position: FloatArray, cell: Cell | None) -> WallForces:
+def _wall_forces(listed: WallForces, position: FloatArray, cell: Cell | None) -> WallForces:
     """Check listed forces of walls, and move each point to the grain that it touches."""
     row = cast("wall_forces: row", listed.row, np.int64, (None,))
     point = cast("wall_forces: point", listed.point, np.float64, (len(row), 3))
@@ -329,19 +311,6 @@ def _refuse_twice(id: IntArray) -> None:
     if again.size:
         raise PackingError(
             f"the id {again[0]} occurs twice: {len(id) - again.size} ids for {len(id)} grains"
-        )
-
-
-def _refuse_outside(position: FloatArray, space: Space) -> None:
-    """PackingError if centres do not lie in the plane of a series."""
-    if space.across is None or not len(position):
-        return
-    elsewhere = position[position[:, space.across] != position[0, space.across]]
-    if len(elsewhere):
-        raise PackingError(
-            f"the reference frame of the series has discs in {space}, but here centres lie at "
-            f"{spelt_plane(position, space)} and at {spelt_plane(elsewhere, space)}: `dim=3` reads "
-            f"all frames as spheres"
         )
 
 

@@ -12,13 +12,13 @@ from functools import cached_property
 import numpy as np
 
 from scanfab.base.arrays import cast
-from scanfab.base.errors import Note, PackingError
+from scanfab.base.errors import PackingError
 from scanfab.base.spelling import counted
-from scanfab.base.typing import BoolArray, IntArray
+from scanfab.base.typing import BoolArray, IntArray, RowArray
 from scanfab.packing.contacts import Contacts
-from scanfab.packing.escaped import Escaped, escaped_grains, notes_of_escaped
+from scanfab.packing.escaped import SHARE, escaped_grains
 from scanfab.packing.packing import Packing
-from scanfab.packing.rattlers import RattlerRule, Touching, count
+from scanfab.packing.rattlers import RattlerRule, count
 from scanfab.packing.window import Window
 
 
@@ -150,39 +150,23 @@ class Sample:
     def clumps(self) -> int:
         """How many grains are bodies of several spheres."""
         bodies = self.packing.bodies
-        return 0 if bodies is None else bodies.count(self.grains & bodies.has_many)
+        return 0 if bodies is None else int(np.sum(np.bincount(bodies.head[self.grains]) > 1))
 
     @cached_property
-    def escaped(self) -> Escaped:
+    def escaped(self) -> BoolArray:
         """Grains that lie far away from all others."""
         return escaped_grains(self.packing, self.grains)
 
     @property
     def gathered(self) -> BoolArray:
-        """Grains without those that have escaped, shape (N,); the extents are theirs."""
-        return self.grains if self.escaped.are_many else self.grains & ~self.escaped.grains
-
-    def doubts_of_escaped(self) -> list[Note]:
-        """
-        The note on grains that have escaped.
-
-        Returns
-        -------
-        list of Note
-            Empty if there are none.
-        """
-        return notes_of_escaped(self.packing, self.grains, self.escaped)
-
-    @cached_property
-    def touching(self) -> Touching:
-        """The data by which a rule finds the rattlers."""
-        options = self.min_contacts, self.packing.bodies, self.min_force
-        return Touching(self.contacts, self.contact_numbers, self.grains, *options)
+        """Grains without escaped ones, unless these are too many, (N,); the extents are theirs."""
+        few = max(SHARE * self.number(self.grains), 1.0)
+        return self.grains & ~self.escaped if self.number(self.escaped) <= few else self.grains
 
     @cached_property
     def rattlers(self) -> BoolArray:
         """Grains that are rattlers by the rule, shape (N,)."""
-        named = self.rattler_rule(self.touching)
+        named = self.rattler_rule(self)
         found: BoolArray = cast("rattlers", named, np.bool_, (len(self.packing),))
         if self.packing.bodies is not None:
             found = found[self.packing.bodies.head]
@@ -196,13 +180,38 @@ class Sample:
         Grains that are spheres have one neighbour a contact. Each sphere of a clump has the number
         of the clump.
         """
+        return self._numbers(self.contacts.neighbours(self.packing.bodies))
+
+    def numbers_without(self, left_out: BoolArray) -> IntArray:
+        """
+        Number of neighbours of each particle without some contacts; contacts with walls stay.
+
+        Parameters
+        ----------
+        left_out : ndarray of bool, shape (M,)
+            Contacts.
+
+        Returns
+        -------
+        ndarray of int, shape (N,)
+        """
+        contacts, packing = self.contacts, self.packing
+        if packing.bodies is None:
+            lost = np.compress(left_out, contacts.pairs, axis=0)
+            return self.contact_numbers + packing.wall_contacts - self._numbers(lost)
+        # clumps that touch in several points stay neighbours while one contact is left
+        return self._numbers(contacts.neighbours(packing.bodies, left_out))
+
+    def _numbers(self, pairs: RowArray) -> IntArray:
+        """Numbers of neighbours, by pairs of grains and by all contacts with walls, shape (N,)."""
         bodies, walls = self.packing.bodies, self.packing.wall_contacts
-        pairs = self.contacts.neighbours(bodies)
-        ends = np.bincount(pairs.ravel(), minlength=len(self.packing))
+        # one column at a time, as bincount copies what it counts
+        first, second = (np.bincount(rows, minlength=len(walls)) for rows in pairs.T)
+        numbers = first + second
         if bodies is None:
-            return ends + walls
-        np.add.at(ends, bodies.head, walls)
-        return ends[bodies.head]
+            return numbers + walls
+        np.add.at(numbers, bodies.head, walls)
+        return numbers[bodies.head]
 
     def numbers_of(self, variant: Variant) -> IntArray:
         """
@@ -222,7 +231,7 @@ class Sample:
     @cached_property
     def _numbers_left(self) -> IntArray:
         """Number of neighbours without rattlers, shape (N,)."""
-        return self.touching.numbers_without(~self.contacts_without(self.rattlers))
+        return self.numbers_without(~self.contacts_without(self.rattlers))
 
     def removed(self, variant: Variant) -> BoolArray:
         """

@@ -209,7 +209,7 @@ class _OneFrame:
         self.name, self.sample, self.space = frames.name, sample, self.first.packing.space
         self.settings = settings.in_space(self.space)
         doubts = doubts_of_frame(wanted, sample, self.settings)
-        tell([*doubts, *sample.doubts_of_escaped()], f"frame {self.number}")
+        tell(doubts, f"frame {self.number}")
         # these notes hold for every step
         tell(make_plan(self.settings, self.first).notes)
 

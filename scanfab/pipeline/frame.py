@@ -131,7 +131,7 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
     # rows have the order of the settings; in the frame, RVs without a void fabric come last
     rvs = plan.rvs
     plan = plan.in_frame(frame)
-    notes = [*frame.doubts_of_escaped(), *empty_rvs(plan.rvs)]
+    notes = list(empty_rvs(plan.rvs))
     if plan.strains.file is not None and known["strain"] is None:
         text = f"{settings.strain} has no row for this frame, so its strain is empty"
         notes.append(Note("no_strain_in_file", text, kind=ScanfabNote))

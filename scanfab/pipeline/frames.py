@@ -15,6 +15,7 @@ from scanfab.base.errors import (
     Note,
     PackingError,
     ReadError,
+    ScanfabNote,
     SettingsError,
     SkippedFrameWarning,
     tell,
@@ -24,7 +25,7 @@ from scanfab.io.follow import FollowedSeries
 from scanfab.io.frame import Frame
 from scanfab.io.series import ENDLESS, Series
 from scanfab.packing.boundary import select_boundary, spelt_rules, unnamed_boundary
-from scanfab.packing.doubts import cell_doubt, doubts_of
+from scanfab.packing.doubts import cell_hint, doubts_of
 from scanfab.packing.packing import Packing
 from scanfab.packing.rattlers import installed_rules
 from scanfab.packing.sample import Sample
@@ -290,14 +291,13 @@ def no_such_reference(number: int, name: str, count: int) -> NoReferenceError:
 
 def doubts_of_frame(frame: Unread, sample: Sample, settings: Settings) -> list[Note]:
     """What looks wrong in a frame before anything is measured."""
-    if isinstance(frame, Packing):
-        # made of arrays, it has the cell and the bodies that its maker wants
-        notes = doubts_of(sample)
-    else:
-        notes = doubts_of(sample, frame.cell_is_named, frame.bodies_are_named)
-        if no_cell := cell_doubt(sample, frame.carries):
-            notes.append(Note("no_cell", no_cell))
-    return notes if settings.boundary else notes + unnamed_boundary(sample.packing)
+    # a packing made of arrays has the cell that its maker wants
+    notes = doubts_of(sample, not isinstance(frame, Packing) and frame.cell_is_named)
+    if settings.boundary:
+        return notes
+    if not isinstance(frame, Packing) and (hint := cell_hint(sample, frame.carries)):
+        notes.append(Note("no_cell", hint, kind=ScanfabNote))
+    return notes + unnamed_boundary(sample.packing)
 
 
 def packing_of(frame: Unread) -> Packing:

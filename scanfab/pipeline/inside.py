@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 from scanfab.base.errors import PackingError, ScanfabError, SettingsError, note
-from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.io.columns import first_of
 from scanfab.packing.bodies import CLUMP_COLUMNS
 from scanfab.packing.cell import Cell
-from scanfab.packing.contacts import ContactList, ListedWallForces
+from scanfab.packing.contacts import ContactList, WallForces
 from scanfab.packing.packing import Packing, space_of, spelt_plane
 from scanfab.pipeline.compute import compute
 from scanfab.pipeline.settings import Settings
@@ -93,7 +92,7 @@ def from_ovito(data: Any) -> Packing:
         cell=cell,
         step=data.attributes.get("Timestep"),
         time=data.attributes.get("Time"),
-        dim=2 if is_flat else _space("OVITO's data", position),
+        dim=2 if is_flat else _dimension("OVITO's data", position),
     )
 
 
@@ -113,13 +112,13 @@ def _ovito_radius(particles: Any) -> FloatArray:
     return np.array([radius[type] for type in types], np.float64)
 
 
-def _space(name: str, position: FloatArray) -> Space:
-    """The space of centres, as in files: centres in one plane are those of discs."""
+def _dimension(name: str, position: FloatArray) -> int:
+    """2 or 3, as for files: centres in one plane are those of discs."""
     space = space_of(position)
     if space.is_plane:
         where = spelt_plane(position, space)
         note(f"{name}: all centres lie in {space} ({where}): they are read as discs, in 2D")
-    return space
+    return space.dimension
 
 
 def ovito_modifier(**options: Any) -> Callable[[int, Any], None]:
@@ -221,7 +220,7 @@ def from_yade() -> Packing:
         sign = np.where(pairs[walls, 1:] >= 0, 1.0, -1.0)
         points = [touching[wall].geom.contactPoint for wall in walls]
         point = np.array(points, np.float64).reshape(-1, 3)
-        wall_forces = ListedWallForces(walled, point, sign * force[walls])
+        wall_forces = WallForces(walled, point, sign * force[walls])
         force = force[is_inner]
     position = np.array([body.state.pos for body in spheres], np.float64).reshape(-1, 3)
     columns = {"mask": np.array([body.mask for body in spheres], np.int64)}
@@ -241,5 +240,5 @@ def from_yade() -> Packing:
         cell=Cell(np.array(O.cell.hSize).T) if O.periodic else None,
         step=O.iter,
         time=O.time,
-        dim=_space("YADE's scene", position),
+        dim=_dimension("YADE's scene", position),
     )

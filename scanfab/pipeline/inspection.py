@@ -8,12 +8,11 @@ from dataclasses import replace
 from typing import Any
 
 from scanfab.base.column import LENGTH, Column
-from scanfab.base.errors import Note, PackingError, ReadError, ScanfabNote, collected, note, tell
+from scanfab.base.errors import PackingError, ReadError, ScanfabNote, collected, tell
 from scanfab.base.option import unusable
 from scanfab.io.frame import Frame
 from scanfab.io.series import Series
 from scanfab.packing.boundary import spelt_rules
-from scanfab.packing.doubts import cell_hint, refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import Frames, doubts_of_frame, sample_of
@@ -131,24 +130,16 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[Row]:
 
 
 def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
-    """Read a frame and collect doubts, including errors that would prevent a measurement."""
+    """Read a frame and collect doubts about it."""
     rules = frames.settings.boundary
     with collected() as told:
         sample = sample_of(frame, frames.settings)
+    told = [*told, *doubts_of_frame(frame, sample, frames.settings)]
     tell(one for one in told if one.kind is ScanfabNote)
-    doubts = [one for one in told if one.kind is not ScanfabNote]
+    doubts = [one.text for one in told if one.kind is not ScanfabNote]
     if rules and len(sample.packing) and not sample.boundary.any():
-        text = f"`boundary`: no particle has {spelt_rules(rules, sample.packing)}"
-        doubts.append(Note("no_such_boundary", text))
-    try:
-        refuse_impossible(sample)
-    except PackingError as error:
-        doubts.append(Note("impossible", str(error)))
-    doubts += doubts_of_frame(frame, sample, frames.settings)
-    hint = cell_hint(sample, frame.carries)
-    if hint and all(one.code != "no_cell" for one in doubts):
-        note(hint)
-    return sample, [doubt.text for doubt in (*doubts, *sample.doubts_of_escaped())]
+        doubts.insert(0, f"`boundary`: no particle has {spelt_rules(rules, sample.packing)}")
+    return sample, doubts
 
 
 def _rv(frames: Frames, sample: Sample) -> Window | None:

@@ -12,7 +12,6 @@ from scanfab.base.convex import Convex
 from scanfab.base.errors import Note, SettingsError
 from scanfab.base.shapes import sphere
 from scanfab.base.space import SPACE, Space
-from scanfab.packing.doubts import refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.map_blocks import MapBlocks
@@ -203,7 +202,6 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     PackingError
         If the packing cannot be measured.
     """
-    refuse_impossible(sample)
     packing = sample.packing
     settings = settings.in_space(packing.space)
     plan = unscanned_plan(settings, sample)

@@ -130,8 +130,8 @@ def in_sample(rv: RV, sample: Sample) -> RV:
             f"the {window} reaches {beyond:g} beyond the sample, which is more than twice the "
             f"largest radius ({largest:g})"
         )
-        escaped = packing.id[sample.escaped.grains]
-        if escaped.size and not sample.escaped.are_many:
+        escaped = packing.id[sample.grains & ~sample.gathered]
+        if escaped.size:
             lack += f"; its extents leave out {spelt_some(escaped)} that flew away"
     return rv._replace(lack=lack)
 

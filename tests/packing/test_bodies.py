@@ -135,10 +135,7 @@ def test_a_clump_of_many_spheres_that_flew_away_is_one_grain_that_did():
     clump = np.array([30.0, 2.0, 2.0]) + 0.1 * np.random.default_rng(0).random((40, 3))
     number = np.concatenate([np.full(216, -1), np.full(40, 7)])
     sample = grains(np.vstack([cubic_grid(6), clump]), number, 0.5)
-    assert not sample.escaped.are_many
-    assert np.flatnonzero(sample.escaped.grains).tolist() == list(range(216, 256))
-    (note,) = sample.doubts_of_escaped()
-    assert "more" not in note.text.partition(":")[0]
+    assert np.flatnonzero(~sample.gathered).tolist() == list(range(216, 256))
 
 
 def test_a_body_that_touches_its_own_image_has_two_neighbours():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scanfab.base.errors import SettingsError
-from scanfab.packing.boundary import BoundaryRule, enclosing_class, select_boundary
+from scanfab.packing.boundary import BoundaryRule, select_boundary, unnamed_boundary
 from scanfab.packing.packing import Packing
 from scanfab.pipeline.compute import compute
 from tests.helpers.lattices import unit_vectors
@@ -83,7 +83,8 @@ def box_shell(count=150):
 @pytest.mark.parametrize("name", ["type", "mask", "Type", "matId", "materialId"])
 def test_a_class_that_encloses_the_rest_is_named(shell, name):
     values = np.r_[np.ones(200), np.full(len(shell), 3)]
-    assert enclosing_class(cloud(shell, **{name: values})) == f"{name}=3"
+    (note,) = unnamed_boundary(cloud(shell, **{name: values}))
+    assert f"{name}=3" in note.text
 
 
 @pytest.mark.parametrize(
@@ -98,14 +99,14 @@ def test_a_class_that_encloses_the_rest_is_named(shell, name):
 )
 def test_other_columns_enclose_nothing(name, values):
     """Mixed classes, one class, very many, words, and a column that is no class."""
-    assert enclosing_class(cloud(sphere_shell(), **{name: values})) is None
+    assert unnamed_boundary(cloud(sphere_shell(), **{name: values})) == []
 
 
 def test_a_few_particles_are_not_judged():
     shell = sphere_shell(10)
     position = np.vstack([0.1 * shell, shell])
     packing = Packing(position, 0.01, columns={"type": np.repeat([1, 3], 10)})
-    assert enclosing_class(packing) is None
+    assert unnamed_boundary(packing) == []
 
 
 def test_a_column_that_does_not_do_is_named(packing):

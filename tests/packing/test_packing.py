@@ -7,7 +7,7 @@ import pytest
 
 from scanfab.base.errors import PackingError, ScanfabWarning
 from scanfab.packing.cell import Cell
-from scanfab.packing.contacts import ContactList, ListedWallForces
+from scanfab.packing.contacts import ContactList, WallForces
 from scanfab.packing.packing import Packing
 
 PAIR = np.array([[0.0, 0, 0], [1.9, 0, 0]])
@@ -140,20 +140,19 @@ def test_each_pair_counts_once_with_its_first_force_whichever_grain_is_first():
     np.testing.assert_array_equal(contacts.force, force[[0, 2]])
 
 
-@pytest.mark.parametrize(("walls", "expected"), [(None, [1, 0, 2]), ([0, 3, 1], [0, 3, 1])])
-def test_other_contacts_keep_everything_else(walls, expected):
-    """Also those with walls, unless others are named, whose forces are not known."""
-    forces = ListedWallForces([0], [[-1.0, 0, 0]], [[1.0, 0, 0]])
+def test_other_contacts_keep_everything_else():
+    """Also those with walls."""
+    forces = WallForces([0], [[-1.0, 0, 0]], [[1.0, 0, 0]])
     packing = Packing(
         ROW, 1.0, id=[5, 6, 7], columns={"type": [1, 2, 3]}, step=4, time=0.5,
         wall_contacts=[1, 0, 2], wall_forces=forces,
     )  # fmt: skip
-    other = packing.with_contacts(ContactList([[0, 1]], source="geometric"), walls)
+    other = packing.with_contacts(ContactList([[0, 1]], source="geometric"))
     assert other.contacts.source == "geometric"
     np.testing.assert_array_equal(other.id, packing.id)
     np.testing.assert_array_equal(other.columns["type"], [1, 2, 3])
-    np.testing.assert_array_equal(other.wall_contacts, expected)
-    assert (other.wall_forces is None) == (walls is not None)
+    np.testing.assert_array_equal(other.wall_contacts, [1, 0, 2])
+    assert other.wall_forces is not None
     assert (other.step, other.time, len(other.contacts)) == (4, 0.5, 1)
     assert packing.contacts is None
 

@@ -47,7 +47,11 @@ RING, TAIL = [(0, 1), (1, 2), (2, 3), (3, 0)], [(3, 4), (4, 5), (5, 6)]
         ([*RING, *TAIL], {}, [4, 5, 6]),
         ([*RING, *TAIL], {"least": 3}, [0, 1, 2, 3, 4, 5, 6]),
         # a rule says nothing of boundary particles
-        (row(7), {"boundary": [1], "rule": lambda one: one.numbers < 9}, [0, 2, 3, 4, 5, 6]),
+        (
+            row(7),
+            {"boundary": [1], "rule": lambda one: one.contact_numbers < 9},
+            [0, 2, 3, 4, 5, 6],
+        ),
     ],
 )
 def test_rows_and_rings_fall_apart_from_their_ends(pairs, options, expected):
@@ -74,7 +78,7 @@ def test_recursive_is_its_naive_twin(least):
 
 
 def test_a_rule_that_gives_something_else_is_an_error():
-    sample = network(row(4), 4, rule=lambda touching: np.array([0, 3]))
+    sample = network(row(4), 4, rule=lambda sample: np.array([0, 3]))
     with pytest.raises(PackingError, match=r"rattlers: expected shape \(4\), found \(2,\)"):
         _ = sample.rattlers
 

@@ -85,9 +85,9 @@ def series(tmp_path):
     return scanfab.read_series(write(tmp_path / "dump.txt", dump_text(rows, box=((-1, 7),) * 3)))
 
 
-def untouched(touching):
+def untouched(sample):
     """A made-up rule: only what nothing touches."""
-    return touching.numbers == 0
+    return sample.contact_numbers == 0
 
 
 @pytest.fixture

@@ -143,16 +143,6 @@ def test_a_warning_comes_once_and_its_frames_in_the_end():
     assert not any("no contact" in one for one in found)
 
 
-def test_other_grains_that_fly_away_are_told_again():
-    frames = [bed(), bed(), bed()]
-    for number, frame in enumerate(frames):
-        place = frame.position.copy()
-        place[:number, 0] += 50.0
-        frames[number] = Packing(place, frame.radius)
-    found = [one for one in told(frames, ScanfabWarning) if "flown away" in one]
-    assert ['"id=0"' in found[0], '"id=0,1"' in found[1], len(found)] == [True, True, 2]
-
-
 def test_the_frames_are_told_too_if_the_run_is_stopped():
     rows = compute_rows([bed(apart=2.0)] * 3, scanfab.Settings(workers=1, **SCAN))
     with warnings.catch_warnings(record=True) as caught:

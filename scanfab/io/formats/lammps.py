@@ -26,7 +26,7 @@ from scanfab.io.formats.shared import FormsReader, GrainsOnly
 from scanfab.io.formats.text_dump import TextDump
 from scanfab.io.formats.vtk import VtkReader
 from scanfab.io.reader import GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.packing.contacts import ListedWallForces
+from scanfab.packing.contacts import WallForces
 
 # only LAMMPS writes these items, and bounds with 16 digits (LIGGGHTS: six digits)
 LAMMPS_ITEMS = re.compile(rb"(?m)^ITEM: ((UNITS|TIME)\s|BOX BOUNDS( abc|[^\n]*\n-?\d\.\d{16}e))")
@@ -349,6 +349,6 @@ def _walls(path: Path, values: FloatArray, grains: GrainTable) -> JoinedContacts
                 touches = (distance > 0.5) & (distance < 1.01)
                 pushes = np.sum(force * (centre - point), axis=1) > 0
                 if touches.mean() >= MOST_ROWS and pushes.mean() >= PUSHES:
-                    forces = ListedWallForces(rows, point, force)
+                    forces = WallForces(rows, point, force)
             return JoinedContacts(None, np.bincount(rows, minlength=len(grains.radius)), forces)
     return None

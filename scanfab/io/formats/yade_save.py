@@ -28,7 +28,7 @@ from scanfab.io.formats.shared import GrainsOnly, cell_of
 from scanfab.io.mesh import read_mesh
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell
-from scanfab.packing.contacts import ListedWallForces
+from scanfab.packing.contacts import WallForces
 
 STEP = re.compile(rb"<iter>\s*(\d{1,18})\s*</iter>")
 TIME = re.compile(rb"<time>\s*(\d+\.?\d*(?:e[-+]?\d+)?)\s*</time>")
@@ -162,7 +162,7 @@ def _with_contacts(
     if at.any() and force is not None and not np.isnan(point).any():
         # YADE's forces act on the second body; make them act on the grain
         forces = np.where(rows[at, 1:] >= 0, 1.0, -1.0) * force[at]
-        walls = ListedWallForces(rows[at].max(axis=1), point[at], forces)
+        walls = WallForces(rows[at].max(axis=1), point[at], forces)
     return grains._replace(
         contacts=joined.contacts, wall_contacts=joined.wall_contacts, wall_forces=walls
     )
