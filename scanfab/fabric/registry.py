@@ -20,7 +20,7 @@ from scanfab.fabric.harmonics import Harmonics
 from scanfab.fabric.invariants import Invariants
 from scanfab.fabric.measured import Measured
 from scanfab.fabric.state import State
-from scanfab.fabric.usual import Contact, Halves, Orientation, Scatter, Void
+from scanfab.fabric.usual import Contact, Orientation, Scatter, Void
 
 GROUP = "scanfab.fabrics"
 
@@ -41,7 +41,6 @@ OWN_FABRICS: dict[str, Fabric] = {
     "contact": Contact(),
     "scatter": Scatter(),
     "orientation": Orientation(),
-    "halves": Halves(),
 }
 
 # groups of further columns, which the option `with_` adds, by name

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import zip_longest
 from typing import Any
 
 from scanfab.base.column import LENGTH, numbers
@@ -72,6 +71,12 @@ class Scatter:
                 for block in range(1, BLOCKS + 1)
             }
         ),
+        *numbers(
+            {
+                f"{VOID}_half_{k}": f"{VOID}_without_{k} is the mean of two replicates: {HALF}"
+                for k in range(1, BLOCKS + 1)
+            }
+        ),
     )
 
     def values(self, measured: Measured) -> dict[str, Any]:
@@ -86,25 +91,10 @@ class Scatter:
                 row[f"{name}_sample_se"] = scatter.error
                 without = tensor.axial(axis) + scatter.shift
                 row |= {f"{name}_without_{k}": float(x) for k, x in enumerate(without, start=1)}
+        if measured.void_scatter is not None:
+            halves = enumerate(measured.void_scatter.half.tolist(), start=1)
+            row |= {f"{VOID}_half_{k}": half for k, half in halves}
         return row
-
-
-class Halves:
-    """Columns of the scan's noise in the void anisotropy without each block."""
-
-    columns = numbers(
-        {
-            f"{VOID}_half_{block}": f"{VOID}_without_{block} is the mean of two replicates: {HALF}"
-            for block in range(1, BLOCKS + 1)
-        }
-    )
-
-    def values(self, measured: Measured) -> dict[str, Any]:
-        """Values by column; None if the fabric, or the fabric without some block, is missing."""
-        scatter = measured.void_scatter
-        halves = [] if scatter is None else scatter.half.tolist()
-        # a plane has only four blocks, so the last columns stay empty
-        return dict(zip_longest((column.name for column in self.columns), halves))
 
 
 class Orientation:

@@ -116,7 +116,7 @@ class Comparison:
     >>> found
     Comparison of 3 rows
     s, variant c: slope 0.1, 3 frames
-    >>> round(float(found.slope[0]), 12)
+    >>> round(found.summary[0].slope, 12)
     0.1
     """
 
@@ -124,26 +124,6 @@ class Comparison:
     summary: Table
     differences: Table
     points: tuple[FloatArray, ...]
-
-    @property
-    def slope(self) -> FloatArray:
-        """Slope of each row of the summary, dimensionless; NaN if there is none."""
-        return self.summary["slope"]
-
-    @property
-    def slope_se(self) -> FloatArray:
-        """Standard error of each slope, by a jackknife over the octants of the sample."""
-        return self.summary["slope_se"]
-
-    @property
-    def r2(self) -> FloatArray:
-        """R² of each fit with an intercept."""
-        return self.summary["r2"]
-
-    @property
-    def peak(self) -> FloatArray:
-        """For each row of the summary, the void anisotropy with the largest absolute value."""
-        return self.summary["peak"]
 
     def __repr__(self) -> str:
         lines = [
@@ -233,28 +213,16 @@ def _tell_of_strains(rows: Rows, column: str, strain_max: float | None) -> None:
         return
     if not math.isfinite(strain_max):
         raise SettingsError(f"strain_max: expected a number, found {strain_max}")
-    strained = [row for row in rows if number_of(row, column) is not None]
-    strains = {(row["source"], row["frame"]): float(row[column]) for row in strained}
+    strains = numbers_of(rows, column)
     if not strains:
         warn("`strain_max`: no frame has a strain, so no frame is fitted")
-        return
-    largest = max(strains.values())
-    lie = (
-        f"strains are fractions (5 % is 0.05), positive in compression, and here lie between "
-        f"{min(strains.values()):.3g} and {largest:.3g}"
-    )
-    if _within(largest, strain_max):
+    elif _within(max(strains), strain_max):
         tell = warn if strain_max > 1 else note
-        tell(f"`strain_max`: {strain_max:g} leaves out no frame: {lie}")
-    for source in dict.fromkeys(source for source, _ in strains):
-        own = [strain for (name, _), strain in strains.items() if name == source]
-        beyond = [strain for strain in own if not _within(strain, strain_max)]
-        if beyond and (left := len(own) - len(beyond)) < FEWEST_FRAMES:
-            warn(
-                f"`strain_max`: {strain_max:g} leaves {left} of {len(own)} frames of {source}, but "
-                f"a fit needs {FEWEST_FRAMES}: the next larger strain is {min(beyond):.10g}; "
-                f"{lie}"
-            )
+        tell(
+            f"`strain_max`: {strain_max:g} leaves out no frame: strains are fractions (5 % is "
+            f"0.05), positive in compression, and here lie between {min(strains):.3g} and "
+            f"{max(strains):.3g}"
+        )
 
 
 def _tell_of_errors(summary: Iterable[Mapping[str, Any]], rows: Rows) -> None:

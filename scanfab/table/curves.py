@@ -17,8 +17,9 @@ STRAINS = {
     "strain": ("axial strain", r"$\varepsilon_a$"),
     "shear_strain": ("shear strain", r"$\varepsilon_q$"),
 }
-# what curves are drawn over without a strain, each with its label and its words in a sentence
-OTHERS = {
+# what curves are drawn over, each with its label in figures and its words in a sentence
+ABSCISSAS = {
+    **{name: (f"{' '.join(one)} in %", f"the {one[0]}") for name, one in STRAINS.items()},
     "time": ("time (dump's unit)", "the time"),
     "step": ("time step", "the time step"),
     "frame": ("frame", "the number of the frame"),
@@ -75,12 +76,12 @@ class Curve:
 def curves_of(rows: Iterable[Mapping[str, Any]]) -> list[Curve]:
     """The curves of a table, in the order of their first rows."""
     rows = list(rows)
-    abscissa = _abscissa(rows)
-    factor = 100.0 if abscissa in STRAINS else 1.0
+    name = abscissa(rows)
+    factor = 100.0 if name in STRAINS else 1.0
     groups = groups_of(rows)
     names = short_names(source for source, _ in groups)
     return [
-        Curve(names[source], variant, factor * _drawable(column_of(group, abscissa)), group)
+        Curve(names[source], variant, factor * _drawable(column_of(group, name)), group)
         for (source, variant), group in groups.items()
     ]
 
@@ -126,7 +127,7 @@ def why_not_strain(rows: Rows) -> str | None:
     lacking = _lacking(rows, "strain")
     if not lacking or not numbers_of(rows, "strain"):
         return None
-    instead = abscissa_words(rows) if strain_column(rows) is None else "shear_strain"
+    instead = ABSCISSAS[abscissa(rows)][1]
     why = f"is used, because {'; '.join(lacking)}"
     return f"{instead} {why}: `strain` of compute can measure it by another length"
 
@@ -182,7 +183,7 @@ def spelt_strain(row: Mapping[str, Any], column: str | None, *, symbol: bool = F
     return f"{f'{sign} =' if symbol else words} {100 * value:.3g} %"
 
 
-def _abscissa(rows: Rows) -> str:
+def abscissa(rows: Rows) -> str:
     """The column over which curves are drawn: a strain, else the first that all frames have."""
     if column := strain_column(rows):
         return column
@@ -191,18 +192,6 @@ def _abscissa(rows: Rows) -> str:
         if None not in places.values() and len(set(places.values())) > 1:
             return name
     return "frame"
-
-
-def abscissa_label(rows: Rows) -> str:
-    """Label of the abscissa in figures."""
-    column = _abscissa(rows)
-    return f"{' '.join(STRAINS[column])} in %" if column in STRAINS else OTHERS[column][0]
-
-
-def abscissa_words(rows: Rows) -> str:
-    """Name of the abscissa within a sentence."""
-    column = _abscissa(rows)
-    return f"the {STRAINS[column][0]}" if column in STRAINS else OTHERS[column][1]
 
 
 def is_turned(rows: Rows) -> bool:
@@ -227,12 +216,9 @@ def is_turned(rows: Rows) -> bool:
 def short_names(sources: Iterable[str], longest: int = LONGEST_NAME) -> dict[str, str]:
     """Short names of sources: the last part of each path if these differ, else the path."""
     sources = list(dict.fromkeys(sources))
-    for kept in ([PurePath(source).name or source for source in sources], sources):
-        names = [middle_out(name, longest) for name in kept]
-        if len(set(names)) == len(names):
-            break
-    else:
-        names = [f"{number}: {name}" for number, name in enumerate(names, 1)]
+    last = [PurePath(source).name or source for source in sources]
+    short = ([middle_out(name, longest) for name in names] for names in (last, sources))
+    names = next(names for names in (*short, sources) if len(set(names)) == len(names))
     return dict(zip(sources, names, strict=True))
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.errors import SettingsError, note, warn
+from scanfab.base.errors import SettingsError, warn
 from scanfab.table.columns import KINDS
 from scanfab.table.row import is_number, variant_of
 
@@ -119,10 +119,6 @@ def _of_cutoff(name: str, rows: Rows, cutoff: float) -> Rows:
     """Rows with one cut-off; a frame without grains has none and keeps one row per variant."""
     cutoffs = sorted({row["cutoff"] for row in rows if row.get("cutoff") is not None})
     nearest = min(cutoffs, key=lambda value: abs(value - cutoff), default=math.nan)
-    if len(cutoffs) == 1:
-        if abs(nearest - cutoff) > ROUNDING * nearest:
-            note(f"{name}: its rows have the one cut-off {nearest:g}")
-        return rows
     if not abs(nearest - cutoff) <= ROUNDING * abs(nearest):
         listed = ", ".join(f"{value:.3g}" for value in cutoffs) or "none in this table"
         expected = f"expected a cut-off of the table: {listed}"

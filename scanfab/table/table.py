@@ -124,11 +124,6 @@ class Table(Sequence[Row]):
         return np.array(values.to_list(), dtype=object if values.null_count() else None)
 
     @property
-    def rows(self) -> tuple[Row, ...]:
-        """All rows."""
-        return tuple(self)
-
-    @property
     def names(self) -> tuple[str, ...]:
         """Names of the columns."""
         return tuple(column.name for column in self.columns)

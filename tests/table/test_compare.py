@@ -130,16 +130,12 @@ NO_STRAINS = [{**row, "strain": None} for row in curve()]
 LARGEST = [
     (curve(), 5.0, 5, ScanfabWarning, "5 leaves out no frame: .* fractions .* 0 and 0.04"),
     (curve(), 0.5, 5, ScanfabNote, "0.5 leaves out no frame: .* fractions .* 0 and 0.04"),
-    (curve(), -1, 0, ScanfabWarning, "-1 leaves 0 of 5 frames of .* between 0 and 0.04"),
-    (curve(), 0.01, 2, ScanfabWarning, "0.01 leaves 2 of 5 .* needs 3: .* larger strain is 0.02;"),
     (NO_STRAINS, 1.0, 0, ScanfabWarning, "no frame has a strain"),
 ]
 
 
 @pytest.mark.parametrize(("rows", "largest", "frames", "kind", "message"), LARGEST)
-def test_a_largest_strain_that_leaves_out_nothing_or_too_much_is_told(
-    rows, largest, frames, kind, message
-):
+def test_a_largest_strain_that_leaves_out_nothing_is_told(rows, largest, frames, kind, message):
     assert summary_of(rows).frames == 5
     with pytest.warns(kind, match=f"strain_max`?: {message}"):
         assert summary_of(rows, strain_max=largest).frames == frames
@@ -164,7 +160,7 @@ def test_a_sheared_cell_goes_by_its_shear_strain_and_its_turned_axes_are_told():
         row = summary_of(sheared(), strain_max=0.2)
     assert (row.frames, row.peak_strain) == (3, 0.4)
     told = " ".join(str(one.message) for one in caught)
-    assert "shear_strain is used, because the axial strain of" in told
+    assert "the shear strain is used, because the axial strain of" in told
     assert "the loading axis is not the axis of the contact fabric" in told
 
 

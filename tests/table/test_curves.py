@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from scanfab.base.errors import ScanfabNote, ScanfabWarning, SettingsError
+from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.pipeline.calibration import STEP_COLUMNS
 from scanfab.pipeline.inspection import REPORT_COLUMNS
 from scanfab.table import curves
@@ -26,7 +26,7 @@ def changed(source="one", frame=None, **values):
 ROUNDED = [{**row, "strain": 0.25 + 1e-12 * row["frame"]} for row in curve("one")]
 SMALL = [{**row, "strain": 1e-6 * row["frame"]} for row in curve("one")]
 SHEARED_TOO = [{**row, "shear_strain": row["strain"]} for row in curve("one")]
-FRAME, SHEAR = "the number of the frame is used", "shear_strain is used"
+FRAME, SHEAR = "the number of the frame is used", "the shear strain is used"
 
 
 ABSCISSAS = [
@@ -112,12 +112,6 @@ def test_the_rows_of_one_cutoff_are_chosen_to_three_digits(asked):
     cutoffs = [row["cutoff"] for row in chosen[1:]]
     assert cutoffs == [pytest.approx(asked, rel=1e-3)] * 4
     assert [row["frame"] for row in chosen] == [0, 1, 2, 3, 4]
-
-
-def test_a_table_of_one_cutoff_keeps_its_rows_and_says_so():
-    rows = [{**row, "cutoff": 0.5} for row in curve()]
-    with pytest.warns(ScanfabNote, match=r"t\.csv: its rows have the one cut-off 0\.5"):
-        assert choose_rows([("t.csv", rows)], cutoff=0.4) == [rows]
 
 
 LABELS = [

@@ -11,7 +11,7 @@ from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 
 from scanfab.table.compare import Comparison, compare_tables
-from scanfab.table.curves import abscissa_words, have_errors, is_turned
+from scanfab.table.curves import ABSCISSAS, abscissa, have_errors, is_turned
 from scanfab.table.row import numbers_of
 from scanfab.table.table import Table
 from scanfab.viz.figures.curves import ROW, Curves, Drawn, Group, Quantity, group_of, groups_of
@@ -99,7 +99,7 @@ class Evolution(Curves):
         banded = [name for name, one in named if have_errors(self.curves, one.column)]
         errors = f"with total standard errors of {' and '.join(banded)}"
         errors = errors if banded else "without total errors"
-        return f"{drawn}, over {abscissa_words(self.data)}{divided}; {errors}."
+        return f"{drawn}, over {ABSCISSAS[abscissa(self.data)][1]}{divided}; {errors}."
 
     @property
     def note(self) -> str:

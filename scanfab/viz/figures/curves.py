@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from scanfab.base.column import no_column
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray
-from scanfab.table.curves import Curve, abscissa_label, abscissa_words, curves_of
+from scanfab.table.curves import ABSCISSAS, Curve, abscissa, curves_of
 from scanfab.table.row import numbers_of
 from scanfab.table.table import Table
 from scanfab.viz.figures.figure import Figure
@@ -214,7 +214,7 @@ class Curves(Figure):
 
     def _set_abscissa(self, axes: Axes) -> None:
         """Set label and scale of the x axis."""
-        label = abscissa_label(self.data)
+        label = ABSCISSAS[abscissa(self.data)][0]
         axes.set_xlabel(label)
         places = np.concatenate([curve.x for curve in self.curves])
         known = np.unique(places[np.isfinite(places)])
@@ -290,7 +290,7 @@ class Columns(Curves):
         """The names of the columns and of the x axis."""
         has_errors = any(f"{name}_se" in self.data.names for name in self.names)
         errors = "; bands are their standard errors, as the table has them" if has_errors else ""
-        return f"{', '.join(self.names)} over {abscissa_words(self.data)}{errors}."
+        return f"{', '.join(self.names)} over {ABSCISSAS[abscissa(self.data)][1]}{errors}."
 
 
 def _named(data: Table, of: str | Sequence[str] | None) -> list[str]:
