@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -145,9 +144,7 @@ class _Drawing:
 
 def _write(job: Job, excerpt: Excerpt) -> None:
     """Write the rows as they come; if that fails or is interrupted, say how to continue."""
-    # decided here, because a signal handler calls `_standing` at any moment
     as_table = job.output is None and is_readable()
-    standing = partial(_standing, job, as_table)
 
     def words() -> str:
         ranges = (
@@ -155,7 +152,7 @@ def _write(job: Job, excerpt: Excerpt) -> None:
             for series in job.notes
             for note, where in series.ranges()
         )
-        return standing() + "".join(ranges)
+        return _standing(job) + "".join(ranges)
 
     try:
         with telling(words):
@@ -175,25 +172,14 @@ def _write(job: Job, excerpt: Excerpt) -> None:
                 job.save_manifests()
     except (scanfab.ScanfabError, OSError) as error:
         # with the same wrong option the same command would stop again
-        is_wrong = isinstance(error, scanfab.SettingsError)
-        has_more = job.is_over or 0 < job.done < job.frames()
-        if job.output is not None and has_more and not is_wrong:
-            click.echo(f"scanfab: stopped {standing()}", err=True)
+        if job.output is not None and job.done and not isinstance(error, scanfab.SettingsError):
+            click.echo(f"scanfab: stopped {_standing(job)}", err=True)
         raise
 
 
-def _standing(job: Job, as_table: bool) -> str:
+def _standing(job: Job) -> str:
     """How far the job has come, and how to continue it."""
-    output = job.output
-    if output is not None and job.done == job.taken_over > 0 and output.exists():
-        again = f"{output} is as it was; the same command goes on"
-        return f"before the first new frame was finished: {again}"
-    if not job.done:
-        return "before the first frame was finished: nothing is kept"
     done = f"after {job.done} of {job.frames()} frames"
-    if job.is_over:
-        done = "after the last frame, before the table was complete"
-    if output is None:
-        kept = "nothing is kept" if as_table else "the rows printed so far are all"
-        return f"{done}; {kept}: with -o FILE, --resume could go on"
+    if job.output is None:
+        return f"{done}: with -o FILE, --resume could go on"
     return f"{done}; the same command{'' if job.resume else ' with --resume'} goes on"

@@ -16,7 +16,7 @@ from scanfab.base.errors import Note, PackingError, SettingsError, tell
 from scanfab.base.spelling import counted
 from scanfab.io.options import parse_frames
 from scanfab.packing.sample import VARIANTS
-from scanfab.pipeline.frame import OTHER_CUTOFFS, compute_frame
+from scanfab.pipeline.frame import compute_frame
 from scanfab.pipeline.frames import Frames, NoChosenFrameError, Source, doubts_of_frame
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import make_plan
@@ -269,8 +269,7 @@ class _OneFrame:
         r_min = float(self.first.packing.radius[self.first.grains].min())
         rows = []
         for row in result.rows:
-            # notes on errors at other cut-offs are dropped: each row has its own error
-            own = [n for n in result.notes if row.variant in n.variants and n.code != OTHER_CUTOFFS]
+            own = [note for note in result.notes if row.variant in note.variants]
             more = {
                 "ladder": ladder,
                 "value": round(row.cutoff / r_min, 9) if value is None else value,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 import time
 from collections import deque
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
@@ -29,7 +28,7 @@ from scanfab.pipeline.cluster import DaskExecutor, DeadWorkersError
 from scanfab.pipeline.frame import FrameResult, compute_frame
 from scanfab.pipeline.frames import Frames, Source, Unread, doubts_of_frame
 from scanfab.pipeline.map_settings import MapSettings
-from scanfab.pipeline.plan import Plan, make_plan, unscanned_plan
+from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.series_notes import Facts, SeriesNotes
 from scanfab.pipeline.settings import Settings
 from scanfab.scan.directions import DirectionRule
@@ -235,15 +234,14 @@ def compute_frames(
     if not isinstance(executor, Executor | None):
         raise unusable("executor", "a concurrent.futures.Executor", executor)
     frames = Frames(source, settings)
-    reference = None
-    # an error in a file of strains is raised before the first frame is read
-    plan = unscanned_plan(settings)
     with collected() as told:
         found = frames.reference()
-    if found is not None:
-        plan = make_plan(settings, found[2])
-        reference = found[0], float(found[2].packing.radius[found[2].grains].min())
-        tell(plan.notes)
+    if found is None:
+        next(frames.due())  # raises another error if there is no frame at all
+        raise PackingError(f"{frames.name or 'the source'}: no frame has any grains")
+    plan, first = make_plan(settings, found[2]), found[2]
+    reference = found[0], float(first.packing.radius[first.grains].min())
+    tell(plan.notes)
     notes = notes or SeriesNotes(frames.settings)
     own = ThreadPoolExecutor(settings.workers)
     try:
@@ -256,8 +254,6 @@ def compute_frames(
         notes.end(reference)
         # an interrupted run does not wait for the frames under way
         own.shutdown(wait=False, cancel_futures=True)
-    if math.isnan(plan.cutoff):
-        tell([Note("no_grains", "no frame has any grains")], frames.name)
 
 
 def _jobs(

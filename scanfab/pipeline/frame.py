@@ -12,7 +12,6 @@ import numpy as np
 
 from scanfab.base.arrays import compressed, in_parts
 from scanfab.base.errors import Note, PackingError, ScanfabNote, joined
-from scanfab.base.spelling import spelt_apart
 from scanfab.base.typing import BoolArray, IntArray
 from scanfab.fabric import predicted
 from scanfab.fabric.forces import doubts_of_forces
@@ -44,8 +43,6 @@ from scanfab.table.row import Row
 
 # with fewer grains the numbers of a row mean little
 FEW_GRAINS = 10
-OTHER_CUTOFFS = "error_at_other_cutoffs"
-"""Code of the note that the scan is fine enough for its cut-off, but not for another."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +153,7 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
         text = f"fewer than {FEW_GRAINS} grains: the numbers of these rows mean little"
         doubts.append(Note("few_grains", text, few, ScanfabNote))
     notes += [note for measurement in result.measurements for note in measurement.notes]
-    return replace(result, notes=(*notes, *joined(doubts), *_large_errors(result.rows, plan)))
+    return replace(result, notes=(*notes, *joined(doubts)))
 
 
 def _empty_rows(known: Mapping[str, Any], plan: Plan, cell: Cell | None) -> Iterator[Row]:
@@ -171,31 +168,6 @@ def _empty_rows(known: Mapping[str, Any], plan: Plan, cell: Cell | None) -> Iter
         for rv, place in product(plan.rvs_of(variant), places):
             own = {"variant": variant, RV_COLUMN.name: rv.fraction, **place}
             yield from [row_of(settings.columns, {**empty, **own})] * len(plan.cutoffs)
-
-
-def _large_errors(rows: list[Row], plan: Plan) -> Iterator[Note]:
-    """
-    A note if a scan that meets the tolerance for one row misses it for another row.
-
-    This happens for other cut-offs, other RVs and the second moment, which use the same lines.
-    """
-
-    def aim_of(row: Row) -> float:
-        return plan.settings.aim(row.alpha_vs_axial_sample_se)
-
-    worst = max(rows, key=lambda row: (row.alpha_vs_axial_se or 0.0) / aim_of(row))
-    error, rv = worst.alpha_vs_axial_se or 0.0, worst.get(RV_COLUMN.name)
-    aim, others = aim_of(worst), plan.settings.lists_gaps or len(plan.rvs) > 1
-    # if the scan missed the tolerance at its own cut-off and RV, a note of the scan says so
-    rvs = (None, plan.rvs[0].fraction) if plan.rvs else (None,)
-    own = [row for row in rows if row.cutoff == plan.cutoff and row.get(RV_COLUMN.name) in rvs]
-    others &= all((row.alpha_vs_axial_se or 0.0) <= aim_of(row) for row in own)
-    if plan.auto and others and error > aim:
-        reached, tolerance = spelt_apart(error, aim)
-        where = f"at the cut-off {worst.cutoff:g}{f' in the RV {rv:g}' if rv else ''}"
-        met = f"which holds at {plan.cutoff:g}{f' in {plan.rvs[0].fraction:g}' if rv else ''}"
-        text = f"{where} alpha_vs_axial_se is {reached}, above the tolerance {tolerance}, {met}"
-        yield Note(OTHER_CUTOFFS, f"{text}: choose a smaller `tolerance`", (worst.variant,))
 
 
 class VariantColumns:

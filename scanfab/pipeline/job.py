@@ -91,10 +91,6 @@ class Job:
     """The settings that decide the bytes of the table, from :func:`asked_for`."""
     finished: FrameRows = field(default_factory=dict, init=False)
     """The rows of all finished frames, including those of earlier runs."""
-    taken_over: int = field(default=0, init=False)
-    """Number of frames that earlier runs have finished."""
-    is_over: bool = field(default=False, init=False)
-    """Whether all frames are finished, and only the table is still to be written."""
     resumed: Record | None = field(default=None, init=False)
     """The complete FILE that is resumed, if there is one."""
 
@@ -186,7 +182,6 @@ class Job:
         with self._part.alone():
             if self.resume:
                 self._take_over(self.output, needed)
-                self.taken_over = self.done
             yield
 
     def rows(self, advance: Advance = lambda: None) -> Generator[Row, None, None]:
@@ -264,7 +259,6 @@ class Job:
             except NoChosenFrameError as none:
                 # an array of more jobs than frames has jobs without frames
                 note(f"{str(none).removeprefix('frames: ')}, so the table has no rows of it")
-        self.is_over = True
         for one in self.series:
             if isinstance(one, FollowedSeries):
                 one.end()

@@ -85,10 +85,7 @@ def merge_tables(
         for row in _rows_of(source, frame, records)
     ]
     asked, declared = manifest["settings"], records[0].settings.columns
-    fields = asked.get("fields") or [column.name for column in declared]
-    lists = [record.columns for record in records if record.rows]
-    fields = tuple(name for name in fields if all(name in names for names in lists))
-    excerpt = Excerpt(fields, asked.get("digits", Excerpt.digits))
+    excerpt = Excerpt(tuple(asked.get("fields", ())), asked.get("digits", Excerpt.digits))
     if output is not None:
         save = partial(write_manifest, manifest_of(Path(output)), manifest)
         write_rows(Path(output), rows, declared, excerpt, save)
@@ -108,9 +105,7 @@ def _joined_manifest(records: Sequence[Record], frames: slice) -> dict[str, Any]
             if before.get("sha256") != entry.get("sha256"):
                 what = f"{path} has changed between the jobs of it and of {part}"
                 raise ReadError(f"{record.path}: {what}: run them again")
-        # the manifest of an older version does not say how many frames each series has
-        last = [(source, frame + 1) for source, frame in record.rows]
-        for source, count in (*record.manifest["frames"].items(), *last):
+        for source, count in record.manifest["frames"].items():
             counts[source] = max(count, counts.get(source, 0))
 
     def each_once(lists: Iterable[Iterable[Any]]) -> list[str]:

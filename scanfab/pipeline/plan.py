@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from scanfab.base.convex import Convex
 from scanfab.base.errors import Note, SettingsError
 from scanfab.base.shapes import sphere
-from scanfab.base.space import SPACE, Space
+from scanfab.base.space import Space
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.map_blocks import MapBlocks
@@ -86,16 +86,15 @@ class Plan:
     """
     cutoffs: tuple[float, ...]
     """Cut-offs of the table's rows, in ascending order."""
-    # the fields below are unknown for a series without grains
-    cutoff: float = math.nan
+    cutoff: float
     """Cut-off at which the scan must meet the tolerance."""
-    spacing: float = math.nan
+    spacing: float
     """Distance between the lines of one axis and replicate."""
-    replicates: int = 0
+    replicates: int
     """Number of replicates of a fixed scan, or of the first round of an auto scan."""
-    auto: str = ""
+    auto: str
     """What the scan may add to meet the tolerance: ``""``, ``replicates`` or ``directions``."""
-    region: Region | None = None
+    region: Region
     """The scanned region, from which the spacing of an auto scan follows."""
     of_whole: dict[str, Any] | None = None
     """
@@ -151,7 +150,7 @@ class Plan:
 
     def aiming_at(self, tolerance: float) -> Plan:
         """The plan with the spacing at which an auto scan begins for a tolerance."""
-        if self.region is None or self.auto != "replicates":
+        if self.auto != "replicates":
             return self
         blocks = self.settings.blocks
         spacing = _auto_spacing(self.region, len(self.rule), tolerance, blocks, self.space)
@@ -162,26 +161,6 @@ class Plan:
         variants = "".join(name for name in self.variants if VARIANTS[name].in_window)
         for rv in self.rvs[1:]:
             yield replace(self, rvs=(rv,), variants=variants, replicates=replicates, auto="")
-
-
-def unscanned_plan(settings: Settings, sample: Sample | None = None) -> Plan:
-    """
-    The plan before its lines are chosen; that of a series without grains stays so.
-
-    ``sample`` is the reference frame; without it the frames have rows, but nothing is scanned.
-    """
-    space = SPACE if sample is None else sample.packing.space
-    return Plan(
-        settings=settings,
-        space=space,
-        strains=Strains.of(settings, sample),
-        variants=settings.variants,
-        workers=settings.workers,
-        max_chords=settings.budget,
-        rule=settings.directions or usual_rule(space),
-        rvs=rvs_of(settings, sample),
-        cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),
-    )
 
 
 def make_plan(settings: Settings, sample: Sample) -> Plan:
@@ -204,11 +183,12 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     """
     packing = sample.packing
     settings = settings.in_space(packing.space)
-    plan = unscanned_plan(settings, sample)
-    radii = packing.radius[sample.grains]
+    space, rule = packing.space, settings.directions or usual_rule(packing.space)
+    rvs, radii = rvs_of(settings, sample), packing.radius[sample.grains]
     lengths = {"rmin": float(radii.min()), "rmean": float(radii.mean()), "rmax": float(radii.max())}
     box = SurfaceBox.of(packing, sample.gathered)
-    window, windows = plan.window, plan.windows
+    windows = [rv.window for rv in rvs if rv.window is not None]
+    window = next(iter(windows), None)
     for one in windows:
         one.check_fits(packing)
     notes = [note for one in windows for note in doubts_of_rv(one, sample)]
@@ -216,25 +196,30 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     if isinstance(settings, MapSettings):
         blocks = MapBlocks.of(settings, sample)
         notes += blocks.doubts(sample, window)
-    if plan.rule.bias > 0.1 * settings.aim():
-        name, bias = plan.rule.name, plan.rule.bias
-        text = f"directions {name}: an isotropic sample would get alpha = {bias:.2g}"
+    if rule.bias > 0.1 * settings.aim():
+        text = f"directions {rule.name}: an isotropic sample would get alpha = {rule.bias:.2g}"
         notes.append(Note("biased_directions", text))
     if settings.rv_follows != "none" and windows:
         deformation = Deformation.since(sample, settings.strain, settings.axis)
-    cutoff, lines = settings.cutoff.resolve(lengths), partial(_lines, settings, plan.rule, box)
+    cutoff, lines = settings.cutoff.resolve(lengths), partial(_lines, settings, rule, box)
     chosen = lines(window.shape if window else None, lengths)
-    share, of_whole = 1.0, None
+    most, of_whole = settings.budget, None
     if window is not None and chosen["auto"]:
         # The limit of chords holds for all RVs together. The first RV gets the fraction that its
         # scan needs at least: its part of the total volume.
-        share = window.shape.volume / sum(one.shape.volume for one in windows)
+        most *= window.shape.volume / sum(one.shape.volume for one in windows)
         if not all(VARIANTS[name].in_window for name in settings.variants):
-            of_whole = {**lines(None, lengths), "max_chords": plan.max_chords}
-    return replace(
-        plan,
+            of_whole = {**lines(None, lengths), "max_chords": settings.budget}
+    return Plan(
+        settings=settings,
+        space=space,
+        strains=Strains.of(settings, sample),
+        variants=settings.variants,
+        workers=settings.workers,
+        max_chords=most,
+        rule=rule,
+        rvs=rvs,
         deformation=deformation,
-        max_chords=plan.max_chords * share,
         cutoff=cutoff,
         # equal cut-offs are kept, so that the number of rows is as the settings say
         cutoffs=tuple(sorted(length.resolve(lengths) for length in settings.cutoffs)) or (cutoff,),

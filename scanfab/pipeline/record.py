@@ -48,7 +48,7 @@ from scanfab.table.writing import ALL, Excerpt, manifest_of
 # Settings that may differ if rows come from a complete table: they say which frames and which
 # series were computed, and the inputs are compared by their content.
 FREE = ("frames", "sources")
-# entries of a manifest that are lists, and may be missing in the manifest of an older version
+# entries of a manifest that are lists
 LISTS = ("inputs", "warnings", "notes")
 # options that take their numbers one by one
 APART = ("rv_center", "rv_size", "cell")
@@ -270,8 +270,7 @@ def read_manifest(table: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        usual: dict[str, Any] = {"versions": {}, "frames": {}, **{name: [] for name in LISTS}}
-        found = {**usual, **json.loads(path.read_text("utf-8"))}
+        found: dict[str, Any] = json.loads(path.read_text("utf-8"))
         lists = [found["settings"]["sources"], *(found[name] for name in LISTS)]
         entries = [found["versions"], found["frames"], *found["inputs"]]
         if {*map(type, lists)} != {list} or {*map(type, entries)} != {dict}:

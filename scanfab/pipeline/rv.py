@@ -32,16 +32,14 @@ class RV(NamedTuple):
     fraction: float | None = None
     """Size as a fraction of the sample; None unless there are several RVs."""
     window: Window | None = None
-    """Place and shape; None in a series without grains."""
+    """Place and shape; None for the whole sample."""
     lack: str = ""
     """Why there is no void fabric in it; empty if there is one."""
 
 
-def rvs_of(settings: Settings, sample: Sample | None = None) -> tuple[RV, ...]:
+def rvs_of(settings: Settings, sample: Sample) -> tuple[RV, ...]:
     """
-    The RVs in ascending order; empty if no variant needs an RV.
-
-    ``sample`` is the reference frame; without it the RVs have no windows.
+    The RVs in ascending order in the reference frame; empty if no variant needs an RV.
 
     Raises
     ------
@@ -52,13 +50,11 @@ def rvs_of(settings: Settings, sample: Sample | None = None) -> tuple[RV, ...]:
         If the file of the surface cannot be read.
     """
     sizes = settings.rvs if settings.needs_window else ()
-    rvs = [RV(size if len(sizes) > 1 else None) for size in sizes]
-    if sample is None:
-        return tuple(rvs)
     packing, space = sample.packing, sample.packing.space
     surfaces = SurfaceBox.of(packing, sample.gathered)
     smallest = float(packing.radius[sample.grains].min())
-    for place, size in enumerate(sizes):
+    rvs = []
+    for size in sizes:
         shape, center = _shape(settings, size * (0.5 * surfaces.extents), space)
         if settings.rv_center is not None:
             center = np.array(settings.rv_center, dtype=float)
@@ -76,7 +72,7 @@ def rvs_of(settings: Settings, sample: Sample | None = None) -> tuple[RV, ...]:
             raise SettingsError(
                 f"rv: the {shape} is far too small for grains of radius {smallest:g}"
             )
-        rvs[place] = RV(rvs[place].fraction, Window(center, shape))
+        rvs.append(RV(size if len(sizes) > 1 else None, Window(center, shape)))
     return tuple(rvs)
 
 
@@ -118,8 +114,7 @@ def _cylinder_within(half: FloatArray, axis: Vector) -> tuple[float, float]:
 def in_sample(rv: RV, sample: Sample) -> RV:
     """The RV, with the reason why it has no void fabric in a sample, if it has none."""
     packing, window = sample.packing, rv.window
-    if window is None:
-        return rv
+    assert window is not None
     largest = float(packing.radius[sample.grains].max())
     beyond = -SurfaceBox.of(packing, sample.gathered).room_around(window)
     lack = ""

@@ -185,9 +185,9 @@ class Strains(NamedTuple):
     """Cell of the reference frame."""
 
     @classmethod
-    def of(cls, settings: Settings, first: Sample | None = None) -> Strains:
+    def of(cls, settings: Settings, first: Sample) -> Strains:
         """
-        Start from settings and the reference frame, if there is one.
+        Start from settings and the reference frame.
 
         Raises
         ------
@@ -199,8 +199,6 @@ class Strains(NamedTuple):
         mode, axis = settings.strain, settings.axis
         is_file = mode not in STRAIN_MODES
         file = FrameFile(Path(mode), ["strain"]) if is_file else None
-        if first is None:
-            return cls(mode, axis, file)
         length = None if is_file else axial_length(first, mode, axis)
         return cls(mode, axis, file, length, first.packing.cell)
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.convex import Convex
-from scanfab.base.errors import Note, PackingError, ReadError, SettingsError, tell
+from scanfab.base.errors import tell
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.io.series import Series
@@ -20,10 +19,9 @@ from scanfab.packing.window import Window
 from scanfab.pipeline.frames import Frames, doubts_of_frame, sample_of
 from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.strain import Strains
 from scanfab.pipeline.values import Vector
 from scanfab.scan.lines import Segments, cut_lines
-from scanfab.table.curves import SAME, frame_strain_column, spelt_strain
+from scanfab.table.curves import frame_strain_column, spelt_strain
 
 # Angle between the lines of a section and the plane across the axis, degrees.
 LINE_ANGLE = 30.0
@@ -114,7 +112,7 @@ class Look:
     first: Sample | None
     """The reference frame, which fixes all lengths of the series."""
     plan: Plan | None
-    """None if the settings do not fit the series."""
+    """None if no frame has grains."""
     axis: Vector
     """Loading axis, a unit vector."""
 
@@ -135,7 +133,7 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     Raises
     ------
     ScanfabError
-        If there is no such frame, or it cannot be read.
+        If there is no such frame, it cannot be read, or the settings do not fit the series.
     """
     # damaged frames are skipped; only a damaged frame that is asked for is an error
     frames = Frames(series, replace(settings, on_error="skip"))
@@ -143,48 +141,16 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     sample = sample_of(frame, settings)
     tell(doubts_of_frame(frame, sample, settings))
     found = frames.reference()
-    first = None if found is None else found[2]
-    plan = None
-    if first is not None:
-        with suppress(SettingsError):  # _plan warns if the settings do not fit
-            settings = settings.in_space(first.packing.space)
-        plan = _plan(first, settings)
-    if plan is not None and sample.grains.any():
-        plan = plan.in_frame(sample)
-    scene = scene_of(sample, *(() if plan is None else plan.windows))
-    if plan is not None:
-        scene = about_window(replace(scene, cutoff=plan.cutoff))
-    strains = _strains(frame.number, sample, first, settings)
-    column = frame_strain_column(strains)
-    if strains and all(value is not None and abs(value) < SAME for value in strains.values()):
-        # at zero strain, the last frame tells which of the strains tells the frames apart
-        for last_number, last in reversed(list(frames)):
-            with suppress(PackingError, ReadError):
-                later = _strains(last_number, sample_of(last, settings), first, settings)
-                column = frame_strain_column(later)
-                break
-    strain = spelt_strain(strains, column)
-    return Look(scene, frame.number, sample, strain, first, plan, settings.axis)
-
-
-def _plan(first: Sample, settings: Settings) -> Plan | None:
-    """The plan of the series; None, with a warning, if it cannot be made."""
-    try:
-        # a strain that cannot be measured matters only to an RV that follows it
-        strain = settings.strain if settings.rv_follows == "strain" else "auto"
-        plan = make_plan(replace(settings, strain=strain), first)
-    except SettingsError as error:
-        tell([Note("no_rv", f"the RV is not shown: {error}")])
-        return None
+    if found is None:
+        return Look(scene_of(sample), frame.number, sample, "", None, None, settings.axis)
+    plan = make_plan(settings, found[2])
     tell(plan.notes)
-    return plan
-
-
-def _strains(number: int, sample: Sample, first: Sample | None, settings: Settings) -> Strained:
-    """The strains of a frame as in the fabric table; none if they cannot be measured."""
-    with suppress(SettingsError):
-        return Strains.of(settings, first).at(number, sample)
-    return {}
+    strains = plan.strains.at(frame.number, sample)
+    strain = spelt_strain(strains, frame_strain_column(strains))
+    if sample.grains.any():
+        plan = plan.in_frame(sample)
+    scene = about_window(replace(scene_of(sample, *plan.windows), cutoff=plan.cutoff))
+    return Look(scene, frame.number, sample, strain, found[2], plan, plan.settings.axis)
 
 
 def scene_of(sample: Sample, *windows: Window) -> Scene:

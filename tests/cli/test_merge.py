@@ -77,7 +77,7 @@ def test_the_bytes_are_those_of_one_run(series, tmp_path, suffix):
     """A job that no frame was left for has a table without rows."""
     words = ("--with", "harmonics", "--digits", "9")
     parts = as_parts(series, tmp_path, 6, *words, suffix=suffix)
-    assert scanfab.load(parts[5]).rows == ()
+    assert len(scanfab.load(parts[5])) == 0
     whole, merged = tmp_path / f"whole{suffix}", tmp_path / f"merged{suffix}"
     compute(series, whole, *words)
     assert merge(*reversed(parts), output=merged) == whole.read_bytes()

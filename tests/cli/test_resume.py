@@ -152,8 +152,12 @@ def test_how_far_an_interrupted_run_is_is_told(dumps, stop, compute, monkeypatch
     with interrupted_at_row(monkeypatch, 4):
         assert run(["compute", "dumps", *FAST]) == 130
     told = capsys.readouterr().err
-    assert "after 1 of 4 frames; the rows printed so far are all: with -o FILE, --resume" in told
-    stop("t.csv", row=2, told="interrupted before the first frame was finished: nothing is kept")
+    assert "after 1 of 4 frames: with -o FILE, --resume could go on" in told
+    stop(
+        "t.csv",
+        row=2,
+        told="interrupted after 0 of 4 frames; the same command with --resume goes on",
+    )
     assert not list(Path().glob("t.csv*"))
     (dumps / "dump_200.txt").write_text("ITEM: TIMESTEP\n")
     told = "stopped after 2 of 4 frames; the same command with --resume goes on\nscanfab: error: "
@@ -175,7 +179,7 @@ def test_where_there_are_no_locks_runs_go_on(compute, monkeypatch):
 
 def test_a_failure_behind_the_last_frame_says_so(compute, monkeypatch):
     monkeypatch.setattr(Json, "write", Mock(side_effect=OSError(28, os.strerror(28))))
-    told = "stopped after the last frame, before the table was"
+    told = "stopped after 4 of 4 frames; the same command with --resume goes on"
     assert compute("table.json", told=told)[0] == 1
 
 
@@ -265,7 +269,7 @@ def test_part_and_table_are_gone_on_with_together(compute, stop, last_frame, res
     assert compute("table.csv", "--frames=2:4") == (0, 2)
     before, more = Path("table.csv").read_bytes(), ("--resume", "--workers", "1")
     last_frame()
-    told = "interrupted before the first new frame was finished: table.csv is as it was; the same"
+    told = "interrupted after 2 of 5 frames; the same command goes on"
     stop("table.csv", *more, row=1, told=told)
     told = "interrupted after 3 of 5 frames; the same command goes on"
     stop("table.csv", *more, row=4, told=told)

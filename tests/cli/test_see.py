@@ -70,7 +70,7 @@ def drawn(path):
 VIEWS = [
     f"{SAMPLE} --boundary mask=3 --frame -1 --cut",
     # an RV that follows the cell
-    "sample_data/lammps_shear --frame 5 --rv-shape cylinder --axis 1,1,2 --rv-follows strain",
+    "sample_data/lammps_shear --frame 5 --rv-shape cylinder --rv-axis 1,1,2 --rv-follows strain",
 ]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import Packing, ReadError, ScanfabWarning, Settings, SettingsError
+from scanfab import Packing, PackingError, ReadError, Settings, SettingsError
 from scanfab.base.errors import NoReferenceError, ScanfabNote
 from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.inspection import inspect_series
@@ -88,9 +88,8 @@ def test_empty_first_frames_have_rows_without_values(tmp_path, strain):
     assert [numbers(row) for row in table[4:]] == [numbers(row) for row in expected]
     for frames, rows in (("-1", table[-2:]), ("0", table[:2])):
         assert scanfab.compute(series, frames=frames, **words) == rows
-    with pytest.warns(ScanfabWarning, match="no frame has any grains"):
-        nothing = scanfab.compute(series_of(tmp_path, [[], []]), **SCAN)
-    assert [row.alpha_vs for row in nothing] == [None] * 8
+    with pytest.raises(PackingError, match="no frame has any grains"):
+        scanfab.compute(series_of(tmp_path, [[], []]), **SCAN)
 
 
 def test_what_is_no_executor_is_named():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -86,6 +85,7 @@ def overview(table: Path, rows: Sequence[Row]) -> str:
     column = strain_column(rows)
     parts = [f"{counted(frames, 'frame')} of {', '.join(sources)}", f"variants {variants}"]
     if numbers_of(rows, "grains"):
+        where = " a block" if MAP in rows[0] else ""
         # variants count all grains, grains in the RV, or grains without rattlers
         grains = {
             variant: _span([row for row in rows if variant_of(row) == variant], "grains", ".0f")
@@ -93,7 +93,6 @@ def overview(table: Path, rows: Sequence[Row]) -> str:
         }
         each = ", ".join(f"{number} in {variant}" for variant, number in grains.items())
         same = len(set(grains.values())) == 1
-        where = " a block" if MAP in rows[0] else ""
         parts.append(f"{next(iter(grains.values()))} grains{where}" if same else f"grains: {each}")
     if column is not None:
         parts.append(f"{STRAINS[column][0]} {_span(rows, column, '.3g', 100)} %")
@@ -296,12 +295,10 @@ def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, A
     groups = groups_of(filled)
     for (source, variant), group in groups.items():
         if not numbers_of(group, f"{VOID}_se"):
-            why = "it was made of one replicate"
-            if f"{VOID}_se" not in group[0]:
-                why = f"the table has no column {VOID}_se"
             found.append(
-                f"Variant {variant} of {source} has no standard error of the scan: {why}. Without "
-                f"that part there is no error in all, and none behind ±."
+                f"Variant {variant} of {source} has no standard error of the scan: it was made of "
+                f"one replicate, or the table lacks the column {VOID}_se. Without that part there "
+                f"is no error in all, and none behind ±."
             )
     found += _large_errors(groups)
     if groups and max(map(len, groups.values())) < 3:
@@ -312,30 +309,15 @@ def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, A
 
 
 def _large_errors(groups: Mapping[tuple[str, str], Sequence[Row]]) -> Iterator[str]:
-    """Warn of sources with a large total error, and say what would make it smaller."""
-    large: dict[str, list[tuple[str, float, float]]] = {}
+    """Warn of variants with a large total error, and say what would make it smaller."""
     for (source, variant), group in groups.items():
         peak = max(group, key=lambda row: abs(float(row[VOID])))
-        signal = abs(float(peak[VOID]))
-        # use the errors of other frames only if the frame of the peak has none
-        scan, sample = (
-            max(numbers_of([peak], part) or numbers_of(group, part), default=0.0)
-            for part in (f"{VOID}_se", f"{VOID}_sample_se")
-        )
-        total = math.hypot(scan, sample)
-        if total > NOTABLE * signal:
-            parts = f"scan {scan:.2g}, sample {sample:.2g}"
-            text = f"in variant {variant} ({total:.2g} beside {signal:.2g}; {parts})"
-            large.setdefault(source, []).append((text, scan, sample))
-    for source, doubts in large.items():
-        # a part that is less than half of the other part hardly adds to the total error
-        lines = any(scan > 0.5 * sample for _, scan, sample in doubts)
-        grains = any(sample > 0.5 * scan for _, scan, sample in doubts)
-        cure = "Only more grains would help; more lines cannot."
-        if lines:
-            more = "It takes more grains, and more lines" if grains else "More lines would help"
-            cure = f"{more}: a smaller `tolerance` or `spacing`."
-        yield (
-            f"{source}: where α_vs is largest, its standard error, of scan and sample together, is "
-            f"more than a tenth of it {'; '.join(text for text, _, _ in doubts)}. {cure}"
-        )
+        signal, total = abs(float(peak[VOID])), total_error(peak, VOID)
+        if total is not None and total > NOTABLE * signal:
+            scan, sample = (_cells(peak)[part] for part in ("scan", "sample"))
+            yield (
+                f"{source}, variant {variant}: where α_vs is largest, its standard error is more "
+                f"than a tenth of it ({total:.2g} beside {signal:.2g}). A smaller `tolerance` or "
+                f"`spacing` makes the scan's part smaller ({scan}), only more grains the sample's "
+                f"part ({sample})."
+            )

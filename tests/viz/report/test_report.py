@@ -75,7 +75,7 @@ def test_the_sample_is_told_in_full(page):
         "--frames 0::3 -o fabric.csv",
         "boundary mask=3 Which particles are boundary",
         "triaxial-spheres-00000006.vtk.gz",
-        "sample_data/yade_triaxial: where α vs is largest, its standard error, of scan and",
+        "sample_data/yade_triaxial, variant a: where α vs is largest, its standard error is",
         "grains 800 in the reference frame",
         "radii smallest 0.0005042, mean 0.0009907, largest 0.001499",
         "boundary 1000 particles",
@@ -170,6 +170,7 @@ def test_text_is_escaped_everywhere(table, plain):
         path = table(curve(source))
         asked = {"sources": [source], source: source, "contacts": source, "cutoff": source}
         manifest = {"settings": asked, "versions": {source: source}, "warnings": [source]}
+        manifest |= {"inputs": [], "notes": [], "frames": {}}
         Path(f"{path}.manifest.json").write_text(json.dumps(manifest))
         return page_of([path], title=source, author=source)
 
