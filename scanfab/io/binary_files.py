@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import re
-import zipfile
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,14 +12,13 @@ import numpy as np
 from scanfab.base.errors import PackingError, ReadError, note, warn
 from scanfab.base.typing import Columns
 from scanfab.io.fence import fenced
-from scanfab.io.files import bare_name, check_memory, check_times, first_bytes, plain
+from scanfab.io.files import bare_name, check_memory, first_bytes, plain
+from scanfab.io.writer import flat
 from scanfab.packing.cell import Cell
 
 IS_PARQUET = b"PAR1"
 IS_NPZ = b"PK"
 IS_HDF = b"\x89HDF\r\n\x1a\n"
-# longest header of an array, in characters
-MOST_HEADER = 10_000
 # numpy's kinds of arrays with numbers or text
 KINDS = "biufU"
 # the lines of packing.nfo that are read: a name and numbers
@@ -30,9 +27,6 @@ NFO = re.compile(
     r"((?:[ \t]+[-+]?[0-9]+\.?[0-9]*(?:e[-+]?[0-9]+)?(?![^\s,;]))+)"
 )
 POROSITIES = ("final porosity", "theoretical porosity")
-# names of arrays in an NPZ file that hold centres, and names of arrays that hold pairs
-POSITIONS = ("position", "positions", "pos", "points", "centers", "centres")
-PAIRS = ("pairs", "contacts", "ids")
 
 
 def binary_names(path: Path) -> list[str] | None:
@@ -41,11 +35,8 @@ def binary_names(path: Path) -> list[str] | None:
         return ["x", "y", "z", "diameter"]
     head = first_bytes(path, 8)
     if head.startswith(IS_PARQUET):
-        with _told(path, "Parquet"):
-            return list(_open_parquet(path).schema_arrow.names)
-    if head.startswith(IS_NPZ):
-        return [part for name, shape in npz_shapes(path).items() for part in _parts(name, shape)]
-    return None
+        return [*fenced(parquet_in_worker, path, 0)]
+    return [*read_binary(path)] if head.startswith(IS_NPZ) else None
 
 
 def read_binary(path: Path) -> Columns:
@@ -53,85 +44,35 @@ def read_binary(path: Path) -> Columns:
     if is_xyzd(path):
         return _read_xyzd(path)
     if first_bytes(path, 8).startswith(IS_PARQUET):
-        with _told(path, "Parquet"):
-            return _read_parquet(path)
-    columns: Columns = {}
-    for name, values in read_npz(path).items():
-        parts = _parts(name, values.shape)
-        columns |= dict(zip(parts, values.T if values.ndim == 2 else [values], strict=False))
+        return fenced(parquet_in_worker, path, None)
+    columns = flat(read_npz(path))
     # arrays that do not have one row per grain are left out
     rows = len(columns["x"]) if "x" in columns else max(map(len, columns.values()), default=0)
     return {name: values for name, values in columns.items() if len(values) == rows}
 
 
-@contextmanager
-def _told(path: Path, kind: str) -> Iterator[None]:
-    """Turn any error of a library into a ReadError that names the file."""
-    try:
-        yield
-    except ReadError:
-        raise
-    # for a damaged file, libraries raise errors of any type
-    except Exception as error:
-        reason = str(error).partition("\n")[0][:200] or type(error).__name__
-        raise ReadError(f"{path}: cannot be read as {kind}: {reason}") from None
+def parquet_in_worker(path: str, rows: int | None) -> Columns:
+    """The columns of numbers or text in a Parquet file, in the worker process."""
+    import polars
 
-
-def _open_parquet(path: Path) -> Any:
-    from pyarrow import parquet
-
-    return parquet.ParquetFile(plain(path), thrift_string_size_limit=1 << 20)
-
-
-def _read_parquet(path: Path) -> Columns:
     columns: Columns = {}
-    file = _open_parquet(path)
-    names = file.schema_arrow.names
-    _check_room(path, 8.0 * file.metadata.num_rows * len(names))
-    for name, column in zip(names, file.read().columns, strict=True):
-        values = column.to_numpy()
-        if values.dtype == object and all(isinstance(word, str | None) for word in values):
-            values = np.array([word or "" for word in values], dtype=np.str_)
-        if values.dtype.kind in KINDS:
-            columns[name] = values
+    for column in polars.read_parquet(path, n_rows=rows):
+        is_text = column.dtype == polars.String
+        values = np.array(column.fill_null("").to_list(), str) if is_text else column.to_numpy()
+        columns |= {column.name: values} if values.dtype.kind in KINDS else {}
     return columns
 
 
-def _check_room(path: Path, room: float) -> None:
-    """ReadError if a file claims more bytes than its size or the memory allows."""
-    check_times(path, plain(path).stat().st_size, room)
-    check_memory(path, 2.0 * room)
-
-
-def _parts(name: str, shape: tuple[int, ...]) -> list[str]:
-    """The names of the columns in an array of an NPZ file; empty if its shape fits no table."""
-    if len(shape) != 2 or shape[1] > 9:
-        return [name] if len(shape) == 1 else []
-    axes = list("xyz"[: shape[1]]) if shape[1] < 4 else [f"{k}" for k in range(shape[1])]
-    is_pair = name.lower() in PAIRS and shape[1] == 2
-    parts = axes if name.lower() in POSITIONS else ["id1", "id2"] if is_pair else None
-    return parts or [f"{name}_{axis}" for axis in axes]
-
-
-def npz_shapes(path: Path) -> dict[str, tuple[int, ...]]:
-    """The shapes of the arrays of numbers and text in an NPZ file."""
-    shapes, form = {}, np.lib.format
-    read = {(1, 0): form.read_array_header_1_0, (2, 0): form.read_array_header_2_0}
-    with _told(path, "NPZ"), zipfile.ZipFile(plain(path)) as archive:
-        for name in (member for member in archive.namelist() if member.endswith(".npy")):
-            with archive.open(name) as stream:
-                shape, _, dtype = read[form.read_magic(stream)](stream, MOST_HEADER)
-            if dtype.kind in KINDS:
-                shapes[name.removesuffix(".npy")] = shape
-    return shapes
-
-
-def read_npz(path: Path, wanted: Iterable[str] | None = None) -> Columns:
+def read_npz(path: Path, *wanted: str) -> Columns:
     """The arrays of numbers and text in an NPZ file, or the wanted ones; never pickled objects."""
-    names = [name for name in npz_shapes(path) if wanted is None or name in wanted]
-    with _told(path, "NPZ"), np.load(plain(path), max_header_size=MOST_HEADER) as archive:
-        _check_room(path, float(sum(member.file_size for member in archive.zip.infolist())))
-        return {name: archive[name] for name in names}
+    return fenced(npz_in_worker, path, wanted)
+
+
+def npz_in_worker(path: str, wanted: tuple[str, ...]) -> Columns:
+    """The arrays in an NPZ file, in the worker process."""
+    with np.load(path) as archive:
+        arrays = {name: archive[name] for name in archive.files if name in wanted or not wanted}
+    return {name: values for name, values in arrays.items() if values.dtype.kind in KINDS}
 
 
 def is_xyzd(path: Path) -> bool:
@@ -140,12 +81,7 @@ def is_xyzd(path: Path) -> bool:
 
 
 def _read_xyzd(path: Path) -> Columns:
-    """
-    The columns x, y, z and diameter of a binary packing of PackingGeneration.
-
-    The program writes the initial diameters. The final diameters are larger by the factor
-    ((1 - final porosity) / (1 - theoretical porosity))^(1/3); ``packing.nfo`` has both porosities.
-    """
+    """The columns x, y, z and diameter of a binary packing of PackingGeneration."""
     file = plain(path)
     size = file.stat().st_size
     if size == 0 or size % 32:
@@ -153,37 +89,31 @@ def _read_xyzd(path: Path) -> Columns:
         raise ReadError(f"{path}: expected whole rows of four doubles, 32 bytes each, {found}")
     check_memory(path, 3.0 * size)
     x, y, z, diameter = np.fromfile(file, "<f8").reshape(-1, 4).astype(np.float64).T
-    info, factor = _nfo(path), 1.0
+    info = packing_info(path)
     if info is None:
         warn(f"{path}: diameters are not scaled, since there is no packing.nfo beside the file")
-    else:
-        final, theory = (1.0 - info.get(name, [1.0])[0] for name in POROSITIES)
-        factor = (final / theory) ** (1 / 3) if min(final, theory) > 0 else np.nan
-        if not 0.5 < factor < 2.0:
-            expected = "theoretical and final porosities between 0 and 1 to scale the diameters"
-            raise ReadError(f"{path.with_name('packing.nfo')}: expected {expected}")
-    if factor != 1.0:
-        change = f"diameters are multiplied by {factor:.6g}, from the porosities in packing.nfo"
-        note(f"{path}: {change}")
-    return {"x": x, "y": y, "z": z, "diameter": factor * diameter}
+        return {"x": x, "y": y, "z": z, "diameter": diameter}
+    note(f"{path}: diameters are multiplied by {info[0]:.6g}, from the porosities in packing.nfo")
+    return {"x": x, "y": y, "z": z, "diameter": info[0] * diameter}
 
 
-def xyzd_cell(path: Path) -> Cell | None:
-    """The cell, periodic along all axes, from the dimensions in ``packing.nfo``."""
-    edges = (_nfo(path) or {}).get("dimensions", [])
-    try:
-        return Cell(edges) if len(edges) == 3 else None
-    except PackingError as error:
-        raise ReadError(f"{path.with_name('packing.nfo')}: Dimensions: {error}") from None
+def packing_info(path: Path) -> tuple[float, Cell] | None:
+    """
+    The factor of the diameters, and the periodic cell, from ``packing.nfo``; None without the file.
 
-
-def _nfo(path: Path) -> dict[str, list[float]] | None:
-    """The numbers in the file ``packing.nfo`` of a packing, by name; None without the file."""
+    The program writes the initial diameters. The final diameters are larger by the factor
+    ((1 - final porosity) / (1 - theoretical porosity))^(1/3).
+    """
     info = path.with_name("packing.nfo")
     if not info.is_file():
         return None
-    matches = NFO.findall(info.read_bytes()[:10_000].decode("utf-8", "replace"))
-    return {key.lower(): [float(word) for word in words.split()] for key, words in matches}
+    text = info.read_bytes()[:10_000].decode("utf-8", "replace")
+    found = {key.lower(): [float(w) for w in words.split()] for key, words in NFO.findall(text)}
+    try:
+        final, theory = (1.0 - found[name][0] for name in POROSITIES)
+        return max(final / theory, 0.0) ** (1 / 3), Cell(found["dimensions"])
+    except (LookupError, ArithmeticError, PackingError) as error:
+        raise ReadError(f"{info}: expected the dimensions and both porosities: {error}") from None
 
 
 class HdfFile(NamedTuple):

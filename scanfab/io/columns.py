@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,8 +35,8 @@ POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("x
 # axes equal its radius and all exponents equal 2, up to rounding to six digits
 HALF_AXES, EXPONENTS = ("shapex", "shapey", "shapez"), ("blockiness1", "blockiness2")
 OLD_EXPONENTS, SIX_DIGITS = ("roundness1", "roundness2"), 1e-5
-# a grain this many periodic cells away from the cell's origin has a damaged coordinate, because
-# rounding destroys its place; without a cell: this many times as far from 0 as the other grains
+# a grain this many radii of the largest grain away from 0 has a damaged coordinate, because
+# rounding destroys its place
 FAR = 1e12
 # a diameter contradicts the radius if it differs from twice the radius by more than this fraction;
 # smaller differences come from numbers with few digits
@@ -110,34 +110,8 @@ def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | Non
     return Cell(cell.vectors, periodic, cell.origin)
 
 
-def refuse_shared(path: Path, named: Mapping[str, str], option: str) -> None:
-    """
-    Refuse an option that uses one column for two quantities.
-
-    Parameters
-    ----------
-    path : Path
-        The file, for messages.
-    named : mapping of str to str
-        The user's choice: quantity to the file's own name or number of the column.
-    option : str
-        The name of the option, for messages.
-
-    Raises
-    ------
-    ReadError
-        If two quantities have the same column.
-    """
-    serves: dict[str, str] = {}
-    for standard, own in named.items():
-        if serves.setdefault(own, standard) != standard:
-            both = f"as {serves[own]} and as {standard}"
-            raise ReadError(f"{path}: the column {own!r} is named twice in `{option}`, {both}")
-
-
 def _named_by_user(path: Path, columns: Columns, options: ReadOptions) -> dict[str, Any]:
     """All columns; those that the user named get their standard names."""
-    refuse_shared(path, options.columns, "columns")
     rest, named = dict(columns), {}
     for standard, own in options.columns.items():
         if own not in rest:
@@ -173,17 +147,12 @@ def _position(
     raise ReadError(f"{where}: no coordinates (x y z, xu yu zu, xs ys zs) in {names}; {advice}")
 
 
-@np.errstate(over="ignore", invalid="ignore")
 def _refuse_far(where: str, position: FloatArray, radius: FloatArray, cell: Cell | None) -> None:
     """ReadError if a grain is so far away that rounding destroys its place or size."""
-    periodic = cell if cell is not None and cell.is_periodic else None
-    if not len(radius):
-        return
-    away = np.abs(position - (0.0 if periodic is None else periodic.origin)).max(axis=1)
-    size = np.median(away) if periodic is None else np.abs(periodic.vectors).max()
+    away = np.abs(position - (0.0 if cell is None else cell.origin)).max(axis=1, initial=0.0)
     # numbers that cannot be lengths are refused by Packing
-    far = np.flatnonzero((away < MOST) & (away > FAR * max(radius.max(), size)))
-    if len(far):
+    far = np.flatnonzero((away < MOST) & (away > FAR * radius.max(initial=0.0)))
+    if len(far) and radius.max() > 0:
         found = f"grain {far[0] + 1} lies {away[far[0]]:g} from the origin"
         raise ReadError(f"{where}: {found}, too far away: is a number damaged?")
 

@@ -22,8 +22,6 @@ from scanfab.packing.contacts import ContactList
 
 # an end of a contact belongs to the grain whose centre is within this fraction of the radius
 SAME_PLACE = 0.01
-# two grains are neighbours if their distance is below (r1 + r2) times this
-NEAR = 1.1
 # a rule counts as true if it holds for this share of all contacts
 NEARLY_ALL = 0.9
 # programs' words for a contact of two grains; any other word means a contact with a wall
@@ -281,11 +279,11 @@ def join_table(path: Path, grains: GrainTable, columns: Columns) -> JoinedContac
     walls = np.any(ids < 0, axis=1)
     columns = {name: values[~walls] for name, values in columns.items()}
     pairs = ids[~walls]
-    grains = _with_ids(path, grains, pairs)
+    grains = _with_ids(grains, pairs)
     rows = rows_of_ids(grains, pairs)
     force = _force(path, grains, rows, columns) if (rows >= 0).all() else None
-    force_n = columns.get("fn") if force is None else None
-    if force_n is not None:
+    force_n = columns.get("compression") if force is None else None
+    if force is None and force_n is None and (force_n := columns.get("fn")) is not None:
         if force_n.dtype.kind not in "biuf":
             raise ReadError(f"{path}: expected numbers in the column fn, found text")
         # compression is positive, and nearly all contacts are under compression
@@ -310,30 +308,13 @@ def join_table(path: Path, grains: GrainTable, columns: Columns) -> JoinedContac
     return joined._replace(wall_contacts=counted.wall_contacts)
 
 
-def _with_ids(path: Path, grains: GrainTable, ids: IntArray) -> GrainTable:
-    """
-    Grains with ids; if they have none, their rows become ids, counted from 0 or from 1.
-
-    The right count is the one for which the pairs are neighbours.
-    """
+def _with_ids(grains: GrainTable, ids: IntArray) -> GrainTable:
+    """Grains with ids; if they have none, their rows, counted from 0 if a 0 is listed, else 1."""
     if grains.id is not None:
         return grains
-    count = len(grains.radius)
-    if not len(ids):
-        return grains._replace(id=np.arange(count))
-    fitting = []
-    for base in (0, 1):
-        rows = ids - base
-        if rows.min() >= 0 and rows.max() < count:
-            length = np.linalg.norm(branches(grains, rows), axis=1)
-            near = length < NEAR * grains.radius[rows].sum(axis=1)
-            if np.mean(near) > NEARLY_ALL:
-                fitting.append(base)
-    if len(fitting) != 1:
-        problem = 'the grains have no ids, nor do the numbers fit rows: `columns={"id": ...}`'
-        raise OtherGrainsError(f"{path}: names grains by numbers, but {problem} names their ids")
-    note(f"the grains have no ids: contacts name their rows, counted from {fitting[0]}")
-    return grains._replace(id=np.arange(count) + fitting[0])
+    first = int(ids.min(initial=1) > 0)
+    note(f"the grains have no ids: contacts name their rows, counted from {first}")
+    return grains._replace(id=np.arange(len(grains.radius)) + first)
 
 
 def _vectors(path: Path, grains: GrainTable, table: Columns, names: str) -> FloatArray | None:

@@ -18,7 +18,6 @@ from itertools import chain, takewhile
 from pathlib import Path
 
 from scanfab.base.errors import ReadError, note, warn
-from scanfab.base.files import kind_of
 from scanfab.io.files import bare_name
 from scanfab.io.reader import FileKind, Reader, ReadOptions, installed_readers, reader_for
 
@@ -27,8 +26,8 @@ Numbered = list[tuple[int | None, Path]]
 """Files with the number in each name that is its step; None for a name without a number."""
 
 SETTINGS_FILE = "scanfab.toml"
-# endings of files that editors and interrupted programs leave behind
-LEFTOVERS = ("~", ".part", ".tmp", ".bak")
+# endings of files that editors and interrupted programs leave behind, and of companion files
+LEFTOVERS = ("~", ".part", ".tmp", ".bak", ".contacts.csv")
 NUMBER = re.compile(r"\d+")
 
 
@@ -66,12 +65,7 @@ def files_of(path: Path) -> list[Path]:
     """The file itself, or the files of a folder; a note names skipped pipes and devices."""
     if not path.exists():
         raise ReadError(f"{path}: there is no such file, folder or glob")
-    if not path.is_dir():
-        return [path]
-    for entry in sorted(path.iterdir()):
-        if (kind := kind_of(entry)) is not None:
-            note(f"skipped {entry}: it is {kind}, not a file")
-    return files_in(path)
+    return files_in(path) if path.is_dir() else [path]
 
 
 def files_in(folder: Path) -> list[Path]:
@@ -108,16 +102,6 @@ class Family:
     def is_table(self) -> bool:
         """Whether the files are general tables, which may hold anything."""
         return bool(getattr(self.reader, "is_table", False))
-
-    @property
-    def stems(self) -> set[str]:
-        """The STEM of each file; its contacts file would be called ``STEM.contacts.csv``."""
-        return set(map(_own_stem, self.files.values()))
-
-    @property
-    def owners(self) -> set[str | None]:
-        """The STEM of each file called ``STEM.contacts.csv``; None for files with other names."""
-        return set(map(_owner, self.files.values()))
 
 
 def sort_into_families(
@@ -235,19 +219,6 @@ def _glob(members: list[Path], among: Iterable[Path]) -> str:
     return " ".join(map(str, members[:3])) + (" ..." if len(members) > 3 else "")
 
 
-def _own_stem(file: Path) -> str:
-    """The name without its ending; a number (dump.100) is not an ending."""
-    name = bare_name(file)
-    stem, _, ending = name.rpartition(".")
-    return name if ending.isdigit() else stem or name
-
-
-def _owner(file: Path) -> str | None:
-    """The STEM of a file called ``STEM.contacts.csv``; None for any other name."""
-    stem, ending, _ = bare_name(file).rpartition(".contacts.")
-    return stem if ending else None
-
-
 def _words(family: Family) -> list[str]:
     """The words in the name of the files, without the ending."""
     name = re.sub(r"(\.[A-Za-z]\w*)+$", "", bare_name(Path(family.pattern)))
@@ -264,7 +235,7 @@ def _kinship(one: Family, two: Family) -> tuple[int, bool]:
 def are_tied(grains: Family, contacts: Family) -> bool:
     """Whether contacts surely belong to grains: they share the first word, or a step."""
     shared = set(grains.files) & set(contacts.files) - {None}
-    return _kinship(grains, contacts)[0] > 0 or (bool(shared) and not any(contacts.owners))
+    return _kinship(grains, contacts)[0] > 0 or bool(shared)
 
 
 def without_tables(
@@ -283,14 +254,11 @@ def without_tables(
     dumps = [family for family in frames if not family.is_table]
     tables = [family for family in frames if family.is_table]
     with_names = [one for one in tables if one.reader and one.reader.recognises(one.largest)]
-    stems = set[str | None]().union(*(family.stems for family in [*dumps, *chosen]))
 
     def counts(family: Family) -> bool:
         if not family.is_table or set(family.files.values()) & set(named):
             return True
-        if dumps:
-            return bool(family.owners & stems)
-        return family.kind != "grains" or family in with_names or not with_names
+        return not dumps and (family.kind != "grains" or family in with_names or not with_names)
 
     return [family if counts(family) else replace(family, kind="other") for family in families]
 
@@ -316,12 +284,9 @@ def contacts_beside(
     def nearest_rival(contacts: Family) -> tuple[int, bool]:
         return max((_kinship(rival, contacts) for rival in rivals), default=(-1, False))
 
-    own = [family for family in candidates if family.owners <= grains.stems]
-    if not own:
-        free = [family for family in candidates if family.owners == {None}]
-        near = [family for family in free if _kinship(grains, family) > nearest_rival(family)]
-        most = max((_kinship(grains, family)[0] for family in near), default=0)
-        own = [family for family in near if _kinship(grains, family)[0] == most]
+    near = [family for family in candidates if _kinship(grains, family) > nearest_rival(family)]
+    most = max((_kinship(grains, family)[0] for family in near), default=0)
+    own = [family for family in near if _kinship(grains, family)[0] == most]
     doubtful = [one for one in candidates if _kinship(grains, one) >= nearest_rival(one)]
     if own:
         patterns = ", ".join(family.pattern for family in own)
@@ -341,11 +306,9 @@ def _families_beside(
     others = [group for group in groups if files.isdisjoint(file for _, file in group)]
     around = {*files, *(file for group in others for _, file in group)}
     moments = {(file.parent, step) for step, file in grains.files.items()}
-    steps = {_own_stem(file): step for step, file in grains.files.items()}
     families = []
     for group in others:
-        same = [(steps[stem], file) for _, file in group if (stem := _owner(file) or "") in steps]
-        same = same or [(step, file) for step, file in group if (file.parent, step) in moments]
+        same = [(step, file) for step, file in group if (file.parent, step) in moments]
         if same:
             families.append(_family_of(same, around, options, len(group) > 1))
     return families

@@ -13,7 +13,7 @@ from scanfab.io.columns import body_numbers
 from scanfab.io.contacts import NotContactsError, OtherGrainsError
 from scanfab.io.families import are_tied
 from scanfab.io.files import unpacking_up_to
-from scanfab.io.formats.own import FrameData, check_contacts_are_there, companion_kind, with_columns
+from scanfab.io.formats.own import FrameData, companion_file, read_contacts, with_columns
 from scanfab.io.reader import Carries, GrainTable, JoinedContacts, Reader, ReadOptions, Snapshot
 from scanfab.packing.contacts import WallForces
 from scanfab.packing.packing import Packing, check_lengths
@@ -144,22 +144,23 @@ class Frame:
         lists = [grains.contacts] if takes_own and grains.contacts is not None else []
         files: list[Path] = []
         parts: list[JoinedContacts] = []
-        if not lists or series.contacts_from != "beside":
+        own = read_contacts(path, grains, self._options(), self.told) if takes_own else None
+        if own is not None:
+            files, parts = [companion_file(path, "contacts")], [own]
+        elif not lists or series.contacts_from != "beside":
             files, parts = self._contacts(grains)
-            lists += [part.contacts for part in parts if part.contacts is not None]
+        lists += [part.contacts for part in parts if part.contacts is not None]
         named = " and ".join(map(str, files))
         if len(lists) > 1:
             both = f"{path} and {named}" if grains.contacts is not None and takes_own else named
             raise ReadError(f"two contact lists for one frame: {both}: choose with `contacts`")
-        if not lists and takes_own:
-            check_contacts_are_there(path, self.told)
         if not lists and series.contacts_from == "grains":
             raise ReadError(f'{path}: there is no contact file, which `contacts="file"` needs')
         if not lists and series.contacts_from == "path":
             advice = "lists contacts with walls only: those between grains are found by geometry"
             warn(f"{named}: {advice}, unless `contacts` names their file")
         # a contacts file of `convert` lists no walls; the grain file counts contacts with walls
-        is_own = takes_own or any(companion_kind(file) == "contacts" for file in files)
+        is_own = takes_own or companion_file(path, "contacts") in files
         if grains.wall_contacts is not None and is_own:
             parts.append(JoinedContacts(None, grains.wall_contacts, grains.wall_forces))
         none = np.zeros(len(grains.radius), np.int64)

@@ -60,10 +60,7 @@ def text_table(path: Path, skip: int) -> TextTable:
         If the file is not a table: it is not text, or its first rows differ in width.
     """
     head = _first_lines(path)
-    try:
-        lines = head.decode("utf-8-sig").split("\n")
-    except UnicodeDecodeError:
-        lines = head.decode("latin-1").split("\n")
+    lines = head.decode("utf-8-sig", "replace").split("\n")
     # skip comments and empty lines above the table, and empty lines among the examined rows
     numbers = [k for k in range(skip, len(lines)) if lines[k].strip()]
     while numbers and lines[numbers[0]].lstrip().startswith(COMMENTS):

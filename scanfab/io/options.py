@@ -42,16 +42,13 @@ def parse_columns(name: str, value: Any) -> dict[str, str] | None:
     """A dict of standard name to column, from a mapping or from ``NAME=COLUMN,NAME=COLUMN``."""
     if value is None:
         return None
+    parts: Any = [part.partition("=")[::2] for part in str(value).split(",")]
     if isinstance(value, Mapping):
-        return {f"{standard}": f"{column}" for standard, column in value.items()}
-    names: dict[str, str] = {}
-    for part in str(value).split(","):
-        standard, _, column = map(str.strip, part.partition("="))
-        if not (standard and column):
-            raise unusable(name, 'NAME=COLUMN such as "radius=c_rad,x=px"', part)
-        if standard in names:
-            raise unusable(name, f"one column for {standard}", value)
-        names[standard] = column
+        parts = value.items()
+    names = {f"{standard}".strip(): f"{column}".strip() for standard, column in parts}
+    if not all([*names, *names.values()]) or len({*names.values()}) < len(parts):
+        expected = 'NAME=COLUMN such as "radius=c_rad,x=px", each name and each column once'
+        raise unusable(name, expected, value)
     return names
 
 

@@ -225,17 +225,9 @@ def reader_for(path: Path, options: ReadOptions | None = None) -> Reader | None:
     offers = installed_readers().values()
     for offer in sorted(offers, key=lambda offer: getattr(offer.plugin, "generic", False)):
         reader = _told(offer.plugin, options)
-        try:
-            is_known = reader.recognises(path)
-        except ReadError:
-            raise
-        # a plugin may raise errors of any type
-        except Exception as error:
-            reason = f"the reader {reader.name!r} failed: {type(error).__name__}: {error}"
-            raise ReadError(f"{path}: {reason}") from error
-        if is_known and (advice := lacking(reader)) is not None:
-            raise ReadError(f"{path}: {reader.name} needs another package: {advice}")
-        if is_known:
+        if reader.recognises(path):
+            if (advice := lacking(reader)) is not None:
+                raise ReadError(f"{path}: {reader.name} needs another package: {advice}")
             return reader
     return None if why_no_table(path, options) else reader_named(TABLE, options)
 

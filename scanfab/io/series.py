@@ -17,7 +17,7 @@ from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.families import Family
 from scanfab.io.files import Stamp, stamp_of, unpacking_up_to
-from scanfab.io.formats.own import companion_file, read_frame
+from scanfab.io.formats.own import HEADS, companion_file, read_frame
 from scanfab.io.frame import Frame
 from scanfab.io.layout import FrameFile
 from scanfab.io.reader import ReadOptions, Snapshot
@@ -323,7 +323,7 @@ class Series:
             with suppress(ReadError):
                 listed = [(dump.path, *dump.parts) for dump in self.grains.reader.snapshots(path)]
                 dumps = [file for file in dict.fromkeys(chain(*listed)) if file.is_file()]
-        files = [*dumps, *(companion_file(path, kind) for kind in ("frame", "columns"))]
+        files = [*dumps, *(companion_file(path, kind) for kind in HEADS)]
         if (ask := getattr(self.grains.reader, "beside", None)) is not None:
             files += chain.from_iterable(map(ask, dumps or [path]))
         return [file for file in files if file.is_file() and file != path]

@@ -15,6 +15,7 @@ from scanfab.base.option import refuse_unknown, takes_options, unusable
 from scanfab.io import families as sorting
 from scanfab.io.families import Family, Numbered, PathLike, named_once, some
 from scanfab.io.files import first_bytes, unpacking_up_to
+from scanfab.io.formats.own import companion_file
 from scanfab.io.layout import FrameFile
 from scanfab.io.options import READING_OPTIONS, take_reading
 from scanfab.io.reader import FileKind, ReadOptions, why_no_table
@@ -264,15 +265,11 @@ def _choose_contacts(
         return [], "geometric"
     if contacts not in ("auto", "file"):
         return _named_contacts(contacts, options), "path"
-    listed = [family for family in families if family.kind == "contacts"]
-    own = [family for family in listed if None in family.owners or family.owners & grains.stems]
-    is_beside = bool(around) and not own
+    own = [family for family in families if family.kind == "contacts"]
+    has_own = any(companion_file(path, "contacts").is_file() for path in grains.files.values())
+    is_beside = bool(around) and not own and not has_own
     if is_beside:
         families, own = sorting.contacts_beside(grains, around, options)
-    in_grains = getattr(grains.reader, "lists_contacts", False)
-    if contacts == "file" and not (own or in_grains):
-        lacks = 'there is no contact file, which `contacts="file"` needs'
-        raise ReadError(f"{grains.pattern}: {lacks}")
     if contacts == "file":
         return own, "path" if own else "grains"
     if own:
@@ -283,7 +280,8 @@ def _choose_contacts(
         for one in families
         if one.problem and len(one.files) == len(grains.files) and sorting.are_tied(grains, one)
     ]
-    if options.contact_columns and not (damaged or in_grains):
+    has_own |= getattr(grains.reader, "lists_contacts", False)
+    if options.contact_columns and not (damaged or has_own):
         missing = "no contact file has these columns"
         warn(f"`contact_columns` is given, but {missing}: contacts are found by geometry")
     return damaged, "beside"

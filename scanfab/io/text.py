@@ -12,9 +12,8 @@ import csv
 import os
 import re
 import sys
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from io import BytesIO
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +21,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import ReadError, warn
 from scanfab.base.typing import Columns
-from scanfab.io.fence import Answer, fenced
+from scanfab.io.fence import fenced
 from scanfab.io.files import check_memory, grows, plain
 from scanfab.io.reader import Snapshot
 
@@ -140,7 +139,10 @@ def read_rows(
     if not rows:
         kinds = {name: np.int64 if name in layout.whole else np.float64 for name in layout.names}
         return {name: np.zeros(0, kind) for name, kind in kinds.items()}
-    columns = by_polars(columns_of, snapshot.path, rows, layout)
+    if any(_had_polars):
+        columns = fenced(columns_of, snapshot.path, rows, layout)
+    else:
+        columns = columns_of("", rows, layout)
     if columns is None:
         raise (ReadError if has_end else CutError)(_bad_line(snapshot, rows, layout))
     if not has_end:
@@ -149,11 +151,6 @@ def read_rows(
             raise CutError(f"{problem}: the file is still being written")
         warn(f"{problem}: if the file was cut, rows or digits may be missing")
     return columns
-
-
-def by_polars(function: Callable[..., Answer], path: Path, *more: Any) -> Answer:
-    """Call a function that uses polars; the worker does it where polars would wait for ever."""
-    return fenced(function, path, *more) if any(_had_polars) else function(f"{path}", *more)
 
 
 def columns_of(_path: str, rows: bytes, layout: Layout) -> Columns | None:

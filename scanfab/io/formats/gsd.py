@@ -7,15 +7,11 @@ hardly ever meant; therefore a file without diameters counts as having no radii.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from scanfab.base.errors import ReadError
-from scanfab.base.typing import AnyArray, Columns
+from scanfab.base.typing import Columns
 from scanfab.io.fence import fenced
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbered_frames
@@ -24,8 +20,6 @@ from scanfab.packing.cell import Cell
 
 # the first eight bytes of each file
 MAGIC = (0x65DF65DF65DF65DF).to_bytes(8, "little")
-STEP, PARTICLES = "configuration/step", "particles/"
-GROUPS = (PARTICLES, "configuration/", "log/particles/")
 
 
 class GsdReader(GrainsOnly):
@@ -52,25 +46,11 @@ class GsdReader(GrainsOnly):
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """The arrays of the particles in the frame, or in the first frame, and the cell."""
         path, where = snapshot.path, f"{snapshot.path}, frame {snapshot.start}"
-        arrays = fenced(arrays_in_worker, path, snapshot.start)
-        position = arrays.pop("particles/position", np.zeros((0, 3), np.float32))
-        count = arrays.pop("particles/N", np.array([0])).tolist()
-        box = arrays.get("configuration/box", np.zeros(0)).astype(np.float64).tolist()
-        if position.shape != (*count, 3) or len(box) not in (0, 6):
-            expected = f"positions of shape {(*count, 3)} and six numbers as box"
-            raise ReadError(f"{where}: expected {expected}, found {position.shape} and {box}")
-        # not an array of the first frame with another number of particles; not the names of types
-        columns: Columns = {
-            name.removeprefix("log/").removeprefix(PARTICLES): values
-            for name, values in arrays.items()
-            if PARTICLES in name and name != "particles/types" and len(values) == len(position)
-        }
-        columns["position"] = position.astype(np.float64)
-        if not box:
-            return columns, None
+        columns, (*box, dimensions) = fenced(frame_in_worker, path, snapshot.start)
+        columns["position"] = columns["position"].astype(np.float64)
+        flat = dimensions == 2
         # edges and tilt factors (of the second and third edge); the box is centred at the origin
         lx, ly, lz, xy, xz, yz = box
-        flat = arrays.get("configuration/dimensions", np.array([3])).tolist() == [2]
         if flat:
             # in 2D the edge along z has no meaning, and may be 0
             lz, xz, yz = max(lx, ly), 0.0, 0.0
@@ -79,31 +59,22 @@ class GsdReader(GrainsOnly):
         return columns, cell_of(f"{where}: its box", vectors, (True, True, not flat), origin)
 
 
-@contextmanager
-def _opened(path: str) -> Iterator[tuple[Any, list[str]]]:
-    """Open a file, with the names of its arrays; ValueError if HOOMD has not written it."""
-    import gsd.fl
-
-    with gsd.fl.open(path, mode="r") as file:
-        if file.schema != "hoomd":
-            raise ValueError(f"its schema is {file.schema!r}, expected 'hoomd'")
-        yield file, [name for name in file.find_matching_chunk_names("") if name.startswith(GROUPS)]
-
-
-def _array(file: Any, number: int, name: str) -> AnyArray:
-    """The array of a frame; if it is constant, of the first frame; else an empty text."""
-    frames = [k for k in (number, 0) if file.chunk_exists(frame=k, name=name)]
-    return np.asarray(file.read_chunk(frame=frames[0], name=name) if frames else "")
-
-
 def contents_in_worker(path: str) -> tuple[list[int], list[str]]:
     """The steps of all frames, and the names of all arrays."""
-    with _opened(path) as (file, names):
-        return [int(_array(file, k, STEP).item() or 0) for k in range(file.nframes)], names
+    import gsd.hoomd
+
+    with gsd.hoomd.open(path) as file:
+        steps = gsd.hoomd.read_log(path, scalar_only=True)["configuration/step"]
+        return steps.tolist(), file.file.find_matching_chunk_names("particles/")
 
 
-def arrays_in_worker(path: str, frame: int) -> Columns:
-    """The arrays of numbers of one frame."""
-    with _opened(path) as (file, names):
-        found = {name: _array(file, frame, name) for name in names}
-    return {name: values for name, values in found.items() if values.dtype.kind in "biuf"}
+def frame_in_worker(path: str, number: int) -> tuple[Columns, list[float]]:
+    """The arrays of the particles of one frame, the edges and tilt factors, and the dimensions."""
+    import gsd.hoomd
+
+    with gsd.hoomd.open(path) as file:
+        frame, written = file[number], file.file.find_matching_chunk_names("particles/")
+    names = {name.rpartition("/")[2] for name in written} - {"N", "types"}
+    columns = {name: getattr(frame.particles, name) for name in names}
+    logged = {k.rpartition("/")[2]: v for k, v in frame.log.items() if k.startswith("particles/")}
+    return columns | logged, [*frame.configuration.box, frame.configuration.dimensions]

@@ -17,7 +17,7 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.io.columns import refuse_shared, whole_numbers
+from scanfab.io.columns import whole_numbers
 from scanfab.io.contacts import NotContactsError, OtherGrainsError, branches, join_ids, rows_of_ids
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.binary_dump import BinaryDump, NetcdfDump
@@ -232,7 +232,6 @@ def named_places(path: Path, option: str, names: list[str]) -> Places:
             f"for the force on the first grain, found {option!r}; "
             f"the columns are {', '.join(names)}"
         )
-    refuse_shared(path, {key: named[key] for key in IDS}, "contact_columns")
     triples = [triple for triple in (FORCE, TANGENTIAL) if triple[0] in named]
     ids, *force = ([names.index(named[key]) for key in keys] for keys in (IDS, *triples))
     return Places(ids, force, touch=False)

@@ -9,7 +9,6 @@ whatever its ending. :func:`scanfab.convert` writes them, and reading the grain 
 
 from __future__ import annotations
 
-import csv
 import io
 import re
 from contextlib import suppress
@@ -20,29 +19,28 @@ import numpy as np
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.typing import Columns
-from scanfab.io.binary_files import IS_NPZ, npz_shapes, read_npz
+from scanfab.io.binary_files import IS_NPZ, read_npz
 from scanfab.io.columns import BODIES, WALLS, grain_table, whole_numbers
-from scanfab.io.contacts import join_ids
 from scanfab.io.families import numbers_in
-from scanfab.io.files import bare_name, check_memory, first_bytes, plain
+from scanfab.io.files import bare_name, first_bytes
 from scanfab.io.formats.shared import GrainsOnly
+from scanfab.io.formats.table import TableReader
 from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.io.text import by_polars
+from scanfab.io.text import Layout, read_rows, text_of, words_of
 from scanfab.io.writer import Left, as_arrays, contacts_of, csv_bytes, more_columns, stated_cell
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
 # the first line of each kind of companion file
 HEADS = {
-    "contacts": r"id1,id2,ix,iy,iz(,fx2,fy2,fz2|,fn)?\r?$",
+    "contacts": r"id1,id2,ix,iy,iz(,fx2,fy2,fz2|,compression)?\r?$",
     "frame": "step,time,ax,",
     "columns": "scanfab_id,",
 }
 # columns of the contacts file for each array of writer.Arrays; the force acts on the second grain,
 # and the normal force is positive in compression
 PARTS = {"id1": ["id1"], "id2": ["id2"], "image": ["ix", "iy", "iz"]}
-PARTS |= {"force": ["fx2", "fy2", "fz2"], "force_n": ["fn"]}
-WHOLE = ("id1", "id2", *PARTS["image"])
+PARTS |= {"force": ["fx2", "fy2", "fz2"], "force_n": ["compression"]}
 # the three vectors of the cell, and its corner (o)
 CELL = tuple(f"{vector}{axis}" for vector in "abco" for axis in "xyz")
 FRAME = ("step", "time", *CELL, "periodic", "grains", "contacts")
@@ -50,8 +48,6 @@ FRAME = ("step", "time", *CELL, "periodic", "grains", "contacts")
 MARK = "scanfab_packing"
 # prefix of the names of arrays that are columns of the grains
 COLUMN = "columns/"
-# bytes of memory needed for each byte of a file
-IN_MEMORY = 12.0
 
 
 def companion_file(path: Path, kind: str) -> Path:
@@ -94,74 +90,14 @@ def companions_of(packing: Packing, path: Path, left: Left) -> dict[Path, bytes]
     return {companion_file(path, kind): csv_bytes(table) for kind, table in tables.items()}
 
 
-def _content(path: Path) -> bytes:
-    """The bytes of a companion file, all lines of which are complete."""
-    file = plain(path)
-    check_memory(path, IN_MEMORY * file.stat().st_size)
-    data = file.read_bytes()
+def _columns(path: Path) -> Columns:
+    """The columns of a companion file: int64 or float64 if all words allow it, else words."""
+    data = text_of(Snapshot(path))
+    head, _, rows = data.partition(b"\n")
     if not data.endswith(b"\n"):
         raise ReadError(f"{path}: the last line has no end: the file is incomplete")
-    return data
-
-
-def _columns(path: Path) -> Columns:
-    """The columns of a companion file."""
-    columns = by_polars(columns_of_csv, path, _content(path))
-    if isinstance(columns, str):
-        raise ReadError(f"{path}: {columns}")
-    return columns
-
-
-def columns_of_csv(_path: str, data: bytes) -> Columns | str:
-    """Columns of words, or of int64 or float64 if all words allow it; or a text: what is wrong."""
-    import polars
-
-    try:
-        # header row as words, because polars keeps doubled quotes in a header it parses itself
-        words = polars.read_csv(data, has_header=False, infer_schema=False)
-    except polars.exceptions.PolarsError as error:
-        return f"cannot be read: {error}".partition("\n")[0]
-    if any(words.null_count().row(0)):
-        return "a line is incomplete"
-    columns = {}
-    for name, column in zip(words.row(0), words.slice(1), strict=True):
-        casts = [column.cast(kind, strict=False) for kind in (polars.Int64, polars.Float64)]
-        values = next((cast for cast in casts if not cast.null_count()), column).to_numpy()
-        columns[str(name)] = values.astype(str) if values.dtype == object else values
-    return columns
-
-
-def read_contacts(path: Path, grains: GrainTable) -> JoinedContacts:
-    """
-    Read a contacts file, and join its contacts to the grains.
-
-    Raises
-    ------
-    ReadError
-        If a line is damaged or names a grain that does not exist; or if the frame file counts
-        another number of contacts.
-    """
-    if companion_kind(path) != "contacts":
-        raise ReadError(f"{path}: expected contacts under the line id1,id2,ix,iy,iz and forces")
-    table = _columns(path)
-    if any(values.dtype.kind == "U" for values in table.values()):
-        raise ReadError(f"{path}: expected numbers in the columns {', '.join(table)}, found text")
-    # any ending will do here: the frame file is found by the stem
-    grain_file = path.with_name(f"{bare_name(path).removesuffix('.contacts.csv')}.csv")
-    _check_count(path, len(table["id1"]), "contacts", read_frame(grain_file))
-    if grains.id is None:
-        grains = grains._replace(id=np.arange(len(grains.radius)))
-    whole = np.column_stack([whole_numbers(path, table[name]) for name in WHOLE])
-    ids, image, normal = whole[:, :2], whole[:, 2:], table.get("fn")
-    force = np.column_stack([table[name] for name in PARTS["force"]]) if "fx2" in table else None
-    return join_ids(path, grains, ids, force, walls=False, image=image, force_n=normal)
-
-
-def _check_count(path: Path, count: int, what: str, frame: FrameData | None) -> None:
-    """ReadError if a file does not have as many rows as the frame file says."""
-    if frame is not None and getattr(frame, what) not in (None, count):
-        expected = f"but {frame.file.name} counts {getattr(frame, what)}"
-        raise ReadError(f"{path}: holds {count} {what}, {expected}: it is cut or of another frame")
+    names = tuple(words_of(head.decode("utf-8", "replace"), ","))
+    return read_rows(Snapshot(path), rows, Layout(names, ",", 2, whole=names, optional=names))
 
 
 class FrameData(NamedTuple):
@@ -190,12 +126,13 @@ def read_frame(path: Path) -> FrameData | None:
     if file is None:
         return None
     try:
-        names, *rows = csv.reader(_content(file).decode().splitlines())
-        row = rows[-1] if rows else []
-        words = {name: word for name, word in zip(FRAME, row, strict=False) if word}
-        along, sizes = words.get("periodic", ""), [len(one) for one in rows]
-        if tuple(names) != FRAME or sizes != [len(FRAME)] or set(along) - set("xyz"):
+        table = _columns(file)
+        if tuple(table) != FRAME or len(table["step"]) != 1:
             raise ValueError(f"expected the line {','.join(FRAME)} and one row")
+        words = {name: value.item() for name, value in table.items() if value[0] == value[0]}
+        along = words.get("periodic", "")
+        if set(along) - set("xyz"):
+            raise ValueError(f"expected letters of xyz as periodic, found {along}")
         cell = None
         if any(name in words for name in CELL):
             numbers = np.array([float(words[name]) for name in CELL]).reshape(4, 3)
@@ -203,35 +140,31 @@ def read_frame(path: Path) -> FrameData | None:
         counts = ("step", "grains", "contacts")
         step, grains, contacts = (int(words[count]) if count in words else None for count in counts)
         time = float(words["time"]) if "time" in words else None
-    except (csv.Error, KeyError, ValueError, PackingError) as error:
+    except (KeyError, TypeError, ValueError, PackingError) as error:
         raise ReadError(f"{file}: cannot be read as cell, step and time: {error}") from None
     return FrameData(file, step, time, cell, grains, contacts)
 
 
-def check_contacts_are_there(path: Path, frame: FrameData | None) -> None:
+def read_contacts(
+    path: Path, grains: GrainTable, options: ReadOptions, frame: FrameData | None
+) -> JoinedContacts | None:
     """
-    Check that grains without contacts have not lost their contacts file.
-
-    Parameters
-    ----------
-    path : Path
-        The grain file.
-    frame : FrameData, optional
-        The content of its frame file.
+    Read the contacts file of a grain file; None if there is none.
 
     Raises
     ------
     ReadError
-        If the contacts file is empty, or if it is missing although the frame file counts contacts.
+        If the file is damaged, or if the frame file counts another number of contacts.
     """
-    file = companion_file(path, "contacts")
-    is_empty = file.is_file() and not file.stat().st_size
-    count = "" if frame is None or frame.contacts is None else f"{frame.contacts} "
-    if count or is_empty:
-        found = "an empty file" if is_empty else "other words" if file.is_file() else "no such file"
+    file, joined, found = companion_file(path, "contacts"), None, None
+    if file.is_file():
+        joined = TableReader().read_contacts(Snapshot(file), options, grains)
+        found = 0 if joined.contacts is None else len(np.asarray(joined.contacts.pairs))
+    if frame is not None and frame.contacts not in (None, found):
+        problem = f"holds {found or 'no'} contacts of {path.name}, but {frame.file.name} counts"
         advice = 'copy it again, or choose `contacts="geometric"`'
-        expected = f"expected the {count}contacts of {path.name}"
-        raise ReadError(f"{file}: {expected}, found {found}: {advice}")
+        raise ReadError(f"{file}: {problem} {frame.contacts}: {advice}")
+    return joined
 
 
 def with_columns(path: Path, grains: GrainTable, frame: FrameData | None) -> GrainTable:
@@ -244,7 +177,10 @@ def with_columns(path: Path, grains: GrainTable, frame: FrameData | None) -> Gra
         If the columns file is damaged or belongs to other grains; or if the frame file counts
         another number of grains.
     """
-    _check_count(path, len(grains.radius), "grains", frame)
+    count = len(grains.radius)
+    if frame is not None and frame.grains not in (None, count):
+        expected = f"but {frame.file.name} counts {frame.grains}: it is cut or of another frame"
+        raise ReadError(f"{path}: holds {count} grains, {expected}")
     file = companion_there(path, "columns")
     if file is None:
         return grains
@@ -270,23 +206,22 @@ class NpzFormat(GrainsOnly):
     def recognises(self, path: Path) -> bool:
         """Recognised by the array `MARK`, or by the first line of a companion file."""
         if first_bytes(path, 2) != IS_NPZ:
-            return companion_kind(path) is not None
+            return companion_kind(path) in ("frame", "columns")
         with suppress(ReadError):
-            return MARK in npz_shapes(path)
+            return MARK in read_npz(path, MARK)
         return False
 
     def kind(self, path: Path) -> FileKind:
         """Grains, or for companion files contacts or ``cell``."""
         if first_bytes(path, 2) == IS_NPZ:
             return "grains"
-        kind = companion_kind(path)
-        return "other" if kind is None else "contacts" if kind == "contacts" else "cell"
+        return "cell" if companion_kind(path) in ("frame", "columns") else "other"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """The only snapshot, with the step and time of the packing."""
         if self.kind(path) != "grains":
             return [Snapshot(path)]
-        moment = read_npz(path, ("step", "time"))
+        moment = read_npz(path, "step", "time")
         try:
             step = int(moment["step"].item()) if "step" in moment else None
             time = float(moment["time"].item()) if "time" in moment else None
@@ -307,12 +242,6 @@ class NpzFormat(GrainsOnly):
         if "pairs" not in arrays:
             return grains
         return grains._replace(contacts=contacts_of(arrays["pairs"], arrays))
-
-    def read_contacts(
-        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
-    ) -> JoinedContacts:
-        """The contacts in a companion file."""
-        return read_contacts(snapshot.path, grains)
 
     def write(self, packing: Packing, path: Path) -> Left:
         """Write one frame; the file holds all data of the packing."""

@@ -11,20 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
-from scanfab.base.typing import AnyArray, Columns, FloatArray
+from scanfab.base.typing import AnyArray, Columns
 from scanfab.io.formats.table import FRAME_NAMES, plain_name
 from scanfab.io.writer import Left, csv_bytes, more_columns, table_columns
-from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
 # doubles hold whole numbers up to here exactly
 MOST_EXACT = 2**53
 # limit of ids and types in the usual builds of LAMMPS
 MOST_SMALL = 2**31
-TURNED = (
-    "LAMMPS cannot store this cell, as its first vector is not along x, or its second not in the "
-    "plane x-y: the box in the file is the box around the cell"
-)
 
 
 class CsvWriter:
@@ -86,10 +81,15 @@ class LammpsDumpWriter:
         known, own, notes = table_columns(packing)
         held = {name: values for name, values in own.items() if _is_dumped(name, values)}
         rows = {**known, **held}
+        kind, lines = _box(packing, is_around=True)
+        along = (False,) * 3 if packing.cell is None else packing.cell.periodic
+        # 16 digits, as LAMMPS writes bounds
+        box = "\n".join(" ".join(f"{x:.16e}" for x in line) for line in lines)
+        flags = " ".join([*kind.split(), *("pp" if repeats else "ff" for repeats in along)])
         time = "" if packing.time is None else f"ITEM: TIME\n{packing.time!r}\n"
         head = (
             f"{time}ITEM: TIMESTEP\n{packing.step or 0}\nITEM: NUMBER OF ATOMS\n{len(packing)}\n"
-            f"ITEM: BOX BOUNDS {_bounds(packing)}ITEM: ATOMS {' '.join(rows)}\n"
+            f"ITEM: BOX BOUNDS {flags}\n{box}\nITEM: ATOMS {' '.join(rows)}\n"
         )
         path.write_bytes(head.encode() + csv_bytes(rows, " ", with_names=False))
         left = tuple(name for name in own if name not in held)
@@ -113,11 +113,11 @@ class LammpsDataWriter:
         kinds |= {name: own[name].astype(kinds[name].dtype) for name in held}
         rows = {"id": packing.id, "type": kinds["type"], "diameter": 2.0 * packing.radius}
         rows |= {"density": kinds["density"], **dict(zip("xyz", packing.position.T, strict=True))}
-        low, high, tilt, is_turned = _box(packing)
-        sides = zip(low.tolist(), high.tolist(), "xyz", strict=True)
-        box = "".join(f"{a!r} {b!r} {axis}lo {axis}hi\n" for a, b, axis in sides)
-        if tilt.any():
-            box += f"{' '.join(map(repr, tilt.tolist()))} xy xz yz\n"
+        kind, lines = _box(packing)
+        keys = ("avec", "bvec", "cvec") if "abc" in kind else ("xlo xhi", "ylo yhi", "zlo zhi")
+        last = [[line.pop() for line in lines]] if kind else []
+        named = zip([*lines, *last], (*keys, kind), strict=False)
+        box = "".join(f"{' '.join(map(repr, line))} {key}\n" for line, key in named)
         step = f", timestep = {packing.step}" if packing.step is not None else ""
         head = (
             f"LAMMPS data file by scanfab{step}\n\n{len(packing)} atoms\n"
@@ -127,7 +127,6 @@ class LammpsDataWriter:
         if len(packing) and packing.id.max() >= MOST_SMALL:
             notes.append("LAMMPS takes ids above 2147483647 only if it was built for them")
         left = tuple(name for name in more_columns(packing) if name not in held)
-        notes += [TURNED] if is_turned else []
         return Left(contacts=True, frame=True, columns=left, notes=tuple(notes))
 
 
@@ -145,43 +144,25 @@ def _is_data(name: str, values: AnyArray) -> bool:
     return name == "density" or bool(np.all((values < MOST_SMALL) & (values == np.floor(values))))
 
 
-def _box(packing: Packing) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
+def _box(packing: Packing, *, is_around: bool = False) -> tuple[str, list[list[float]]]:
     """
-    Lower and upper corner of the box before it is tilted, and the tilt (xy, xz, yz).
+    The box as LAMMPS has it: a row of numbers for each axis, and the name of its last column.
 
-    LAMMPS needs the first vector along x and the second in the plane x-y. For any other cell the
-    result is the box around the cell, and the last value is True. Without a cell the box encloses
-    the grains.
+    A row has the lower and the upper bound, and perhaps the tilt (xy, xz, yz); or a vector and a
+    coordinate of the origin, if the first vector is not along x or the second not in the plane x-y.
+    Dumps have the bounds of the box around the tilted box (``is_around``). Without a cell the box
+    encloses the grains.
     """
-    cell, no_tilt = packing.cell, np.zeros(3)
-    if cell is None and not len(packing):
-        return np.zeros(3), np.ones(3), no_tilt, False
+    cell, place, radius = packing.cell, packing.position, packing.radius[:, None]
     if cell is None:
-        place, radius = packing.position, packing.radius[:, None]
-        return (place - radius).min(axis=0), (place + radius).max(axis=0), no_tilt, False
+        place, radius = (place, radius) if len(packing) else (np.zeros((1, 3)), np.ones((1, 1)))
+        low, high = (place - radius).min(axis=0), (place + radius).max(axis=0)
+        return "", np.column_stack([low, high]).tolist()
     if np.any(np.triu(cell.vectors, 1)) or np.any(np.diag(cell.vectors) <= 0):
-        return *_around(cell), no_tilt, True
-    high = cell.origin + np.diag(cell.vectors)
-    return cell.origin, high, cell.vectors[[1, 2, 2], [0, 0, 1]], False
-
-
-def _around(cell: Cell) -> tuple[FloatArray, FloatArray]:
-    """Lower and upper corner of the box around a cell."""
-    corners = cell.origin + np.array(list(np.ndindex(2, 2, 2))) @ cell.vectors
-    return corners.min(axis=0), corners.max(axis=0)
-
-
-def _bounds(packing: Packing) -> str:
-    """The box in a dump: bounds, which older programs read too, or three vectors if need be."""
-    cell = packing.cell
-    along = (False,) * 3 if cell is None else cell.periodic
-    low, high, tilt, is_turned = _box(packing)
-    kind, columns = "", [low, high]
-    if cell is not None and is_turned:
-        kind, columns = "abc origin ", [*cell.vectors.T, cell.origin]
-    elif cell is not None and tilt.any():
-        kind, columns = "xy xz yz ", [*_around(cell), tilt]
-    # 16 digits, as LAMMPS writes bounds
-    rows = (" ".join(f"{x:.16e}" for x in row) for row in np.column_stack(columns).tolist())
-    flags = " ".join("pp" if repeats else "ff" for repeats in along)
-    return "\n".join([f"{kind}{flags}", *rows, ""])
+        return "abc origin", np.column_stack([cell.vectors, cell.origin]).tolist()
+    tilt = cell.vectors[[1, 2, 2], [0, 0, 1]]
+    corners = cell.origin + np.array([np.zeros(3), np.diag(cell.vectors)])
+    if is_around:
+        corners = cell.origin + np.array(list(np.ndindex(2, 2, 2))) @ cell.vectors
+    columns = [corners.min(axis=0), corners.max(axis=0), *([tilt] if tilt.any() else [])]
+    return "xy xz yz" if tilt.any() else "", np.column_stack(columns).tolist()

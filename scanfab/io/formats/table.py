@@ -19,8 +19,8 @@ import numpy as np
 from scanfab.base.arrays import MOST, doubles
 from scanfab.base.errors import ReadError, SettingsError, note
 from scanfab.base.typing import Columns
-from scanfab.io.binary_files import binary_names, is_xyzd, read_binary, xyzd_cell
-from scanfab.io.columns import DIAMETER_NAMES, ID_NAMES, RADIUS_NAMES, grain_table, refuse_shared
+from scanfab.io.binary_files import binary_names, is_xyzd, packing_info, read_binary
+from scanfab.io.columns import DIAMETER_NAMES, ID_NAMES, RADIUS_NAMES, grain_table
 from scanfab.io.contacts import join_table
 from scanfab.io.layout import TextTable, read_text, text_table
 from scanfab.io.options import parse_columns
@@ -35,8 +35,8 @@ FRAME_NAMES = ("step", "timestep", "time.step", "frame", "time", "time.s", "time
 # names of a coordinate (axis and its number), of a grain in a contact, and of a force component,
 # including the names of PFC and EDEM
 CENTRE = (
-    "{0} pos.{0} pos{0} position.{0} points.{1} ball.pos.{0} ball.position.{0} ball.{0} "
-    "particle.position.{0}"
+    "{0} pos.{0} pos{0} position.{0} positions.{0} points.{0} points.{1} ball.pos.{0} "
+    "ball.position.{0} ball.{0} particle.position.{0}"
 )
 END = (
     "id{0} id.{0} grain{0} particle{0} particle.{0} body{0} contact.end{0}.id contact.end{0} "
@@ -49,6 +49,7 @@ ALONG = {"f{0}": FORCE, "i{0}": "i{0} image.{0}", "f{0}1": "f{0}1", "f{0}2": "f{
 ALONG |= {"fn{0}": "fn{0} contact.normal.force.{0}", "ft{0}": "ft{0} contact.tangential.force.{0}"}
 FORCES: dict[str, tuple[str, ...]] = {
     "fn": ("fn", "force.n", "normal.force", "contact.force.normal", "force.normal"),
+    "compression": ("compression",),
     "kind": ("contact.type", "kind"),
 }
 FORCES |= {k.format(x): tuple(v.format(x).split()) for x in "xyz" for k, v in ALONG.items()}
@@ -129,7 +130,7 @@ class TableReader:
 
     def carries(self, path: Path) -> Carries:
         """Tables have no cell, except ``.xyzd`` with its file packing.nfo."""
-        return "cell" if is_xyzd(path) and xyzd_cell(path) is not None else "nothing"
+        return "cell" if is_xyzd(path) and packing_info(path) is not None else "nothing"
 
     def beside(self, path: Path) -> list[Path]:
         """The file packing.nfo, which holds the cell of an ``.xyzd``."""
@@ -157,8 +158,8 @@ class TableReader:
             roles["radius"] = "radius"
         # columns that the user names, and columns of grains with usual names; not those of contacts
         known = {k: own for k, own in roles.items() if k in options.columns or k in OF_GRAINS}
-        cell = xyzd_cell(path) if is_xyzd(path) else None
-        return grain_table(path, columns, cell, replace(options, columns=known))
+        info = packing_info(path) if is_xyzd(path) else None
+        return grain_table(path, columns, info and info[1], replace(options, columns=known))
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
@@ -296,7 +297,6 @@ def find_columns(
         keys = [table.layout.names[place] for place in places]
         if standard in named or not {*keys} <= {*roles.values()}:
             roles[standard] = keys[0]
-    refuse_shared(path, {standard: roles[standard] for standard in named}, option)
     return roles
 
 

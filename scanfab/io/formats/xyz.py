@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,8 +11,8 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import AnyArray, Columns
-from scanfab.io.files import bare_name, first_bytes, leave_out_last, plain
-from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
+from scanfab.io.files import bare_name, first_bytes
+from scanfab.io.formats.shared import GrainsOnly, cell_of, marked_frames, numbers
 from scanfab.io.reader import Carries, Snapshot
 from scanfab.io.text import Layout, read_rows, spelt, text_of
 from scanfab.io.writer import Left, as_arrays, csv_bytes, flat
@@ -21,6 +20,8 @@ from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
 COUNT = re.compile(rb"(?:\xef\xbb\xbf)?[ \t]*([0-9]{1,15})[ \t]*\r?\n")
+# the two lines above the rows of a frame
+FRAME = re.compile(rb"[ \t]*[0-9]{1,15}[ \t]*\r?\n[^\n]*\bProperties[ \t]*=", re.IGNORECASE)
 # key=value; a value with blanks is in quotes
 PAIR = re.compile(r"([A-Za-z_][\w.-]*)\s*=\s*(?:\"([^\"]*)\"|([^\s\"]+))")
 PROPERTIES = re.compile(r"[^:]+:[SIRL]:[1-9][0-9]?(:[^:]+:[SIRL]:[1-9][0-9]?)*")
@@ -66,27 +67,8 @@ class XyzFormat(GrainsOnly):
         return "nothing" if _cell(path, _head(path, first_bytes(path, HEAD))) is None else "cell"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
-        """The frames, one after the other."""
-        frames: list[Snapshot] = []
-        with open(plain(path), "rb") as stream:
-            start = 0
-            while first := stream.readline():
-                if first.strip():
-                    head = _head(path, first + stream.readline())
-                    rows = sum(1 for _ in islice(stream, head.rows))
-                    if rows < head.rows:
-                        reason = f"expected {head.rows} rows, the file ends after {rows}"
-                        leave_out_last(path, len(frames), reason)
-                        break
-                    words = (head.words.get(key, "") for key in ("step", "timestep"))
-                    steps = [int(word) for word in words if re.fullmatch(r"[-+]?[0-9]{1,18}", word)]
-                    time = _numbers(path, head, "time", 1)
-                    moment = steps[0] if steps else None, time[0] if time else None
-                    frames.append(Snapshot(path, *moment, start, stream.tell()))
-                start = stream.tell()
-        if not frames:
-            raise ReadError(f"{path}: the file is empty")
-        return frames
+        """The frames, in the order of their steps; an incomplete last one is left out."""
+        return marked_frames(path, FRAME, self.table, _moment)
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """The columns by name, and the cell; ``pos`` are the centres."""
@@ -154,6 +136,16 @@ def _head(path: Path, text: bytes) -> Head:
         raise ReadError(f"{path}: {expected}, found {words['properties'][:100]!r}")
     columns = list(zip(parts[::3], parts[1::3], map(int, parts[2::3]), strict=True))
     return Head(int(count[1]), words, columns)
+
+
+def _moment(path: Path, text: bytes) -> tuple[int | None, float | None]:
+    """The step and the time of a frame."""
+    head = _head(path, text)
+    step, time = (
+        head.words.get("step", head.words.get("timestep", "")),
+        _numbers(path, head, "time", 1),
+    )
+    return int(step) if re.fullmatch(r"[-+]?[0-9]{1,18}", step) else None, time[0] if time else None
 
 
 def _numbers(path: Path, head: Head, key: str, count: int) -> list[float] | None:

@@ -115,7 +115,6 @@ REFUSED = [
     (FLAGGED, ROWS, "id forces", None, "or keywords, id among them"),
     (FLAGGED, ROWS, "id force torque", None, "for 6 columns; .* is for 9"),
     (FLAGGED, ROWS, "id1=c_con[2],id2=c_con[9]", None, r"c_con\[9\].*; the columns are c_con"),
-    (FLAGGED, ROWS, "id1=c_con[1],id2=c_con[1]", None, "named twice"),
     (ROUNDED, chain(1234561)[0], None, "liggghts", r"rounded to six digits.*%\.0f"),
     # each rounded id is that of another grain
     (ROUNDED, chain(1234560, 0.01)[0], "id force", None, r"rounded to six digits.*%\.0f"),

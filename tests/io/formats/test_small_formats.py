@@ -72,7 +72,7 @@ def test_gsd_of_another_schema_or_without_the_package(tmp_path, monkeypatch):
     fl, path = pytest.importorskip("gsd.fl"), tmp_path / "a.gsd"
     with fl.open(str(path), "w", application="x", schema="mine", schema_version=[1, 0]) as file:
         file.end_frame()
-    refuses(path, "its schema is 'mine', expected 'hoomd'")
+    refuses(path, "has incorrect schema: mine")
     monkeypatch.setattr(readers, "find_spec", lambda name: None)
     for format in (None, "gsd"):
         refuses(path, r'pip install "scanfab\[gsd\]"', error=scanfab.ScanfabError, format=format)
