@@ -301,7 +301,7 @@ def join_table(path: Path, grains: GrainTable, columns: Columns) -> JoinedContac
     if np.any(counts > 1):
         first, second, *_ = unique[np.argmax(counts)]
         problem = f"{path}: {np.count_nonzero(counts > 1)} of {len(unique)} pairs are listed more "
-        warn(f"{problem}than once, such as {first} and {second}: each row counts as a contact")
+        warn(f"{problem}than once, such as {first} and {second}: each pair counts once")
     # not contacts of two walls
     with_walls = ids[walls & np.any(ids >= 0, axis=1)]
     counted = join_ids(path, grains, with_walls, None, walls="negative")

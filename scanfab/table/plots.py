@@ -9,9 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from inspect import Parameter, Signature, signature
 from typing import Any
 
 from scanfab.base.column import no_column
+from scanfab.base.option import refuse_unknown
 from scanfab.base.plugins import load_plugins
 
 
@@ -59,11 +61,17 @@ class Plots:
         if name not in figures:
             raise AttributeError(no_column(name, figures, "figure"))
         figure, data = figures[name], self._data
+        options = [*signature(figure).parameters.values()][1:]
 
         def plot(ax: Any = None, **given: Any) -> Any:
+            refuse_unknown(f"the figure {name}", given, [option.name for option in options])
             return figure(data, **given).on(ax)
 
+        # notebooks show the docstring and the signature of the figure
+        axes = Parameter("ax", Parameter.POSITIONAL_OR_KEYWORD, default=None)
+        named = [option.replace(kind=Parameter.KEYWORD_ONLY) for option in options]
         plot.__name__, plot.__doc__ = name, figure.__doc__
+        plot.__signature__ = Signature([axes, *named])  # type: ignore[attr-defined]
         return plot
 
     def __dir__(self) -> list[str]:

@@ -40,10 +40,9 @@ def test_errors_and_warnings_name_standard_input(by_stdin, text, message, packed
 def test_so_do_warnings_in_results_and_manifests(by_stdin, tmp_path):
     answer = by_stdin(b"x,y,z,radius\n1,2,3,4", "inspect", "--json")
     assert json.loads(answer.out)["warnings"][0].startswith("standard input: the last line")
-    words = ("compute", "--on-error", "skip", "-o", tmp_path / "out.csv")
-    by_stdin(b"x,y,z,radius\n1,2,3,-4\n", *words, code=1)
-    (first, *_) = json.loads((tmp_path / "out.csv.manifest.json").read_text())["warnings"]
-    assert first.startswith("frame 0 skipped: standard input: grain 0: the radius")
+    by_stdin(b"x,y,z,radius\n1,2,3,4", "compute", "-o", tmp_path / "out.csv", code=1)
+    told = json.loads((tmp_path / "out.csv.manifest.json").read_text())["warnings"]
+    assert any("standard input: the last line" in one for one in told)
 
 
 KEYS = (

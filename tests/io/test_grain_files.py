@@ -141,8 +141,13 @@ def test_contacts_of_another_sample_are_skipped_with_a_note(tmp_path, grains, co
     path = write(tmp_path / grains, STEPLESS)
     write(tmp_path / contacts, CONTACTS.replace("0,1", "5,6"))
     assert contacts_of(path) == [None]
-    write(tmp_path / "a.contacts.csv" if grains == "a.csv" else tmp_path / "a_1.pairs", CONTACTS)
-    assert contacts_of(path) == [1]
+    if grains == "a.csv":
+        write(tmp_path / "a.contacts.csv", CONTACTS)
+        assert contacts_of(path) == [1]
+        return
+    write(tmp_path / "a_1.pairs", CONTACTS)
+    with pytest.warns(ScanfabNote, match=r"contacts are read from .*a_1.pairs"):
+        assert contacts_of(path) == [1]
 
 
 DATA = (SAMPLE_DATA / "lammps_shear" / "forms" / "shear.data.gz").read_bytes()

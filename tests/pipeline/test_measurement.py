@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, direction_rule, find_contacts
+from scanfab import Cell, Packing, Settings, compute, direction_rule, find_contacts
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox
 from scanfab.pipeline.measurement import measure
@@ -82,18 +82,6 @@ def test_turned_with_its_axis_the_sample_has_the_same_octants(packing):
     assert other.alpha_c_axial_sample_se == pytest.approx(row.alpha_c_axial_sample_se)
     ours, theirs = (np.sort(without(one, "alpha_c_axial")) for one in (row, other))
     assert theirs == pytest.approx(ours, abs=1e-12)
-
-
-def test_cut_offs_whose_errors_are_above_the_tolerance_are_told(packing):
-    """Few segments reach the larger one, along lines that suffice for the other."""
-    words = {"variants": "c", "tolerance": 2e-3, "cutoff": 0.2, "cutoffs": "0.2,0.8"}
-    told = r"c: at the cut-off 0.8 .* above the tolerance 0.002, which"
-    with pytest.warns(ScanfabWarning, match=told):
-        low, high = compute(packing, **words)
-    assert low.alpha_vs_axial_se <= 2e-3 < high.alpha_vs_axial_se
-    with pytest.warns(ScanfabWarning, match="the scan stopped after") as caught:
-        compute(packing, **{**words, "tolerance": 1e-5, "max_chords": 1e5})
-    assert not any("which holds" in str(one.message) for one in caught)
 
 
 def test_other_cut_offs_of_the_same_lines_are_those_of_a_scan_with_all_of_them(packing):

@@ -64,7 +64,7 @@ def contents_in_worker(path: str) -> tuple[list[int], list[str]]:
     import gsd.hoomd
 
     with gsd.hoomd.open(path) as file:
-        steps = gsd.hoomd.read_log(path, scalar_only=True)["configuration/step"]
+        steps = gsd.hoomd.read_log(path, glob_pattern="configuration/step")["configuration/step"]
         return steps.tolist(), file.file.find_matching_chunk_names("particles/")
 
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure as Page
 import scanfab
 from scanfab.base.errors import ScanfabNote, SettingsError
 from scanfab.table.compare import compare_tables
-from scanfab.table.curves import abscissa_label
+from scanfab.table.curves import ABSCISSAS, abscissa
 from scanfab.table.table import Table
 from scanfab.viz.figures.anisotropy import PAPER_SLOPE, Correlation
 from scanfab.viz.figures.curves import Columns, groups_of
@@ -102,7 +102,7 @@ def test_one_frame_has_its_error_as_a_bar_and_no_line(drawn):
 
 def test_without_strain_the_frame_is_the_abscissa(drawn):
     rows = with_all(curve(), strain=None)
-    assert abscissa_label(rows) == "frame"
+    assert ABSCISSAS[abscissa(rows)][0] == "frame"
     assert drawn(rows).axes[0].lines[0].get_xdata().tolist() == [0, 1, 2, 3, 4]
     for caption in captions(rows)[:2]:
         assert ", over the number of the frame" in caption
