@@ -144,9 +144,15 @@ class Frame:
         lists = [grains.contacts] if takes_own and grains.contacts is not None else []
         files: list[Path] = []
         parts: list[JoinedContacts] = []
-        own = read_contacts(path, grains, self._options(), self.told) if takes_own else None
+        own_file, named_own = companion_file(path, "contacts"), False
+        if series.contacts_from == "path" and len(series.contacts) == 1:
+            snapshot = series.contacts_of(self, series.contacts[0])
+            named_own = snapshot is not None and snapshot.path == own_file
+        own = None
+        if takes_own or named_own:
+            own = read_contacts(path, grains, self._options(), self.told)
         if own is not None:
-            files, parts = [companion_file(path, "contacts")], [own]
+            files, parts = [own_file], [own]
         elif not lists or series.contacts_from != "beside":
             files, parts = self._contacts(grains)
         lists += [part.contacts for part in parts if part.contacts is not None]
@@ -160,7 +166,7 @@ class Frame:
             advice = "lists contacts with walls only: those between grains are found by geometry"
             warn(f"{named}: {advice}, unless `contacts` names their file")
         # a contacts file of `convert` lists no walls; the grain file counts contacts with walls
-        is_own = takes_own or companion_file(path, "contacts") in files
+        is_own = takes_own or own_file in files
         if grains.wall_contacts is not None and is_own:
             parts.append(JoinedContacts(None, grains.wall_contacts, grains.wall_forces))
         none = np.zeros(len(grains.radius), np.int64)

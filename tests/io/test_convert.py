@@ -63,7 +63,7 @@ def test_contacts_that_were_cut_or_left_behind_are_an_error(tmp_path, name):
     path, file = written(EVERYTHING, tmp_path, name), tmp_path / "a.contacts.csv"
     without_last_row(file)
     words = rf"a\.contacts\.csv: holds {COUNT - 1} contacts of a.*, but a\.frame\.csv counts"
-    for contacts in ("auto", "file"):
+    for contacts in ("auto", "file", file):
         refuses(path, words, contacts=contacts)
     file.write_bytes(b"")
     for found in ("expected a table, found no row", f"holds no contacts of {path.name}, but"):
