@@ -157,7 +157,7 @@ class Sample:
         """Grains that lie far away from all others."""
         return escaped_grains(self.packing, self.grains)
 
-    @property
+    @cached_property
     def gathered(self) -> BoolArray:
         """Grains without escaped ones, unless these are too many, (N,); the extents are theirs."""
         few = max(SHARE * self.number(self.grains), 1.0)

@@ -18,13 +18,11 @@ from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import Frames, doubts_of_frame, sample_of
 from scanfab.pipeline.rv import rvs_of
 from scanfab.pipeline.settings import Settings
+from scanfab.table.columns import FRAME_COLUMNS, row_of
 from scanfab.table.row import Row
 
 REPORT_COLUMNS = (
-    Column("source", str, "", "the series as given"),
-    Column("frame", int, "", "index of the frame in the series, from 0"),
-    Column("step", int, "", "time step of the dump"),
-    Column("time", float, "", "time"),
+    *FRAME_COLUMNS[:4],
     Column("format", str, "", "name of the reader"),
     Column("grains", int, "", "number of grains, without boundary particles; a clump is one grain"),
     Column("boundary", int, "", "number of boundary particles"),
@@ -157,30 +155,31 @@ def _report(
     radius = packing.radius[grains]
     box = SurfaceBox.of(packing, sample.gathered) if grains.any() else None
     in_rv = None if window is None else sample.number(sample.counted(VARIANTS["c"], window))
-    return Row(
-        source=source,
-        frame=number,
-        step=packing.step,
-        time=packing.time,
-        format=frame.reader.name,
-        grains=sample.number(grains),
-        boundary=sample.number(sample.boundary),
-        radius_min=float(radius.min()) if radius.size else None,
-        radius_max=float(radius.max()) if radius.size else None,
-        contacts=len(sample.contacts),
-        contacts_from=sample.contacts.source,
-        rattlers=sample.number(sample.rattlers),
-        coordination=sample.coordination(VARIANTS["a"], None),
-        cell=None if cell is None else cell.vectors.tolist(),
-        periodic=None if cell is None else list(cell.periodic),
-        columns=["id", "x", "y", "z", "radius", *packing.columns],
-        warnings=doubts,
-        low=None if box is None else box.low.tolist(),
-        high=None if box is None else box.high.tolist(),
-        rv_center=None if window is None else window.center.tolist(),
-        rv_radius=None if window is None else window.radius,
-        rv_shape=None if window is None else str(window.shape),
-        clumps=sample.clumps,
-        spheres=int(grains.sum()),
-        grains_in_rv=in_rv,
-    )
+    found = {
+        "source": source,
+        "frame": number,
+        "step": packing.step,
+        "time": packing.time,
+        "format": frame.reader.name,
+        "grains": sample.number(grains),
+        "boundary": sample.number(sample.boundary),
+        "radius_min": float(radius.min()) if radius.size else None,
+        "radius_max": float(radius.max()) if radius.size else None,
+        "contacts": len(sample.contacts),
+        "contacts_from": sample.contacts.source,
+        "rattlers": sample.number(sample.rattlers),
+        "coordination": sample.coordination(VARIANTS["a"], None),
+        "cell": None if cell is None else cell.vectors.tolist(),
+        "periodic": None if cell is None else list(cell.periodic),
+        "columns": ["id", "x", "y", "z", "radius", *packing.columns],
+        "warnings": doubts,
+        "low": None if box is None else box.low.tolist(),
+        "high": None if box is None else box.high.tolist(),
+        "rv_center": None if window is None else window.center.tolist(),
+        "rv_radius": None if window is None else window.radius,
+        "rv_shape": None if window is None else str(window.shape),
+        "clumps": sample.clumps,
+        "spheres": int(grains.sum()),
+        "grains_in_rv": in_rv,
+    }
+    return row_of(REPORT_COLUMNS, found)

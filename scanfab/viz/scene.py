@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,10 +28,6 @@ LINE_ANGLE = 30.0
 SHADES = (1.0, 0.8, 0.62)
 # Kinds of grains, which have a colour each.
 IN_WINDOW, OUTSIDE, RATTLER = 0, 1, 2
-
-
-Strained = Mapping[str, float | None]
-"""Strains of a frame by the names of their columns; None where one is not known."""
 
 
 @dataclass(frozen=True, eq=False)
