@@ -70,9 +70,8 @@ class Blocks:
         # for x, y or z these are the octants of the coordinates
         is_coordinate = np.count_nonzero(along) == 1
         parting = np.eye(3) if is_coordinate else line_triads(along[None], space)[0]
-        # places within reach have coordinates from a quarter to three quarters of a period
-        edges = 4.0 * reach * parting
-        return cls._halves(center - 0.5 * edges.sum(axis=0), edges, space)
+        none = np.zeros(3, bool)
+        return cls.of_periods(reach * parting, np.zeros(3), none, center[None], space)
 
     @classmethod
     def of_periods(
@@ -100,14 +99,10 @@ class Blocks:
         # far more than the extent of the positions, about their middle
         length = np.where(periodic, 1.0, 4.0 * (1.0 + high - low))
         start = np.where(periodic, 0.0, 0.5 * (low + high - length))
-        return cls._halves(origin + start @ vectors, length[:, None] * vectors, space)
-
-    @classmethod
-    def _halves(cls, corner: FloatArray, edges: FloatArray, space: Space) -> Blocks:
-        """Two parts along each edge (not across a plane); all repeat, so no place is outside."""
-        across = space.across
+        edges, across = length[:, None] * vectors, space.across
+        # no parts across a plane; all edges repeat, so no place is outside
         parts = tuple(2 if across is None or not edge[across] else 1 for edge in edges)
-        return cls(corner, edges, parts, (True, True, True))
+        return cls(origin + start @ vectors, edges, parts, (True, True, True))
 
     def moved(self, origin: FloatArray) -> Blocks:
         """The same blocks, for places relative to an origin."""

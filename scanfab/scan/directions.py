@@ -276,17 +276,10 @@ def design(degree: float) -> DirectionRule:
 def icosahedral(degree: float) -> DirectionRule:
     """The corners of an icosahedron and of its dual, which together are exact to degree 9."""
     golden = (1 + math.sqrt(5)) / 2
-    signs = np.array([[1, 1], [1, -1]])
-    corners = np.concatenate(
-        [np.roll(np.column_stack([[0, 0], signs * [1, golden]]), k, axis=1) for k in range(3)]
-    )
-    centres = np.concatenate(
-        [np.roll(np.column_stack([[0, 0], signs * [golden, 1 / golden]]), k, 1) for k in range(3)]
-    )
-    cube = np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [1, -1, -1]])
-    axes = np.concatenate(
-        [corners / math.sqrt(1 + golden**2), centres / math.sqrt(3), cube / math.sqrt(3)]
-    )
+    kinds = [[0, 1, golden], [0, 1, -golden]], [[0, golden, 1 / golden], [0, golden, -1 / golden]]
+    turned = np.stack([np.roll(kinds, k, axis=-1) for k in range(3)], axis=1).reshape(12, 3)
+    axes = np.concatenate([turned, [[1, 1, 1], [1, 1, -1], [1, -1, 1], [1, -1, -1]]])
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     weights = np.repeat([5 / 168, 9 / 280], [6, 10])
     return _normalised("icosahedral:9", axes, weights, 9)
 
