@@ -19,9 +19,8 @@ import numpy as np
 from scanfab.base.space import on_circle, on_sphere
 from scanfab.base.typing import BoolArray, FloatArray
 
-# STEPS: most steps of the walk to the point of a region that is nearest to a sphere.
-# ROUNDING: relative differences of lengths below this are rounding.
-STEPS, ROUNDING = 200, 1e-12
+# relative differences of lengths below this are rounding
+ROUNDING = 1e-12
 # a polyhedron and its copy share nothing unless a ball of this size, relative to both, fits in
 SLIVER = 1e-9
 
@@ -81,25 +80,20 @@ class Body:
 
 
 class Quadric(NamedTuple):
-    """
-    The points x with x·(m I + D) x < level; D is exactly 0 for a sphere with any axes.
-    """
+    """The points x with x·form x < level."""
 
-    isotropic: float
-    """m, not negative."""
-    deviator: FloatArray
-    """D: symmetric, shape (3, 3), all eigenvalues at least -m."""
+    form: FloatArray
+    """Symmetric, no eigenvalue below 0, shape (3, 3); exactly the unit matrix for a sphere."""
     level: float
     """Above 0, so that the origin lies inside."""
 
-    @property
-    def form(self) -> FloatArray:
-        """The matrix m I + D."""
-        return self.isotropic * np.eye(3) + self.deviator
+    def norm(self, points: FloatArray) -> FloatArray:
+        """√(x·form x) of each point, shape (N,)."""
+        return np.asarray(np.sqrt(np.einsum("ij,ij->i", points @ self.form, points)))
 
 
 # the quadric of a region that is bounded by planes alone: no point violates it
-EVERYWHERE = Quadric(0.0, np.zeros((3, 3)), 1.0)
+EVERYWHERE = Quadric(np.zeros((3, 3)), 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +151,7 @@ class Convex:
     @property
     def is_sphere(self) -> bool:
         """Whether the region is a sphere, or in a plane a circle."""
-        return not len(self.planes) and not self.quadric.deviator.any()
+        return not len(self.planes) and np.array_equal(self.quadric.form, np.eye(3))
 
     @property
     def is_flat(self) -> bool:
@@ -195,18 +189,22 @@ class Convex:
         -------
         ndarray of bool, shape (N,)
         """
-        isotropic, deviator, level = self.quadric
-        form = isotropic * np.einsum("ij,ij->i", points, points)
-        form += np.einsum("ij,ij->i", points @ deviator, points)
         # Distances are compared, not their squares, to round as all other code that compares them.
-        inside = np.sqrt(form) < np.sqrt(level)
+        inside = self.quadric.norm(points) < np.sqrt(self.quadric.level)
         for plane in self.planes:
             inside &= points @ plane[:3] < plane[3]
         return np.asarray(inside)
 
     def share(self, start: FloatArray, branch: FloatArray) -> FloatArray:
+        """The fraction of each straight segment that lies inside the region; see :meth:`cut`."""
+        first, last = self.cut(start, branch)
+        return np.asarray(np.maximum(last - first, 0.0))
+
+    def cut(self, start: FloatArray, branch: FloatArray) -> tuple[FloatArray, FloatArray]:
         """
-        The fraction of each straight segment that lies inside the region.
+        Where each straight segment enters and leaves the region, from 0 (its start) to 1.
+
+        A segment outside leaves before it enters.
 
         Parameters
         ----------
@@ -229,7 +227,7 @@ class Convex:
             c = np.einsum("ni,ij,nj->n", start, form, start) - level
             root = np.sqrt(np.maximum(b * b - a * c, 0.0))
             # along the axis of a cylinder a is 0: the quadric keeps the whole segment, or nothing
-            steep = a > ROUNDING * (self.quadric.isotropic * np.einsum("ni,ni->n", branch, branch))
+            steep = a > ROUNDING * np.einsum("ni,ni->n", branch, branch)
             slope = np.where(steep, a, 1.0)
             first = np.where(steep, np.maximum(first, (-b - root) / slope), first)
             last = np.where(steep, np.minimum(last, (root - b) / slope), last)
@@ -241,7 +239,7 @@ class Convex:
             last = np.where(rise > 0.0, np.minimum(last, crossing), last)
             first = np.where(rise < 0.0, np.maximum(first, crossing), first)
             last[(rise == 0.0) & (room <= 0.0)] = 0.0
-        return np.asarray(np.maximum(last - first, 0.0))
+        return first, last
 
     def may_meet(self, points: FloatArray, radius: FloatArray) -> BoolArray:
         """
@@ -261,32 +259,10 @@ class Convex:
         near = np.sqrt(np.einsum("ij,ij->i", points, points)) < self.reach + radius
         for plane in self.planes:
             near &= points @ plane[:3] < plane[3] + radius
-        if self.is_sphere:
-            return np.asarray(near)
-        # The test so far keeps too many spheres near edges and near quadrics that are no spheres.
-        # For each centre p outside, x walks inside the region towards p: each step goes towards
-        # the point that lies furthest along p - x, and stops as near to p as possible. Then |p - x|
-        # is an upper bound of the distance of p, and the plane through the furthest point gives a
-        # lower bound. A sphere whose radius still lies between them after all steps is kept.
-        left = np.flatnonzero(near)
-        left = left[~self.contains(points[left])]
-        at = np.zeros((len(left), 3))
-        for _ in range(STEPS):
-            toward = points[left] - at
-            distance, furthest = np.linalg.norm(toward, axis=1), self.support(toward)
-            # a centre on the surface is reached: the distance is 0
-            over = np.where(distance > 0.0, distance, 1.0)
-            missed = np.einsum("ij,ij->i", points[left] - furthest, toward) / over >= radius[left]
-            near[left[missed]] = False
-            unsure = ~missed & (distance >= radius[left])
-            left, toward, at = left[unsure], toward[unsure], at[unsure]
-            if not len(left):
-                break
-            way = furthest[unsure] - at
-            square = np.einsum("ij,ij->i", way, way)
-            share = np.einsum("ij,ij->i", toward, way) / np.where(square > 0.0, square, 1.0)
-            at = at + np.clip(share, 0.0, 1.0)[:, None] * way
-        return np.asarray(near)
+        # within a sphere the norm changes by the radius times that of the steepest unit vector
+        form, level = self.quadric
+        steepest = np.sqrt(np.linalg.eigvalsh(form)[-1])
+        return np.asarray(near & (self.quadric.norm(points) < np.sqrt(level) + steepest * radius))
 
     def support(self, along: FloatArray) -> FloatArray:
         """
@@ -372,7 +348,7 @@ def image_of(body: Body, frame: FloatArray, size: str) -> Convex:
         form = inverse.T @ np.diag(body.form) @ inverse
         # scaled so that the isotropic part is 1 in any unit of length
         level = 3.0 / np.trace(form)
-        quadric = Quadric(1.0, level * form - np.eye(3), float(level))
+        quadric = Quadric(level * form, float(level))
     # not every body is symmetric, so the extents along -x, -y, -z are computed as well
     along = np.concatenate([np.eye(3), -np.eye(3)])
     ends = np.einsum("ij,ij->i", body.support(along @ frame) @ frame.T, along)

@@ -124,7 +124,7 @@ def sphere(radius: float, space: Space = SPACE) -> Convex:
     high = radius * np.diag(space.identity)
     frame = _frame("radius", [radius] * space.dimension, space.basis[: space.dimension], space)
     body = DISC if space.is_plane else BALL
-    quadric = Quadric(1.0, np.zeros((3, 3)), radius * radius)
+    quadric = Quadric(np.eye(3), radius * radius)
     return Convex(np.zeros((0, 4)), quadric, -high, high, radius, f"radius {radius:g}", body, frame)
 
 

@@ -23,7 +23,7 @@ from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import DirectionRule, design_of, usual_rule
 from scanfab.scan.edges import CLIP, ENDS, START
 from scanfab.scan.gaps import GapSums, scan_gaps
-from scanfab.scan.kernels.periodic import CellGrains
+from scanfab.scan.kernels.grid import CellGrains
 from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Inner, Solids, margin_of, most_lines
 from scanfab.scan.tallies import FollowedTooFarError

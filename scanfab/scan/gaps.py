@@ -22,7 +22,7 @@ from scanfab.scan.kernels.strips import Bins
 from scanfab.scan.kernels.sweep import TALLY_SIZE
 from scanfab.scan.lines import drawn_lines
 from scanfab.scan.scan import ScanSums, in_parts, sums_of
-from scanfab.scan.solids import Solids, check_space, check_spacing, shortest_gap
+from scanfab.scan.solids import Solids, check_lines, shortest_gap
 from scanfab.scan.tallies import MOST_STEPS, Following, tally_triads
 
 
@@ -118,8 +118,7 @@ def scan_gaps(
         lines through a periodic medium takes more steps than allowed, or if the axes do not lie in
         the plane of the solids.
     """
-    check_spacing(solids, spacing)
-    check_space(solids, rule)
+    check_lines(solids, rule, spacing)
     triads, offsets = drawn_lines(rule, seed, replicates)
     least = np.maximum(np.array(cutoffs, dtype=np.float64), shortest_gap(solids))
     following = Following(most_steps)

@@ -18,8 +18,6 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
-from scanfab.scan.kernels.strips import spans
-from scanfab.scan.solids import clip_of
 
 
 def line_triads(axes: FloatArray, space: Space = SPACE) -> FloatArray:
@@ -78,28 +76,16 @@ def turned_triads(
 
 
 def _random_turn(random: np.random.Generator, space: Space) -> FloatArray:
-    """A random rotation matrix; in a plane, a rotation about its normal."""
-    if not space.is_plane:
-        return _random_rotation(random)
-    angle = 2.0 * np.pi * random.random()
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    rotation = np.eye(3)
-    rotation[np.ix_(space.along, space.along)] = turn
-    return rotation
-
-
-def _random_rotation(random: np.random.Generator) -> FloatArray:
-    """A uniformly distributed rotation matrix, from a random unit quaternion."""
+    """A uniformly distributed rotation matrix; in a plane, a rotation about its normal."""
     # SciPy has this too, but importing it takes as long as a small table
-    quaternion = random.normal(size=4)
+    if space.is_plane:
+        half = np.pi * random.random()
+        quaternion = np.append(np.sin(half) * space.normal, np.cos(half))
+    else:
+        quaternion = random.normal(size=4)
     x, y, z, w = quaternion / np.linalg.norm(quaternion)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + 2.0 * (w * cross + cross @ cross))
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,10 +149,12 @@ def cut_lines(
     array([2., 2., 2.])
     """
     across, depth = position @ triad[:2].T, position @ triad[2]
-    ends, void, line = [np.zeros((0, 2, 3))], [np.zeros(0, bool)], [np.arange(0)]
-    clips = np.empty_like(points)
+    pieces, void, line = [np.zeros((0, 2, 3))], [np.zeros(0, bool)], [np.arange(0)]
     if window is not None:
-        spans(clip_of(window), np.ascontiguousarray(triad), np.ascontiguousarray(points), clips)
+        # along pieces of the lines from before the window to behind it
+        way = np.broadcast_to(2.0 * window.reach * triad[2], (len(points), 3))
+        ends = np.column_stack(window.cut(points @ triad[:2] - 0.5 * way, way))
+        clips = window.reach * (2.0 * ends - 1.0)
     for number, point in enumerate(points):
         square = radius**2 - np.sum((across - point) ** 2, axis=1)
         hit = square > 0
@@ -175,10 +163,10 @@ def cut_lines(
         bounds, is_void = _cut(depth[hit] - half, depth[hit] + half, clip)
         places = np.empty((*bounds.shape, 3))
         places[..., :2], places[..., 2] = point, bounds
-        ends.append(places @ triad)
+        pieces.append(places @ triad)
         void.append(is_void)
         line.append(np.full(len(bounds), first + number))
-    return Segments(np.concatenate(ends), np.concatenate(void), np.concatenate(line))
+    return Segments(np.concatenate(pieces), np.concatenate(void), np.concatenate(line))
 
 
 def _cut(
@@ -187,13 +175,13 @@ def _cut(
     """
     Solid and void pieces of one line, (K, 2) bounds and (K,) flags, from its chords.
 
-    ``clip`` holds where the line enters and leaves a window, NaN if it misses the window.
+    ``clip`` holds where the line enters and leaves a window; it leaves first if it misses it.
     """
     if clip is not None:
         # everything outside the window counts as solid
         start = np.concatenate([[-np.inf, clip[1]], start])
         stop = np.concatenate([[clip[0], np.inf], stop])
-    if len(start) == 0 or (clip is not None and np.isnan(clip[0])):
+    if len(start) == 0 or (clip is not None and clip[0] >= clip[1]):
         return np.zeros((0, 2)), np.zeros(0, bool)
     order = np.argsort(start)
     start, stop = start[order], np.maximum.accumulate(stop[order])

@@ -15,7 +15,7 @@ from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import CLIP
 from scanfab.scan.kernels import sweep
 from scanfab.scan.lines import drawn_lines
-from scanfab.scan.solids import Solids, check_space, check_spacing
+from scanfab.scan.solids import Solids, check_lines
 from scanfab.scan.tallies import MOST_STEPS, Following, tally_triads
 
 JOBS_A_THREAD, MOST_AXES = 4, 16
@@ -186,8 +186,7 @@ def scan_lines(
     >>> round(float(length.sum() / segments.sum()), 2)
     1.87
     """
-    check_spacing(solids, spacing)
-    check_space(solids, rule)
+    check_lines(solids, rule, spacing)
     triads, offsets = drawn_lines(rule, seed, replicates)
     following = Following(most_steps)
 
@@ -230,27 +229,20 @@ def in_parts(
 def sums_of(triads: FloatArray, tallies: FloatArray, variants: str, edge: str = CLIP) -> ScanSums:
     """Make the sums of replicates from line triads and tallies, shape (R, D, 2, TALLY_SIZE)."""
     wanted = np.array([variant in variants for variant in "abcd"])[:, None]
-    # replicate, set of solids, axis
-    entries = np.moveaxis(tallies, (3, 2), (0, 2))
-
-    def of(whole: int, window: int | None = None) -> FloatArray:
-        second = 0.0 * entries[0] if window is None else entries[window]
-        return np.where(wanted, np.concatenate([entries[whole], second], axis=1), 0.0)
-
-    def both(number: int) -> FloatArray:
-        return of(sweep.WHOLE + number, sweep.WINDOW + number)
-
-    segments = both(sweep.KEPT)
-    left = np.concatenate([0.0 * entries[0], entries[sweep.LEFT]], axis=1)
+    # whole or window, set of solids: the axes of a variant; before them the sum and the replicate
+    both = tallies[..., : sweep.CHORDS].reshape(*tallies.shape[:3], 2, -1).transpose(4, 0, 3, 2, 1)
+    variant = np.where(wanted, both.reshape(*both.shape[:2], 4, -1), 0.0)
+    length, kept, void, lines, line_length, astray = variant
+    in_window = np.array([[False], [False], [True], [True]])
     return ScanSums(
         axes=triads[:, :, 2],
-        length=both(sweep.LENGTH),
-        segments=segments.astype(np.int64) if edge == CLIP else segments,
-        lines=both(sweep.LINES).astype(np.int64),
-        void=both(sweep.VOID),
-        line_length=both(sweep.LINE_LENGTH),
-        chords=entries[sweep.CHORDS].sum(axis=(1, 2)).astype(np.int64),
-        channels=of(sweep.CHANNELS).astype(np.int64),
-        steps=entries[sweep.STEPS].sum(axis=(1, 2)).astype(np.int64),
-        left_out=np.where(wanted, left, 0.0),
+        length=length,
+        segments=kept.astype(np.int64) if edge == CLIP else kept,
+        lines=lines.astype(np.int64),
+        void=void,
+        line_length=line_length,
+        chords=tallies[..., sweep.CHORDS].sum(axis=(1, 2)).astype(np.int64),
+        channels=(astray * ~in_window).astype(np.int64),
+        steps=tallies[..., sweep.STEPS].sum(axis=(1, 2)).astype(np.int64),
+        left_out=astray * in_window,
     )

@@ -17,8 +17,7 @@ from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import CLIP
 from scanfab.scan.kernels.cells import Cells, fill_cells
-from scanfab.scan.kernels.grid import Bounds
-from scanfab.scan.kernels.periodic import CellGrains
+from scanfab.scan.kernels.grid import Bounds, CellGrains
 from scanfab.scan.kernels.strips import FAR, Clip
 
 # most lines of one axis and replicate: more would take minutes, even if they meet nothing
@@ -124,13 +123,14 @@ class Solids:
 
     @cached_property
     def bounds(self) -> Bounds:
-        """Bounds of all spheres."""
-        return _bounds(self.position, self.radius)
-
-    @cached_property
-    def bounds_left(self) -> Bounds:
-        """Bounds of the spheres that are not removed."""
-        return _bounds(self.position[~self.removed], self.radius[~self.removed])
+        """A box, and a ball about the origin, that hold all spheres."""
+        position, radius = self.position, self.radius
+        if not len(radius):
+            return Bounds(np.zeros(3), np.zeros(3), 0.0)
+        low = (position - radius[:, None]).min(axis=0)
+        high = (position + radius[:, None]).max(axis=0)
+        reach = float((np.sqrt(np.einsum("ij,ij->i", position, position)) + radius).max())
+        return Bounds(0.5 * (low + high), 0.5 * (high - low), reach)
 
     @cached_property
     def cells(self) -> Cells:
@@ -190,9 +190,8 @@ class Solids:
     @property
     def shadow(self) -> float:
         """Projected area of all spheres: Σ π r², or Σ 2 r for discs."""
-        power = self.space.dimension - 1
-        of_medium = 0.0 if self.medium is None else float(np.sum(self.medium.radius**power))
-        return self.space.unit_shadow * (float(np.sum(self.radius**power)) + of_medium)
+        of_medium = 0.0 if self.medium is None else self.space.shadow(self.medium.radius)
+        return self.space.shadow(self.radius) + of_medium
 
     def chords(self, spacing: float) -> float:
         """
@@ -213,10 +212,8 @@ class Solids:
 def clip_of(window: Convex | None) -> Clip:
     """The numbers of a window for kernels; without a window, nothing clips the lines."""
     if window is None:
-        return Clip(np.zeros((0, 4)), 1.0, np.zeros((3, 3)), 1.0, np.inf, np.inf)
-    isotropic, deviator, level = window.quadric
-    size = isotropic + float(np.abs(deviator).max())
-    return Clip(window.planes, isotropic, deviator, size, level, window.reach)
+        return Clip(np.zeros((0, 4)), np.eye(3), np.inf, np.inf)
+    return Clip(window.planes, *window.quadric, window.reach)
 
 
 def margin_of(grains: CellGrains) -> float:
@@ -239,21 +236,15 @@ def most_lines(solids: Solids, spacing: float) -> float:
         across = solids.medium.position - solids.medium.position.mean(axis=0)
         extent = float((np.linalg.norm(across, axis=1) + solids.medium.radius).max(initial=0.0))
         reach = max(reach, float(edges.max(initial=0.0)), extent if len(edges) < 3 else 0.0)
-    if len(solids.position):
-        reach = max(reach, float((np.linalg.norm(solids.position, axis=1) + solids.radius).max()))
-    return (2.0 * reach / spacing + 1.0) ** (solids.space.dimension - 1)
+    return (2.0 * max(reach, solids.bounds.reach) / spacing + 1.0) ** (solids.space.dimension - 1)
 
 
-def check_space(solids: Solids, rule: DirectionRule) -> None:
-    """Raise SettingsError if the axes do not lie in the plane of the solids."""
+def check_lines(solids: Solids, rule: DirectionRule, spacing: float) -> None:
+    """Raise SettingsError if lines lie in another plane, or are too many for a reasonable time."""
     if rule.space != solids.space:
         raise SettingsError(
             f"directions: the solids lie in {solids.space}, the axes of {rule.name} in {rule.space}"
         )
-
-
-def check_spacing(solids: Solids, spacing: float) -> None:
-    """Raise SettingsError if the lines are too many to be scanned in reasonable time."""
     if not spacing > 0.0:
         raise SettingsError(f"spacing: expected a length above 0, found {spacing:g}")
     lines = most_lines(solids, spacing)
@@ -309,29 +300,17 @@ def cells_of(grains: CellGrains, width: float) -> Cells:
     grain, image = np.empty(start[-1], np.int32), np.empty((start[-1], 3), np.int32)
     fill_cells(low, high, grains.periodic, parts, start[:-1].copy(), grain, image)
     sphere = np.column_stack([grains.position[grain] + image @ vectors, grains.radius[grain]])
-    farthest = [_farthest(grains, volume, solid) for solid in (slice(None), ~grains.removed)]
     return Cells(
         sphere, grains.removed[grain], vectors, inverse, corner, grains.periodic, parts, start,
-        *farthest,
+        _farthest(grains, volume),
     )  # fmt: skip
 
 
-def _farthest(grains: CellGrains, volume: float, solid: BoolArray | slice) -> float:
+def _farthest(grains: CellGrains, volume: float) -> float:
     """How far to follow a ray that meets nothing: FAR leaves an open sample."""
-    radius = grains.radius[solid]
-    if not len(radius):
-        return 0.0
     if not grains.periodic.any():
         return FAR
+    kept = grains.radius[~grains.removed]
+    shadow = np.pi * float(np.sum((kept if len(kept) else grains.radius) ** 2))
     periods = float(np.linalg.norm(grains.vectors[grains.periodic], axis=1).sum())
-    free_path = volume / (np.pi * float(np.sum(radius**2)))
-    return MOST_PERIODS * periods + MOST_FREE_PATHS * free_path
-
-
-def _bounds(position: FloatArray, radius: FloatArray) -> Bounds:
-    """A box, and a ball about the origin, that hold some spheres."""
-    if not len(radius):
-        return Bounds(np.zeros(3), np.zeros(3), 0.0)
-    low, high = (position - radius[:, None]).min(axis=0), (position + radius[:, None]).max(axis=0)
-    reach = float((np.sqrt(np.einsum("ij,ij->i", position, position)) + radius).max())
-    return Bounds(0.5 * (low + high), 0.5 * (high - low), reach)
+    return MOST_PERIODS * periods + MOST_FREE_PATHS * volume / shadow

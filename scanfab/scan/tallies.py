@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import threading
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +13,9 @@ from scanfab.base.jit import Flag
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.scan.edges import CLIP, ENDS
 from scanfab.scan.kernels import sweep
-from scanfab.scan.kernels.axes import Axes, Followed, scan_axes, scan_cell
+from scanfab.scan.kernels.axes import Axes, Followed, scan_axes
 from scanfab.scan.kernels.bins import OF_WHOLE, OF_WINDOW, no_bins
+from scanfab.scan.kernels.grid import CellGrains
 from scanfab.scan.kernels.strips import Bins, Counts, Edge
 from scanfab.scan.solids import Solids, clip_of, shortest_gap
 
@@ -26,6 +27,7 @@ FEW_LINES = 0.5
 NARROW = 0.3
 # a gap without length never counts
 SMALLEST = 5e-324
+NO_CELL = np.zeros((0, 3)), np.zeros(0, bool)
 # edge rules that follow no segment: clip and ends
 CLIPPED, WEIGHED = Edge(None, None, 0.0), Edge(True, None, 0.0)
 # most steps of following lines through a periodic medium: more would take minutes
@@ -36,6 +38,7 @@ class FollowedTooFarError(SettingsError):
     """Following the lines of a scan through a periodic medium takes more steps than allowed."""
 
 
+@dataclass
 class Following:
     """
     The steps that a scan has taken to follow lines, in all its threads together.
@@ -43,15 +46,14 @@ class Following:
     Whether they are too many does not depend on the threads, because steps are only ever added.
     """
 
-    def __init__(self, most: float) -> None:
-        self.most = most
-        self._taken = 0.0
-        self._lock = threading.Lock()
+    most: float
+    taken: list[float] = field(default_factory=list)
+    """Steps of each part of the scan; threads may append to a list without a lock."""
 
     @property
     def left(self) -> float:
         """Number of further steps that are allowed."""
-        return self.most - self._taken
+        return self.most - sum(self.taken, 0.0)
 
     def add(self, steps: float) -> None:
         """
@@ -62,9 +64,8 @@ class Following:
         FollowedTooFarError
             If the scan has taken too many steps.
         """
-        with self._lock:
-            self._taken += steps
-        if self._taken >= self.most:
+        self.taken.append(steps)
+        if self.left <= 0.0:
             raise FollowedTooFarError(
                 f"void segments that leave the cell are long: following them through its images "
                 f"takes more than {self.most:.2g} steps. Much of the cell is empty, or a variant "
@@ -111,7 +112,7 @@ def tally_triads(
         np.zeros((len(triads), 2, sweep.TALLY_SIZE)),
     )
     if solids.medium is not None and whole:
-        lines.scan_cell()
+        lines.scan(True, None, None, medium=solids.medium)
         whole = False
     if solids.edge == CLIP and whole and window:
         lines.scan(True, CLIPPED, solids.window)
@@ -120,6 +121,7 @@ def tally_triads(
             lines.scan_whole(quick)
         if window:
             lines.scan_window()
+    lines.following.add(float(lines.tallies[:, 0, sweep.STEPS].sum()))
     if first:
         return lines.tallies
     # without a or c, the solids of b and d are the only ones
@@ -148,26 +150,6 @@ class _Lines(NamedTuple):
         few = squares < FEW_LINES * variants * self.axes.spacing * np.sum(radius)
         return True if few and not self.bins.cutoffs.size else None
 
-    def scan_cell(self) -> None:
-        """Scan the whole of a periodic packing, which has no edge."""
-        solids = self.solids
-        assert solids.medium is not None
-        medium = solids.medium
-        if not self.first:
-            solid = ~medium.removed
-            medium = medium._replace(
-                position=medium.position[solid],
-                radius=medium.radius[solid],
-                removed=medium.removed[solid],
-            )
-        if not len(medium.radius):
-            return
-        counts = Counts(self.cutoff, self.both, True, None, None)
-        listed = self.listed(medium.radius, 1 + bool(self.both))
-        followed = Followed(solids.medium_cells, not self.first, self.following.left)
-        scan_cell(medium, self.axes, counts, listed, self.bins, followed, self.tallies)
-        self.following.add(float(self.tallies[:, 0, sweep.STEPS].sum()))
-
     def scan(
         self,
         whole: Flag,
@@ -175,6 +157,7 @@ class _Lines(NamedTuple):
         window: Convex | None,
         center: FloatArray | None = None,
         near: BoolArray | None = None,
+        medium: CellGrains | None = None,
     ) -> None:
         """
         Sweep the lines through a window about a centre once; without a window all lines.
@@ -182,31 +165,36 @@ class _Lines(NamedTuple):
         If some spheres are ``near``, only these are scanned.
         """
         solids, both = self.solids, bool(self.both)
+        grains = medium or CellGrains(solids.position, solids.radius, solids.removed, *NO_CELL)
         # a mask of all spheres would copy them
-        solid = slice(None) if self.first else ~solids.removed
+        solid = slice(None) if self.first else ~grains.removed
         if near is not None:
-            solid = near & (self.first | ~solids.removed)
-        position = np.ascontiguousarray(solids.position[solid])
-        radius = np.ascontiguousarray(solids.radius[solid])
+            solid = near & (self.first | ~grains.removed)
+        grains = grains._replace(
+            position=np.ascontiguousarray(grains.position[solid]),
+            radius=np.ascontiguousarray(grains.radius[solid]),
+            removed=grains.removed[solid],
+        )
+        if medium is not None and not len(grains.radius):
+            return
         if center is not None:
-            position = position - center
-        followed, before = None, float(self.tallies[:, 0, sweep.STEPS].sum())
-        if edge is not None and edge.start is not None:
-            followed = Followed(solids.cells, not self.first, self.following.left)
+            grains = grains._replace(position=grains.position - center)
+        cells = None
+        if medium is not None:
+            cells = solids.medium_cells
+        elif edge is not None and edge.start is not None:
+            cells = solids.cells
         scan_axes(
-            position,
-            radius,
-            solids.removed[solid],
-            solids.bounds if self.first else solids.bounds_left,
+            grains,
+            solids.bounds if medium is None else None,
             self.axes,
             clip_of(window),
             Counts(self.cutoff, self.both, whole, edge, None),
-            self.listed(radius, (1 + both) * ((whole is not None) + (edge is not None))),
+            self.listed(grains.radius, (1 + both) * ((whole is not None) + (edge is not None))),
             self.bins,
-            followed,
+            None if cells is None else Followed(cells, not self.first, self.following.left),
             self.tallies,
         )
-        self.following.add(float(self.tallies[:, 0, sweep.STEPS].sum()) - before)
 
     def scan_whole(self, quick: bool) -> None:
         """

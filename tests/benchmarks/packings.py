@@ -14,7 +14,7 @@ import numpy as np
 import scanfab
 from scanfab.base.convex import Convex
 from scanfab.scan.edges import START
-from scanfab.scan.kernels.periodic import CellGrains
+from scanfab.scan.kernels.grid import CellGrains
 from scanfab.scan.solids import Solids, margin_of
 
 PAPER = 13_723

@@ -114,8 +114,7 @@ def within(window, feet, direction):
     if not isinstance(window, Convex):
         half = np.sqrt(np.maximum(window**2 - np.sum(feet**2, axis=-1), 0.0))
         return -half, half
-    isotropic, deviator, level = window.quadric
-    matrix = isotropic * np.eye(3) + deviator
+    matrix, level = window.quadric
 
     def rise(t):
         places = feet + t * direction

@@ -24,7 +24,7 @@ def cut_ball(radius, normal, distance):
     over = np.maximum(points @ normal - distance, 0.0)
     planes = np.append(normal, distance)[None]
     body = Body(points - np.outer(over, normal), planes, np.nan)
-    quadric, half = Quadric(1.0, np.zeros((3, 3)), radius**2), np.full(3, float(radius))
+    quadric, half = Quadric(np.eye(3), radius**2), np.full(3, float(radius))
     return Convex(planes, quadric, -half, half, float(radius), "cut ball", body, np.eye(3))
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scanfab import Cell, Packing, ScanfabWarning, Solids, compute, direction_rule, scan_lines
-from scanfab.scan.kernels.periodic import CellGrains
+from scanfab.scan.kernels.grid import CellGrains
 from tests.helpers import naive
 from tests.helpers.lattices import rotation, unit_vectors
 from tests.helpers.scanning import ratio

@@ -119,8 +119,7 @@ def test_that_of_a_stretched_and_turned_ball_is_stretched_and_turned_likewise():
     points, turn = ball_points(random, 20_000, 10.0), rotation(random)
     stretched = points * [1.0, 1.5, 0.7] @ turn
     found = inner_ellipsoid(stretched, 0.0)
-    isotropic, deviator, level = found.shape.quadric
-    form = (isotropic * np.eye(3) + deviator) / level
+    form = found.shape.quadric.form / found.shape.quadric.level
     half = np.linalg.eigvalsh(form)[::-1] ** -0.5
     assert half == pytest.approx([7.0, 10.0, 15.0], rel=0.05)
     assert np.abs(turn @ form @ turn.T - np.diag(np.diag(turn @ form @ turn.T))).max() < 2e-4
@@ -132,8 +131,7 @@ def test_it_touches_the_hull_moved_inwards_by_the_largest_radius():
     random = np.random.default_rng(1)
     points = ball_points(random, 300, 5.0) * [1.0, 1.2, 0.8]
     found = inner_ellipsoid(points, 0.6)
-    isotropic, deviator, level = found.shape.quadric
-    inverse = level * np.linalg.inv(isotropic * np.eye(3) + deviator)
+    inverse = found.shape.quadric.level * np.linalg.inv(found.shape.quadric.form)
     facets = ConvexHull(points - found.center).equations
     # how far the ellipsoid reaches along each normal
     reach = np.sqrt(np.einsum("fi,ij,fj->f", facets[:, :3], inverse, facets[:, :3]))

@@ -11,7 +11,7 @@ from scanfab.base.convex import Convex
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.edges import EDGES
 from scanfab.scan.gaps import scan_gaps
-from scanfab.scan.kernels.periodic import CellGrains
+from scanfab.scan.kernels.grid import CellGrains
 from scanfab.scan.lines import line_triads
 from scanfab.scan.solids import shortest_gap
 from tests.helpers import naive

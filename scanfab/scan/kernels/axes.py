@@ -7,11 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from scanfab.base.jit import LANES, ZERO, Flag, kernel, part
-from scanfab.base.typing import BoolArray, FloatArray, IntArray
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.bins import bins_along
 from scanfab.scan.kernels.cells import Cells
 from scanfab.scan.kernels.grid import (
     Bounds,
+    CellGrains,
     Grid,
     Spheres,
     open_grid,
@@ -22,7 +23,6 @@ from scanfab.scan.kernels.grid import (
     strip_of,
 )
 from scanfab.scan.kernels.lists import (
-    LISTED_LINES,
     Lists,
     bin_last_gaps,
     bin_lists,
@@ -30,7 +30,7 @@ from scanfab.scan.kernels.lists import (
     room_for_lists,
     sweep_lists,
 )
-from scanfab.scan.kernels.periodic import CellGrains, cell_grid, foot_of
+from scanfab.scan.kernels.periodic import cell_grid, foot_of
 from scanfab.scan.kernels.resolve import Beyond, follow_beyond, follow_measured, solve_closed
 from scanfab.scan.kernels.strips import (
     MOST_LINES,
@@ -71,32 +71,16 @@ class Followed(NamedTuple):
 
 
 @part()
-def visit_all(task: Task, spheres: Spheres, chosen: IntArray, reach: float) -> None:
+def sweep_strip(
+    task: Task, spheres: Spheres, met: IntArray, reach: float, listed: Flag, lists: Lists
+) -> None:
     """
-    Visit the chosen spheres.
+    Let the lines of a strip meet the chords of spheres.
 
     ``reach`` is the radius of the ball that holds the window. Spheres beside it meet no line that
     meets the window.
     """
-    counts = task.counts
-    for k in chosen:
-        sphere = sphere_at(spheres, k)
-        kept = np.nan if spheres.removed[k] else NOTHING
-        if counts.whole is not None and counts.window is not None:
-            away = reach + sphere.radius
-            if sphere.u * sphere.u + sphere.v * sphere.v > away * away:
-                aside = Counts(counts.least, counts.second, True, None, None)
-                visit(Task(task.lines, task.strip, aside, task.tally, task.bins), sphere, kept)
-                continue
-        visit(task, sphere, kept)
-
-
-@part()
-def sweep_strip(
-    task: Task, spheres: Spheres, met: IntArray, reach: float, listed: Flag, lists: Lists
-) -> None:
-    """Let the lines of a strip meet the chords of spheres."""
-    done = ZERO
+    done, counts = ZERO, task.counts
     if listed is not None:
         while done < met.size:
             done = list_chords(lists, task.strip, spheres, met, done)
@@ -106,7 +90,16 @@ def sweep_strip(
             done = list_chords(lists, task.strip, spheres, met, done)
             bin_lists(task, lists)
     else:
-        visit_all(task, spheres, met, reach)
+        for k in met:
+            sphere = sphere_at(spheres, k)
+            kept = np.nan if spheres.removed[k] else NOTHING
+            if counts.whole is not None and counts.window is not None:
+                away = reach + sphere.radius
+                if sphere.u * sphere.u + sphere.v * sphere.v > away * away:
+                    aside = Counts(counts.least, counts.second, True, None, None)
+                    visit(Task(task.lines, task.strip, aside, task.tally, task.bins), sphere, kept)
+                    continue
+            visit(task, sphere, kept)
 
 
 @part()
@@ -125,10 +118,9 @@ def scan_strips(
 ) -> None:
     """Scan a grid strip by strip, so that the lines' state stays in cache."""
     in_bins = bins.cutoffs.size > 0
-    most = LISTED_LINES if listed is not None or in_bins else MOST_LINES
     # a row of lines has to fit a strip
-    columns = min(max(grid.columns, 1), most - LANES)
-    rows = most // (columns + LANES)
+    columns = min(max(grid.columns, 1), MOST_LINES - LANES)
+    rows = MOST_LINES // (columns + LANES)
     start, chosen = sort_into_strips(spheres, grid, rows)
     for column in range(0, grid.columns, columns):
         for number in range(start.size - 1):
@@ -149,10 +141,8 @@ def scan_strips(
 
 @kernel
 def scan_axes(
-    position: FloatArray,
-    radius: FloatArray,
-    removed: BoolArray,
-    extent: Bounds,
+    grains: CellGrains,
+    extent: Bounds | None,
     axes: Axes,
     clip: Clip,
     counts: Counts,
@@ -166,14 +156,13 @@ def scan_axes(
 
     Parameters
     ----------
-    position, radius : shapes (N, 3), (N,)
+    grains : CellGrains
         Spheres; the window's centre is the origin.
-    removed : shape (N,)
-        Spheres that are not solid in the second set of solids.
-    extent : Bounds
-        Bounds of the spheres.
+    extent : Bounds or None
+        Bounds of the spheres; None for the whole of a periodic medium, which has no edge.
     axes : Axes
-        The axes and the lines along them.
+        The axes and the lines along them; in a periodic medium only the last row of each triad
+        counts.
     clip : Clip
         The window.
     counts : Counts
@@ -191,64 +180,46 @@ def scan_axes(
     lines = np.empty(STATE_SIZE)
     lists = room_for_lists(listed is not None or bins.cutoffs.size > 0)
     # kept from axis to axis: to get the pages of large arrays anew takes long
-    room = room_to_project(radius.size)
+    room = room_to_project(ZERO if extent is None else grains.radius.size)
     left = np.inf if followed is None else followed.most_steps
     for axis in range(axes.triads.shape[0]):
         if left <= 0.0:
             return
         triad, offset, tally = axes.triads[axis], axes.offsets[axis], tallies[axis]
-        whole = counts.whole is not None
-        grid = open_grid(extent, triad, offset, axes.spacing, clip.reach, whole)
-        reach, margin = np.inf, 0.0
-        if counts.window is not None and counts.window.start is not None:
-            # other spheres change no line
-            reach, margin = clip.reach, counts.window.margin
-        spheres = project(position, radius, removed, triad, grid, reach, margin, room)
-        section = section_along(clip, triad)
-        here = bins_along(bins, triad, axis)
         beyond = None
-        if followed is not None:
-            beyond = Beyond(followed.cells, triad, followed.without_removed, left, False)
-        scan_strips(
-            lines, spheres, grid, section, clip.reach, tally, counts, listed, lists, here, beyond
-        )
-        left -= tally[0, STEPS]
-
-
-@kernel
-def scan_cell(
-    grains: CellGrains,
-    axes: Axes,
-    counts: Counts,
-    listed: Flag,
-    bins: Bins,
-    followed: Followed,
-    tallies: FloatArray,
-) -> None:
-    """
-    Scan the whole of a periodic medium, which has no edge, along several directions.
-
-    Only the last row of each triad is used. The other parameters are those of :func:`scan_axes`.
-    """
-    lines = np.empty(STATE_SIZE)
-    lists = room_for_lists(listed is not None or bins.cutoffs.size > 0)
-    left = followed.most_steps
-    for axis in range(axes.triads.shape[0]):
-        if left <= 0.0:
-            return
-        normal, offset, tally = axes.triads[axis, 2], axes.offsets[axis], tallies[axis]
-        prism, spheres, grid, measured = cell_grid(grains, normal, offset, axes.spacing)
-        section, triad = foot_of(prism), prism.triad
+        if extent is not None:
+            whole, reach, margin = counts.whole is not None, np.inf, 0.0
+            grid = open_grid(extent, triad, offset, axes.spacing, clip.reach, whole)
+            if counts.window is not None and counts.window.start is not None:
+                # other spheres change no line
+                reach, margin = clip.reach, counts.window.margin
+            spheres = project(grains, triad, grid, reach, margin, room)
+            section = section_along(clip, triad)
+            if followed is not None:
+                beyond = Beyond(followed.cells, triad, followed.without_removed, left, False)
+        else:
+            prism, spheres, grid, measured = cell_grid(grains, triad[2], offset, axes.spacing)
+            section, triad = foot_of(prism), prism.triad
         here = bins_along(bins, triad, axis)
-        # along an axis that is not periodic a line runs from the first solid to the last
-        if grains.periodic[prism.third]:
-            counted = Counts(counts.least, counts.second, True, None, measured)
-            beyond = Beyond(followed.cells, triad, followed.without_removed, left, prism.endless)
+        if extent is None and followed is not None and grains.periodic[prism.third]:
+            within = Counts(counts.least, counts.second, True, None, measured)
+            images = Beyond(followed.cells, triad, followed.without_removed, left, prism.endless)
             scan_strips(
-                lines, spheres, grid, section, 0.0, tally, counted, listed, lists, here, beyond
+                lines, spheres, grid, section, 0.0, tally, within, listed, lists, here, images
             )
         else:
+            # along an axis that is not periodic a line runs from the first solid to the last
             scan_strips(
-                lines, spheres, grid, section, 0.0, tally, counts, listed, lists, here, None
+                lines,
+                spheres,
+                grid,
+                section,
+                clip.reach,
+                tally,
+                counts,
+                listed,
+                lists,
+                here,
+                beyond,
             )
         left -= tally[0, STEPS]

@@ -152,6 +152,18 @@ def strip_of(grid: Grid, row: int, rows: int, column: int, columns: int) -> Stri
     )
 
 
+class CellGrains(NamedTuple):
+    """Grains of a periodic medium, each once."""
+
+    position: FloatArray
+    """Shape (N, 3)."""
+    radius: FloatArray
+    removed: BoolArray
+    vectors: FloatArray
+    """Edges of the cell as rows; for discs the last one is normal to the plane and not periodic."""
+    periodic: BoolArray
+
+
 class Spheres(NamedTuple):
     """Projected spheres, ordered by depth; some are not in the second set of solids."""
 
@@ -165,13 +177,9 @@ class Spheres(NamedTuple):
 @part()
 def room_for_spheres(count: int) -> Spheres:
     """So many spheres, to be filled in."""
-    return Spheres(
-        np.empty(count),
-        np.empty(count),
-        np.empty(count),
-        np.empty(count),
-        np.empty(count, np.bool_),
-    )
+    # rows a power of two apart would evict one another from the processor's first cache
+    rows, removed = np.empty((4, count + 24)), np.empty(count, np.bool_)
+    return Spheres(rows[0], rows[1], rows[2], rows[3], removed)
 
 
 @inner(inline="always")
@@ -200,9 +208,7 @@ def room_to_project(count: int) -> Room:
 
 @inner(error_model="numpy")
 def project(
-    position: FloatArray,
-    radius: FloatArray,
-    removed: BoolArray,
+    grains: CellGrains,
     triad: FloatArray,
     grid: Grid,
     reach: float,
@@ -215,6 +221,7 @@ def project(
     Spheres that lie aside of a ball about the origin are left out, and so are those that lie more
     than the margin before or behind it. The result lies in the room.
     """
+    position, radius, removed = grains.position, grains.radius, grains.removed
     u_x, u_y, u_z = triad[0, 0], triad[0, 1], triad[0, 2]
     v_x, v_y, v_z = triad[1, 0], triad[1, 1], triad[1, 2]
     n_x, n_y, n_z = triad[2, 0], triad[2, 1], triad[2, 2]

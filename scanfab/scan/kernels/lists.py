@@ -26,6 +26,7 @@ from scanfab.scan.kernels.strips import (
     FAR,
     GAP_END,
     GAP_START,
+    MOST_LINES,
     SET,
     Line,
     Strip,
@@ -53,9 +54,6 @@ ROOM = 64
 NEXT = 2 * ABREAST
 TILE = ROOM * NEXT
 SECOND_HALF = TILE // 2
-# Samples of ten thousand grains mostly have one strip. Smaller strips, whose lists fit the second
-# cache, would cost more for sorting spheres than they save.
-LISTED_LINES = 16_384
 # above 0, but its square root is too small to matter
 LEAST_REACH2 = 1e-300
 # gaps that are put in bins together
@@ -78,13 +76,13 @@ class Lists(NamedTuple):
     The square is negative if the sphere is not in the second set of solids.
     """
     stop: IntArray
-    """Place behind the last chord of each line, shape (LISTED_LINES,)."""
+    """Place behind the last chord of each line, shape (MOST_LINES,)."""
 
 
 @part()
 def room_for_lists(wanted: bool) -> Lists:
     """Empty lists; arrays without entries if none are wanted."""
-    count = LISTED_LINES if wanted else 0
+    count = MOST_LINES if wanted else 0
     lists = Lists(np.empty(count // ABREAST * TILE), np.empty(count, np.int64))
     for line in range(count):
         lists.stop[line] = first_place(line)

@@ -16,23 +16,18 @@ import numpy as np
 
 from scanfab.base.jit import ZERO, inner, part
 from scanfab.base.typing import BoolArray, FloatArray
-from scanfab.scan.kernels.grid import Grid, Spheres, in_order, room_to_project, sheared_grid
+from scanfab.scan.kernels.grid import (
+    CellGrains,
+    Grid,
+    Spheres,
+    in_order,
+    room_to_project,
+    sheared_grid,
+)
 from scanfab.scan.kernels.strips import Measured, Section, dot
 
 # solids are listed up to so many mean radii beyond the prism; longer gaps are followed one by one
 BEYOND = 16.0
-
-
-class CellGrains(NamedTuple):
-    """Grains of a periodic medium, each once."""
-
-    position: FloatArray
-    """Shape (N, 3)."""
-    radius: FloatArray
-    removed: BoolArray
-    vectors: FloatArray
-    """Edges of the cell as rows; for discs the last one is normal to the plane and not periodic."""
-    periodic: BoolArray
 
 
 class Prism(NamedTuple):
@@ -105,8 +100,12 @@ def prism_along(
 
 
 @inner(error_model="numpy")
-def shifts(position: float, reach: float, low: float, high: float, step: float) -> tuple[int, int]:
-    """The range of whole numbers k with position + k * step within reach of low to high."""
+def shifts(
+    repeats: bool, position: float, reach: float, low: float, high: float, step: float
+) -> tuple[int, int]:
+    """The range of whole k with position + k * step within reach of low to high; only 0 if none."""
+    if not repeats:
+        return 0, 1
     per_step = 1.0 / step
     return (
         int(np.ceil((low - reach - position) * per_step)),
@@ -146,23 +145,17 @@ def fill_images(
         u0, v0 = u_x * x + u_y * y + u_z * z, v_x * x + v_y * y + v_z * z
         n0 = n_x * x + n_y * y + n_z * z
         height = (n0 - prism.rise_u * u0 - prism.rise_v * v0) / prism.length
-        layer = 0, 1
-        if layers:
-            layer = shifts(height, r * prism.slope, 0.0, 1.0 + beyond, 1.0)
+        layer = shifts(layers, height, r * prism.slope, 0.0, 1.0 + beyond, 1.0)
         for i in range(layer[0], layer[1]):
             k = i * step
             u1, v1, n1 = u0 + k * c_u, v0 + k * c_v, n0 + k * c_n
-            over = 0, 1
-            if rows:
-                over = shifts(v1, r, 0.0, prism.base_v, prism.base_v)
+            over = shifts(rows, v1, r, 0.0, prism.base_v, prism.base_v)
             for j in range(over[0], over[1]):
                 u2, v2, n2 = u1 + j * prism.skew_u, v1 + j * prism.base_v, n1 + j * along_b
                 aside = u2 - skew * v2
                 low_v, high_v = min(low_v, v2 - r), max(high_v, v2 + r)
                 low_u, high_u = min(low_u, aside - r * wide), max(high_u, aside + r * wide)
-                across = 0, 1
-                if columns:
-                    across = shifts(aside, r * wide, 0.0, prism.base_u, prism.base_u)
+                across = shifts(columns, aside, r * wide, 0.0, prism.base_u, prism.base_u)
                 for q in range(across[0], across[1]):
                     if count < room:
                         spheres.u[count] = u2 + q * prism.base_u

@@ -33,8 +33,7 @@ from scanfab.scan.kernels.strips import (
     span,
 )
 from scanfab.scan.kernels.sweep import (
-    CHANNELS,
-    LEFT,
+    ASTRAY,
     LENGTH,
     STEPS,
     VOID,
@@ -218,7 +217,7 @@ def followed(
 def add_followed(task: Task, which: int, line: Line, low: float, high: float, sign: float) -> None:
     """Count a segment, with sign -1 remove it; a segment without an end is counted as left out."""
     if high - low > 0.5 * FAR:
-        task.tally[which, LEFT] += 0.5
+        task.tally[which, WINDOW + ASTRAY] += 0.5
         return
     ends, void = np.empty((2, 1)), task.tally[which, WINDOW + VOID]
     ends[0, 0], ends[1, 0] = low, high
@@ -247,7 +246,7 @@ def follow_measured(task: Task, which: int, measured: Measured, beyond: Beyond) 
             far, steps = followed(line, beyond, which, ray, end, 1.0)
             tally[0, STEPS] += steps
             if far == FAR and beyond.endless:
-                tally[which, CHANNELS] += 1.0
+                tally[which, WHOLE + ASTRAY] += 1.0
                 tally[which, WHOLE + VOID] += enters + measured.length - end
             elif far < FAR and not is_empty:
                 add_followed(task, which, line, end, end + far, 1.0)

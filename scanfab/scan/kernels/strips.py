@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.jit import LANES, Flag, inner, kernel, part
+from scanfab.base.jit import Flag, inner, part
 from scanfab.base.typing import FloatArray, IntArray
 
 # place of a line along u and v, and the depths at which it enters and leaves the window
@@ -22,7 +22,7 @@ Line = tuple[float, float, float, float]
 FAR = 1e300
 # The state of a strip's lines fits a core's cache. Its planes lie at a fixed distance, so that the
 # compiler sees that they do not overlap.
-MOST_LINES = 24_576
+MOST_LINES = 16_384
 PLANE = np.uint64(MOST_LINES + 24)
 # First places of the planes. END, GAP_START and GAP_END are the running end and the last gap; SET
 # places behind them are those of the second set of solids. ENTRY is where the line enters the
@@ -84,10 +84,7 @@ class Clip(NamedTuple):
 
     planes: FloatArray
     """Shape (P, 4)."""
-    isotropic: float
-    deviator: FloatArray
-    size: float
-    """Size of the quadric: no element of its matrix is larger."""
+    form: FloatArray
     level: float
     reach: float
 
@@ -224,17 +221,17 @@ def section_along(clip: Clip, triad: FloatArray) -> Section:
     """
     The section of a window for lines along the third row of a triad (rows u, v, n).
 
-    On a line the quadric x·(m I + D) x = L is a quadratic equation in the depth t. With q the
-    matrix in the triad,
+    On a line the quadric x·Q x = L is a quadratic equation in the depth t. With q the matrix Q in
+    the triad,
 
         t = -(q_un u + q_vn v) / q_nn ± √(L / q_nn - a u² - 2 b u v - c v²),
 
-    where a = q_uu / q_nn - (q_un / q_nn)², and b, c likewise. m I is the same in every triad.
+    where a = q_uu / q_nn - (q_un / q_nn)², and b, c likewise.
     """
     u, v, n = triad[0], triad[1], triad[2]
-    m, deviator = clip.isotropic, clip.deviator
-    along, lean_u, lean_v = m + form(deviator, n, n), form(deviator, u, n), form(deviator, v, n)
-    flat = FLAT * clip.size + LEAST
+    q = clip.form
+    along, lean_u, lean_v = form(q, n, n), form(q, u, n), form(q, v, n)
+    flat = FLAT * (q[0, 0] + q[1, 1] + q[2, 2]) + LEAST
     if along < flat:
         along, lean_u, lean_v = flat, 0.0, 0.0
     lean_u, lean_v = lean_u / along, lean_v / along
@@ -248,9 +245,9 @@ def section_along(clip: Clip, triad: FloatArray) -> Section:
     return Section(
         planes,
         clip.level / along,
-        (m + form(deviator, u, u)) / along - lean_u * lean_u,
-        form(deviator, u, v) / along - lean_u * lean_v,
-        (m + form(deviator, v, v)) / along - lean_v * lean_v,
+        form(q, u, u) / along - lean_u * lean_u,
+        form(q, u, v) / along - lean_u * lean_v,
+        form(q, v, v) / along - lean_v * lean_v,
         -lean_u,
         -lean_v,
     )
@@ -334,22 +331,6 @@ def set_off(
         lines[i + END] = -FAR if is_line else np.nan
     else:
         lines[i + END] = enters
-
-
-@kernel
-def spans(clip: Clip, triad: FloatArray, points: FloatArray, ends: FloatArray) -> None:
-    """
-    Find where a few lines enter and leave a window; NaN if they miss it.
-
-    The lines run along the third row of a triad, through ``points`` along its other rows, shape
-    (L, 2). The result goes into ``ends``, of the same shape.
-    """
-    section, lines = section_along(clip, triad), np.empty(STATE_SIZE)
-    for k in range(points.shape[0]):
-        low, high = np.zeros(1, np.int64), np.ones(1, np.int64)
-        strip = Strip(1.0, 1.0, points[k, 0], points[k, 1], 1, 1, 1 + LANES, low, high)
-        begin(lines, strip, section, Counts(0.0, None, None, None, None))
-        ends[k, 0], ends[k, 1] = lines[ENTRY], lines[EXIT]
 
 
 @inner(inline="always")

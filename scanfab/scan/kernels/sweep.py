@@ -69,11 +69,11 @@ Sums = tuple[float, float, float, float, float, float]
 
 # Adding -0 changes no number, not even -0 itself, so the compiler drops the addition.
 NOTHING = -0.0
-# Entries of a tally: five sums of the whole and, behind them, of the window; then the chords of all
-# solids, the lines that stay in a channel of a periodic medium, the steps of following lines, and
-# the number of segments that leave the sample.
-LENGTH, KEPT, VOID, LINES, LINE_LENGTH = range(5)
-WHOLE, WINDOW, CHORDS, CHANNELS, STEPS, LEFT = 0, 5, 10, 11, 12, 13
+# Entries of a tally: six sums of the whole and, behind them, of the window; then the chords of all
+# solids, and the steps of following lines. ASTRAY counts lines of the whole that stay in a channel
+# of a periodic medium, and segments of the window that leave the sample.
+LENGTH, KEPT, VOID, LINES, LINE_LENGTH, ASTRAY = range(6)
+WHOLE, WINDOW, CHORDS, STEPS = 0, 6, 12, 13
 TALLY_SIZE = 14
 # Segments that reach this fraction of the margin are followed: rounding at its end has no effect.
 NEARLY = 1.0 - 1e-6
@@ -348,7 +348,7 @@ def settle(task: Task, which: int) -> float:
     """
     lines, strip, tally = task.lines, task.strip, task.tally
     counts = task.counts
-    a = b = c = d = e = f = 0.0
+    sums = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     met = length = closed = 0.0
     crossing = np.int64(0)
     state = SET * np.uint64(which)
@@ -358,14 +358,13 @@ def settle(task: Task, which: int) -> float:
         enters, leaves = lines[i + ENTRY], lines[i + EXIT]
         closed += 1.0 if end == FAR else 0.0
         if counts.window is not None and counts.window.start is not None:
-            sums = settled_gap(end < FAR, low, high, lines[k + BEFORE], counts)
+            last = settled_gap(end < FAR, low, high, lines[k + BEFORE], counts)
         else:
-            sums = counted(end < FAR, low, high, enters, leaves, counts)
-        a, b, c = a + sums[0], b + sums[1], c + sums[2]
-        d, e, f = d + sums[3], e + sums[4], f + sums[5]
+            last = counted(end < FAR, low, high, enters, leaves, counts)
+        sums = both(sums, last)
         if counts.window is not None:
             behind = last_gap(lines, k, enters, leaves, counts, counts.window)
-            d, e, f = d + behind[0], e + behind[1], f + behind[2]
+            sums = both(sums, (0.0, 0.0, 0.0, behind[0], behind[1], behind[2]))
             crosses = leaves > enters
             if counts.whole is None and counts.window.start is None:
                 # in a window without an end a line has to meet a solid
@@ -376,7 +375,7 @@ def settle(task: Task, which: int) -> float:
             met += 1.0 if end > -FAR else 0.0
             if counts.measured is not None:
                 crossing += np.int64(enters < FAR)
-    add(tally, which, (a, b, c, d, e, f))
+    add(tally, which, sums)
     if counts.whole is not None:
         tally[which, WHOLE + LINES] += met
     if counts.measured is not None:

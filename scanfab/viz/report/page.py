@@ -124,8 +124,7 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
 
 def _window_data(window: Convex, turn: FloatArray, scale: float) -> dict[str, Any]:
     """Planes [x, y, z, distance], quadric (xx yy zz xy xz yz) and level, as the viewer has them."""
-    isotropic, deviator, level = window.quadric
-    form = isotropic * np.eye(3) + turn @ deviator @ turn.T
+    form, level = turn @ window.quadric.form @ turn.T, window.quadric.level
     planes = np.column_stack([window.planes[:, :3] @ turn.T, window.planes[:, 3] * scale])
     parts = form[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     return {

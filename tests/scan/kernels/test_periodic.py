@@ -6,7 +6,7 @@ import pytest
 from scanfab import Solids
 from scanfab.base.jit import kernel
 from scanfab.scan.kernels import periodic, sweep
-from scanfab.scan.kernels.periodic import CellGrains
+from scanfab.scan.kernels.grid import CellGrains
 from scanfab.scan.tallies import FollowedTooFarError, Following, tally_triads
 from tests.helpers import naive
 from tests.helpers.lattices import simple_cubic, unit_vectors
@@ -152,8 +152,10 @@ def test_simple_cubic_along_an_edge():
         height = min(0.4, (1 - cutoff) / 2)
         mean = tally[sweep.LENGTH] / tally[sweep.KEPT]
         assert mean == pytest.approx(1 - 4 / 3 * height, rel=2e-3)
-        lines = tally[sweep.LINES] + tally[sweep.CHANNELS]
-        assert tally[sweep.CHANNELS] / lines == pytest.approx(1 - np.pi * 0.4**2, rel=5e-3)
+        lines = tally[sweep.LINES] + tally[sweep.WHOLE + sweep.ASTRAY]
+        assert tally[sweep.WHOLE + sweep.ASTRAY] / lines == pytest.approx(
+            1 - np.pi * 0.4**2, rel=5e-3
+        )
 
 
 def test_grain_that_fills_its_cell_leaves_no_gap():
@@ -190,7 +192,7 @@ def test_without_solids_all_lines_are_channels(corner):
     tally = tallies_of(none, np.array([0.48, 0.6, 0.64]), np.array([0.3, 0.4]), 0.5, 0.0)[1]
     assert tally[sweep.LINES] == tally[sweep.KEPT] == 0
     assert tally[sweep.VOID] == pytest.approx(tally[sweep.LINE_LENGTH])
-    assert tally[sweep.CHANNELS] > 1000
+    assert tally[sweep.WHOLE + sweep.ASTRAY] > 1000
 
 
 def test_without_overlap_the_mean_gap_is_that_of_stereology():
