@@ -81,7 +81,7 @@ def write_table(
                 told=ctx.obj,
                 executor=executor,
             )
-            stack.enter_context(job.begun(drawing.needed))
+            stack.enter_context(job.begun())
         for one in series:
             if isinstance(one, FollowedSeries):
                 stack.enter_context(ending_in_order(one.end))
@@ -122,8 +122,6 @@ class _Drawing:
         if outputs.figure is not None:
             figures = [find_figure(outputs.figure, *kinds)[0]]
             self.kind = figures[0].kind
-        self.needed = tuple(dict.fromkeys(name for figure in figures for name in figure.columns))
-        """The columns that the figures need."""
 
     def draw(self, job: Job) -> None:
         """Draw the rows that are computed so far."""

@@ -12,13 +12,13 @@ from itertools import islice, repeat
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.errors import ReadError, SettingsError, note
+from scanfab.base.errors import SettingsError, note
 from scanfab.base.files import check_folder, refuse_inputs
 from scanfab.io.follow import FollowedSeries
 from scanfab.io.options import take_reading
 from scanfab.io.series import Series
 from scanfab.pipeline.compute import Observer, compute_frames
-from scanfab.pipeline.frames import NoChosenFrameError, chosen_frames, number_of_reference, of_whole
+from scanfab.pipeline.frames import NoChosenFrameError, number_of_reference, of_whole
 from scanfab.pipeline.options import Told
 from scanfab.pipeline.record import (
     FREE,
@@ -35,7 +35,6 @@ from scanfab.pipeline.record import (
 from scanfab.pipeline.series_notes import SeriesNotes
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import as_written
-from scanfab.table.formats import read_rows
 from scanfab.table.row import Row
 from scanfab.table.writing import ALL, Excerpt, check_output, manifest_of, write_rows
 
@@ -160,14 +159,9 @@ class Job:
         return max(expected, self.done)
 
     @contextmanager
-    def begun(self, needed: Collection[str] = ()) -> Iterator[None]:
+    def begun(self) -> Iterator[None]:
         """
         Keep other runs away from FILE inside the block; to resume, take over the finished rows.
-
-        Parameters
-        ----------
-        needed : collection of str, optional
-            Columns that a complete FILE must have.
 
         Raises
         ------
@@ -181,7 +175,7 @@ class Job:
             return
         with self._part.alone():
             if self.resume:
-                self._take_over(self.output, needed)
+                self._take_over(self.output)
             yield
 
     def rows(self, advance: Advance = lambda: None) -> Generator[Row, None, None]:
@@ -201,22 +195,15 @@ class Job:
             If the file cannot be written to.
         """
         assert self.output is not None
-        is_table = self.output.is_file() and manifest_of(self.output).is_file()
-        if self.output.is_file() and not self.resume:
-            kind, advice = ("table", "; `resume` would go on with it") if is_table else ("file", "")
-            what = f"the {kind} that is there will be replaced at the end of this run"
-            note(f"{self.output}: {what}{advice}")
         if not (self.resume and self._part.frames):
             self._part.begin(self.asked)
+            if self.resumed is not None:
+                self._part.add(self.resumed.manifest["inputs"], self.every_row)
         known = set[Path]()
         for one, rows in self._computed(advance):
             files = dict.fromkeys((*named_files(self.asked), *one.files(rows[0].frame, known)))
             self._part.add([input_entry(file) for file in files if file not in known], rows)
             known.update(files)
-        if is_table and not self.finished and read_rows(self.output):
-            what = "this run has no rows, so the table that is there stays as it is"
-            choose = "choose other `frames`, or another `output=FILE`"
-            raise SettingsError(f"{self.output}: {what}: {choose}")
         columns = self.settings.columns
         write_rows(self.output, self.every_row, columns, self.excerpt, self.save_manifests)
         self._part.remove()
@@ -227,7 +214,7 @@ class Job:
         versions = {name: version(name) for name in PACKAGES}
         before = [] if self.resumed is None else map(str, self.resumed.manifest["warnings"])
         found = {
-            "settings": self.asked,
+            "settings": {**self.asked, "frames": as_written(self.settings.frames)},
             "seed": self.asked["seed"],
             "versions": {"python": platform.python_version(), **versions},
             "inputs": [input_entry(path) for path in sorted(files)],
@@ -263,36 +250,20 @@ class Job:
             if isinstance(one, FollowedSeries):
                 one.end()
 
-    def _take_over(self, output: Path, needed: Collection[str]) -> None:
-        """Take over the frames of a complete FILE, and those of FILE.part."""
+    def _take_over(self, output: Path) -> None:
+        """Take over the frames that FILE.part holds, else those of a complete FILE."""
         # a followed series counts with the files that exist now
         series = [one.as_it_is if isinstance(one, FollowedSeries) else one for one in self.series]
-        if output.is_file():
-            try:
-                self._take_table(read_table(output), series, needed)
-            except (SettingsError, ReadError):
-                # then FILE is older: the run that was interrupted last has left FILE.part
-                if not self._part.frames:
-                    raise
         if self._part.frames:
-            frames = self._checked(self._part.read(), series)
-            chosen = {one.name: chosen_frames(one, self.settings.frames) for one in series}
-            self.finished |= {key: rows for key, rows in frames.items() if key[1] in chosen[key[0]]}
-
-    def _take_table(
-        self, record: Record, series: Sequence[Series], needed: Collection[str]
-    ) -> None:
-        """Take over the frames of a complete FILE, and its choice of frames."""
-        frames = self._checked(record, series, FREE)
-        lacking = [name for name in needed if name not in record.columns]
-        if frames and lacking:
-            lack = f"its rows lack {', '.join(lacking)} (`fields`), which the figure needs"
-            raise SettingsError(f"{record.path}: {lack}: leave out `plot`, or `resume`")
-        joined = _joined_frames(record, self.settings.frames, [len(one) for one in series])
-        self.settings = replace(self.settings, frames=joined)
-        self.asked = {**self.asked, "frames": as_written(joined)}
-        self.resumed = record
-        self.finished |= frames
+            record = self._part.read()
+            self.finished = self._checked(record, series)
+        elif output.is_file():
+            record = self.resumed = read_table(output)
+            self.finished = self._checked(record, series, FREE)
+        else:
+            return
+        frames = _joined_frames(record, self.settings.frames, [len(one) for one in series])
+        self.settings = replace(self.settings, frames=frames)
 
     def _checked(
         self, record: Record, series: Sequence[Series], free: Collection[str] = ()

@@ -7,9 +7,10 @@ are the ones that would be computed now.
 
 FILE.part is a text that grows with each finished frame. Its first line holds the settings of the
 run. Each further line holds one frame: its rows, with all columns and digits, and size and hash of
-the input files that no earlier frame was made of. A last line without its end belongs to a frame
-that was not finished. At the end of the run the manifest is written, then FILE appears in one step,
-and FILE.part is removed last.
+the input files that no earlier frame was made of. If a complete FILE is resumed, the second line
+holds all its frames. A last line without its end belongs to a frame that was not finished. At the
+end of the run the manifest is written, then FILE appears in one step, and FILE.part is removed
+last.
 """
 
 from __future__ import annotations

@@ -134,8 +134,7 @@ def test_an_interrupted_run_is_gone_on_with(stop, last_frame, resumes, suffix, r
 
 def test_without_a_part_everything_is_computed(compute, resumes):
     assert resumes("table.csv", 4)
-    told = "table.csv: the table that is there will be replaced"
-    assert compute("table.csv", told=told) == (0, 4)
+    assert compute("table.csv") == (0, 4)
 
 
 def test_without_resume_the_part_is_kept_under_another_name(compute, stop, resumes):
@@ -196,10 +195,11 @@ def test_a_damaged_part_is_refused_and_kept(compute, stop, text):
     assert Path("table.1.csv.part").read_bytes() == before
 
 
-def test_frames_that_a_part_has_and_nobody_chooses_now_are_left_out(dumps, stop, resumes):
+def test_frames_that_a_part_has_and_nobody_chooses_now_stay(dumps, compute, stop, is_whole):
     stop("table.csv", "--frames=-3:")
     shutil.copy(dumps / "dump_300.txt", dumps / "dump_500.txt")
-    assert resumes("table.csv", 2, "--frames=-3:")
+    assert compute("table.csv", "--frames=-3:", "--resume") == (0, 2)
+    assert is_whole("table.csv", "--frames=1:")
 
 
 def test_dumps_behind_the_rows_of_a_part_may_change(dumps, stop, resumes):
@@ -270,7 +270,7 @@ def test_part_and_table_are_gone_on_with_together(compute, stop, last_frame, res
     before, more = Path("table.csv").read_bytes(), ("--resume", "--workers", "1")
     last_frame()
     told = "interrupted after 2 of 5 frames; the same command goes on"
-    stop("table.csv", *more, row=1, told=told)
+    stop("table.csv", *more, row=5, told=told)
     told = "interrupted after 3 of 5 frames; the same command goes on"
     stop("table.csv", *more, row=4, told=told)
     assert Path("table.csv").read_bytes() == before
@@ -286,18 +286,6 @@ def test_columns_digits_and_warnings_are_those_of_the_table(compute, last_frame,
     last_frame()
     assert resumes("table.csv", 1, *words)
     assert read_manifest(Path("table.csv"))["warnings"] == ["frame 1: this"]
-
-
-def test_a_figure_needs_its_columns(compute):
-    few = ("--fields", "source,frame,variant,alpha_vs_axial")
-    figure = ("--resume", "--plot", "plot.png")
-    assert compute("table.csv", *few) == (0, 4)
-    told = "its rows lack strain, alpha_c_axial (--fields), which the figure needs: leave out"
-    assert compute("table.csv", *few, *figure, told=told) == (2, 0)
-    assert not Path("plot.png").exists()
-    # one of frames is drawn of the dumps
-    assert compute("table.csv", *few, *figure, "--figure", "histogram")[0] == 0
-    assert Path("plot.png").stat().st_size > 1000
 
 
 @pytest.mark.parametrize("last", ["job.write_rows", "job.write_manifest", "record.PartFile.remove"])
@@ -419,14 +407,9 @@ def test_what_is_read_beside_the_grains_is_an_input(compute):
     assert compute("t.csv", *words, **source) == (2, 0)
 
 
-def test_a_run_without_rows_leaves_the_table_that_is_there(compute):
-    """In an array of more jobs than frames, a job without frames still writes its own table."""
-    assert compute("table.csv")[0] == 0
-    before = Path("table.csv").read_bytes()
-    told = "this run has no rows, so the table that is there stays as it is"
-    assert compute("table.csv", "--frames", "9:", told=told)[0] == 1
-    assert Path("table.csv").read_bytes() == before
-    assert [compute("other.csv", "--frames", "9:")[0] for _ in range(2)] == [0, 0]
+def test_a_job_without_frames_still_writes_its_table(compute):
+    """As an array of more jobs than frames has it."""
+    assert [compute("table.csv", "--frames", "9:")[0] for _ in range(2)] == [0, 0]
 
 
 def test_series_have_references_of_their_own_and_must_be_named_again(compute, resumes):
