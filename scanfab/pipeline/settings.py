@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -323,10 +322,7 @@ class Settings:
             choose = f"choose {first}, {second}, or another axis in the plane"
             what = f"the axis {spelt} leads out of {space} of the discs"
             raise DimensionError(f"axis: {what}: {choose}")
-        if axis[across] == 0.0:
-            return axis
-        flat = [0.0 if k == across else part for k, part in enumerate(axis)]
-        return Axis(*(part / math.hypot(*flat) for part in flat))
+        return axis
 
     def aim(self, sample_error: float | None = None) -> float:
         """

@@ -85,12 +85,13 @@ def centers_of(sample: Sample, mode: str) -> FloatArray:
     return sample.packing.position[chosen]
 
 
-def shear_strain(cell: Cell | None, first: Cell | None) -> float | None:
+def cell_strains(cell: Cell | None, first: Cell | None) -> tuple[float | None, float | None]:
     """
-    Shear strain of a periodic cell since the first frame, in any direction.
+    Shear and volumetric strain of a periodic cell since the first frame.
 
-    It is √(2/3 e:e) of the deviator e of the logarithmic strain, in a plane √(1/2 e:e), and is
-    work-conjugate to the deviator stress. The vectors of both cells must correspond to each other.
+    The shear strain, in any direction, is √(2/3 e:e) of the deviator e of the logarithmic strain,
+    in a plane √(1/2 e:e), and is work-conjugate to the deviator stress. The volumetric strain is
+    -ln(V/V0). The vectors of both cells must correspond to each other.
 
     Parameters
     ----------
@@ -99,57 +100,33 @@ def shear_strain(cell: Cell | None, first: Cell | None) -> float | None:
 
     Returns
     -------
-    float or None
-        Dimensionless, never negative; None unless both cells are periodic along all vectors.
+    shear : float or None
+        Dimensionless, never negative.
+    volumetric : float or None
+        Dimensionless, positive in compression. Both are None unless both cells are periodic along
+        all vectors.
 
     Examples
     --------
     >>> from scanfab import Cell
-    >>> from scanfab.pipeline.strain import shear_strain
-    >>> sheared = Cell([[1, 0, 0], [0.5, 1, 0], [0, 0, 1]])
-    >>> round(shear_strain(sheared, Cell([1.0, 1.0, 1.0])), 4)
-    0.2857
+    >>> from scanfab.pipeline.strain import cell_strains
+    >>> shear, volumetric = cell_strains(Cell([1, 1, 0.9]), Cell([1, 1, 1]))
+    >>> round(shear, 4), round(volumetric, 4)
+    (0.0702, 0.1054)
     """
     if cell is None or first is None or not (cell.is_endless and first.is_endless):
-        return None
+        return None, None
     now, before = cell.own_vectors, first.own_vectors
     if np.array_equal(now, before):
-        return 0.0
+        return 0.0, 0.0
     # deformation gradient F from H = F H0; the lattice vectors are rows here, so this is transposed
     gradient = np.linalg.solve(before, now)
     # the logarithmic principal strains are the logarithms of the singular values of F
     stretch = np.log(np.linalg.svd(gradient, compute_uv=False))
     dimension = cell.space.dimension
     of_norm = np.sqrt((dimension - 1.0) / dimension)
-    return float(of_norm * np.linalg.norm(stretch - stretch.mean()))
-
-
-def volumetric_strain(cell: Cell | None, first: Cell | None) -> float | None:
-    """
-    Volumetric strain of a periodic cell since the first frame: -ln(V/V0).
-
-    Parameters
-    ----------
-    cell, first : Cell or None
-        Cell of this frame and of the first frame.
-
-    Returns
-    -------
-    float or None
-        Dimensionless, positive in compression; None unless both cells are periodic along all
-        vectors.
-
-    Examples
-    --------
-    >>> from scanfab import Cell
-    >>> from scanfab.pipeline.strain import volumetric_strain
-    >>> round(volumetric_strain(Cell([1, 1, 0.9]), Cell([1, 1, 1])), 4)
-    0.1054
-    """
-    if cell is None or first is None or not (cell.is_endless and first.is_endless):
-        return None
-    # this form gives 0.0 for an unchanged cell; the other sign would give -0.0
-    return float(np.log(abs(np.linalg.det(first.own_vectors) / np.linalg.det(cell.own_vectors))))
+    shear = of_norm * np.linalg.norm(stretch - stretch.mean())
+    return float(shear), -float(stretch.sum())
 
 
 def is_flipped(cell: Cell | None, before: Cell | None) -> bool:
@@ -211,11 +188,8 @@ class Strains(NamedTuple):
             length = axial_length(sample, self.mode, self.axis)
             axial = None if length is None else 1.0 - length / self.length
         cell = sample.packing.cell if has_grains else None
-        return {
-            "strain": axial,
-            "shear_strain": shear_strain(cell, self.cell),
-            "volumetric_strain": volumetric_strain(cell, self.cell),
-        }
+        shear, volumetric = cell_strains(cell, self.cell)
+        return {"strain": axial, "shear_strain": shear, "volumetric_strain": volumetric}
 
 
 class Flips:

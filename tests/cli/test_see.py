@@ -11,7 +11,7 @@ from PIL import Image
 
 from scanfab.base.errors import ScanfabError
 from scanfab.io.sources import read_series
-from scanfab.pipeline.strain import shear_strain
+from scanfab.pipeline.strain import cell_strains
 from scanfab.table.formats import read_rows
 from scanfab.viz.window3d import check_drawing
 from tests.conftest import ROOT, SAMPLE
@@ -134,7 +134,7 @@ def test_the_title_names_the_frame_and_its_strain(view, monkeypatch, scenes, wor
     monkeypatch.chdir(ROOT)
     view(*words)
     first, last = (frame.read().cell for frame in [*read_series("sample_data/lammps_shear")][::5])
-    shear = f"{100 * shear_strain(last, first):.3g}"
+    shear = f"{100 * cell_strains(last, first)[0]:.3g}"
     assert [one[2] for one in scenes] == [f"{words[0]}, {title.format(shear=shear)}"]
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import scanfab
 from scanfab import Cell, Packing, ReadError, SettingsError, compute
-from scanfab.pipeline.strain import shear_strain
+from scanfab.pipeline.strain import cell_strains
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.lattices import rotation, simple_cubic
 from tests.helpers.truth import SHEAR
@@ -110,24 +110,26 @@ FIRST = Cell(np.array([[2.0, 0, 0], [0, 3, 0], [0.2, 0.1, 4]]))
 def test_simple_shear_has_its_known_strain_from_wherever_it_is_seen(gamma):
     """Principal logarithmic stretches ± asinh(γ/2), 0; F = I + γ x⊗y of all of space."""
     vectors = FIRST.vectors @ (np.eye(3) + gamma * np.outer([0, 1, 0], [1, 0, 0]))
-    expected = pytest.approx(2 / np.sqrt(3) * np.arcsinh(abs(gamma) / 2), rel=1e-9)
-    assert shear_strain(Cell(vectors), FIRST) == expected
+    known = 2 / np.sqrt(3) * np.arcsinh(abs(gamma) / 2)
+    expected = pytest.approx((known, 0.0), rel=1e-9, abs=1e-12)
+    assert cell_strains(Cell(vectors), FIRST) == expected
     turn = rotation(np.random.default_rng(2))
-    assert shear_strain(Cell(vectors @ turn), Cell(FIRST.vectors @ turn)) == expected
+    assert cell_strains(Cell(vectors @ turn), Cell(FIRST.vectors @ turn)) == expected
 
 
 def test_triaxial_compression_has_its_known_strain():
     """Stretches -e, e/2, e/2 give √(2/3 · 3/2) e; what the volume does does not count."""
     gradient = 1.7 * np.diag(np.exp([0.05, 0.05, -0.1]))
-    assert shear_strain(Cell(FIRST.vectors @ gradient), FIRST) == pytest.approx(0.1, rel=1e-9)
+    found = cell_strains(Cell(FIRST.vectors @ gradient), FIRST)
+    assert found == pytest.approx((0.1, -3 * np.log(1.7)), rel=1e-9)
     turned = Cell(0.8 * FIRST.vectors @ rotation(np.random.default_rng(1)))
-    assert shear_strain(turned, FIRST) == pytest.approx(0, abs=1e-12)
-    assert shear_strain(FIRST, FIRST) == 0.0
+    assert cell_strains(turned, FIRST) == pytest.approx((0, -3 * np.log(0.8)), abs=1e-12)
+    assert cell_strains(FIRST, FIRST) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("cell", [None, Cell(FIRST.vectors, TWO)])
 def test_without_a_cell_that_repeats_in_all_directions_there_is_none(cell):
-    assert shear_strain(cell, FIRST) is shear_strain(FIRST, cell) is None
+    assert cell_strains(cell, FIRST) == cell_strains(FIRST, cell) == (None, None)
 
 
 def test_the_sample_has_the_strain_of_its_deck():
