@@ -69,7 +69,6 @@ if TYPE_CHECKING:
     from scanfab.table.table import load as load
     from scanfab.viz.compute_file import compute_file as compute_file
     from scanfab.viz.report.report import Report as Report
-    from scanfab.viz.report.report import make_report as make_report
     from scanfab.viz.report.report import report as report
     from scanfab.viz.scanned_frames import ScannedFrames as ScannedFrames
     from scanfab.viz.scanned_frames import scan_frames as scan_frames
@@ -121,7 +120,7 @@ _NAMES = {
     "table.row": ["Row"],
     "table.table": ["Table", "load"],
     "viz.compute_file": ["compute_file"],
-    "viz.report.report": ["Report", "make_report", "report"],
+    "viz.report.report": ["Report", "report"],
     "viz.scanned_frames": ["ScannedFrames", "scan_frames"],
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}

@@ -51,7 +51,7 @@ class Input(NamedTuple):
 @dataclass(frozen=True)
 class Report:
     """
-    A report on fabric tables, as :func:`make_report` makes it.
+    A report on fabric tables, as :func:`report` makes it.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class Report:
             part.write_text(self.page, encoding="utf-8", errors="backslashreplace")
 
 
-def make_report(
+def report(
     tables: PathLike | Sequence[PathLike],
     *,
     title: str | None = None,
@@ -136,9 +136,9 @@ def make_report(
     >>> row = dict(source="box", frame=0, variant="c", alpha_vs_axial=0.012, alpha_c_axial=0.1)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     scanfab.Table([row]).save(f"{folder}/fabric.csv")
-    ...     report = scanfab.make_report(f"{folder}/fabric.csv", title="A box")
-    ...     report.save(f"{folder}/report.html")
-    >>> report.has_void_fabric
+    ...     page = scanfab.report(f"{folder}/fabric.csv", title="A box")
+    ...     page.save(f"{folder}/report.html")
+    >>> page.has_void_fabric
     True
     """
     named = [tables] if isinstance(tables, str | os.PathLike) else list(tables)
@@ -180,10 +180,6 @@ def make_report(
         frames=[*([words.frame_table(rows)] if rows else []), *map(words.block_table, maps)],
     )
     return Report(page, any(row["alpha_vs_axial"] is not None for row in every))
-
-
-# the name of the command
-report = make_report
 
 
 def read_inputs(

@@ -23,7 +23,7 @@ from scanfab.table.table import Table, load
 from scanfab.viz.figures.figure import Figure as PackagesFigure
 from scanfab.viz.figures.figure import FrameFigure, drawn_page, make_figures
 from scanfab.viz.figures.style import check_plot_file
-from scanfab.viz.report.report import make_report
+from scanfab.viz.report.report import report
 from scanfab.viz.scanned_frames import ScannedFrames
 from tests.conftest import SAMPLE
 from tests.helpers.figures import BYTES, save_rows
@@ -127,7 +127,7 @@ def test_python_compare_and_report_draw_a_made_up_figure_of_a_table(table, tmp_p
     with drawn_page(make_figures(load(table), "table")) as page:
         letters = [axes.get_title(loc="left") for axes in page.axes if axes.axison]
     assert letters == [f"({letter})" for letter in "abcdef"]
-    page = make_report([table]).page
+    page = report([table]).page
     assert page.count("data:image/svg") == 4
     assert "<figcaption>Rattlers over the frames.</figcaption>" in page
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from scanfab.viz.report.report import make_report
+import scanfab
 from tests.conftest import ROOT
 from tests.viz.report.browser import Browser, missing
 
@@ -57,7 +57,7 @@ def report(computed, tmp_path_factory):
     Path(f"{table}.manifest.json").write_text(json.dumps({**manifest, "warnings": [HOSTILE]}))
     page = table.with_name("report.html")
     with chdir(ROOT):
-        make_report(table, title=HOSTILE, author=HOSTILE).save(page)
+        scanfab.report(table, title=HOSTILE, author=HOSTILE).save(page)
     return page
 
 

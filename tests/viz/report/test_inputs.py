@@ -9,7 +9,7 @@ import pytest
 from scanfab.base.errors import SettingsError
 from scanfab.cli.main import run
 from scanfab.table.formats import read_rows
-from scanfab.viz.report.report import make_report
+from scanfab.viz.report.report import report
 from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import write
 from tests.helpers.tables import curve
@@ -26,7 +26,7 @@ def test_odd_values_are_refused_by_table_row_and_column(table):
         rows = curve()
         rows[2]["alpha_vs_axial_sample_se"] = word
         with pytest.raises(SettingsError, match=r"t\.jsonl: row 3: alpha_vs_axial_sample_se: exp"):
-            make_report([table(rows)])
+            report([table(rows)])
 
 
 def test_tables_of_other_programs_and_of_compare_are_refused(table, tmp_path, capsys):
@@ -51,7 +51,7 @@ def test_few_columns_are_enough(table):
     assert "5 frames of t; variants c." in text
     assert "lacks the column alpha_vs_axial_se" in text
     with pytest.raises(SettingsError, match="there is no column variant"):
-        make_report([table([{k: v for k, v in row.items() if k != "variant"} for row in curve()])])
+        report([table([{k: v for k, v in row.items() if k != "variant"} for row in curve()])])
 
 
 def test_a_table_is_read_once(table, monkeypatch):
@@ -61,7 +61,7 @@ def test_a_table_is_read_once(table, monkeypatch):
         "scanfab.viz.report.report.read_rows", lambda path: read.append(path) or read_rows(path)
     )
     path = table(curve())
-    assert make_report([path]).has_void_fabric
+    assert report([path]).has_void_fabric
     assert read == [path]
 
 
@@ -125,9 +125,9 @@ def test_maps_beside_tables_have_no_labels_and_need_their_columns(table, tmp_pat
     assert run(["report", *words, *labels, "-o", str(tmp_path / "r.html")]) == 0
     assert "sheared" in words_of((tmp_path / "r.html").read_text("utf-8"))
     with pytest.raises(SettingsError, match="labels: expected one per table: 1, found 2"):
-        make_report(words[:1], labels=["sheared", "by place"])
+        report(words[:1], labels=["sheared", "by place"])
     for row in rows:
         del row["variant"], row["alpha_vs_axial"], row["at_surface"]
     lack = r"map\.jsonl: the map lacks the columns variant, alpha_vs_axial"
     with pytest.raises(SettingsError, match=lack):
-        make_report([table(rows, "map.jsonl")])
+        report([table(rows, "map.jsonl")])

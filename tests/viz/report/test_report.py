@@ -17,7 +17,7 @@ from scanfab.base.errors import ReadError, SettingsError
 from scanfab.cli.main import run
 from scanfab.io.sources import read_series
 from scanfab.table.table import Table
-from scanfab.viz.report.report import make_report
+from scanfab.viz.report.report import report
 from tests.conftest import ROOT
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.tables import curve, sheared
@@ -52,7 +52,7 @@ def change(table: Path, **changes):
 
 
 def page_of(tables, **options):
-    return make_report(tables, **options).page
+    return report(tables, **options).page
 
 
 def words_of(page):
@@ -301,11 +301,11 @@ def test_notes_are_not_warnings(copied, plain):
 
 def test_a_report_is_saved_by_one_call(table, tmp_path, plain):
     path = table(curve())
-    report = make_report(str(path), title="One")
-    report.save(str(tmp_path / "report.html"))
-    assert (tmp_path / "report.html").read_text("utf-8") == report.page
-    assert make_report([path], title="One").page == report.page
+    made = report(str(path), title="One")
+    made.save(str(tmp_path / "report.html"))
+    assert (tmp_path / "report.html").read_text("utf-8") == made.page
+    assert report([path], title="One").page == made.page
     with pytest.raises(SettingsError, match="reports are HTML"):
-        report.save(tmp_path / "report.pdf")
+        made.save(tmp_path / "report.pdf")
     with pytest.raises(SettingsError, match="expected files of tables"):
-        make_report(Table(curve()))
+        report(Table(curve()))
