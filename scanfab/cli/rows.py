@@ -114,14 +114,11 @@ class _Drawing:
     """Draws the figures of a table that the options name."""
 
     def __init__(self, outputs: Output, kinds: tuple[str, ...]) -> None:
-        from scanfab.table.plots import figures_of
         from scanfab.viz.figures.figure import find_figure
 
         self.outputs, self.kind, self._drawn = outputs, kinds[0], 0
-        figures = list(figures_of(self.kind).values()) if outputs.plot is not None else []
         if outputs.figure is not None:
-            figures = [find_figure(outputs.figure, *kinds)[0]]
-            self.kind = figures[0].kind
+            self.kind = find_figure(outputs.figure, *kinds)[0].kind
 
     def draw(self, job: Job) -> None:
         """Draw the rows that are computed so far."""
