@@ -12,7 +12,6 @@ import click
 from click.core import ParameterSource
 
 from scanfab.base.errors import SettingsError, note
-from scanfab.base.option import unusable
 from scanfab.pipeline.options import OPTIONS
 
 SECTION = "compute"
@@ -97,10 +96,6 @@ def _as_typed(key: str, value: Any, folder: Path) -> Any:
     Files that an option names are looked for in the folder of the settings file first.
     """
     option, several = KEYS[key], value if isinstance(value, list) else [value]
-    for item in several:
-        # bool is a subclass of int, so True would be taken for the number 1
-        if isinstance(item, bool) or not isinstance(item, str | int | float):
-            raise unusable(key, "numbers or text in quotes, alone or in a list", item)
     words, usual = [str(item) for item in several], option.form.split("|")
     takes_file = usual[-1].startswith(("FILE", "PATH")) and len(words) == 1
     if takes_file and words[0] not in usual and glob(words[0], root_dir=folder):
