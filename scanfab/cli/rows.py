@@ -33,8 +33,7 @@ def write_table(
     it.
     """
     from scanfab.io.follow import FollowedSeries
-    from scanfab.pipeline.job import Job
-    from scanfab.viz.compute_file import paraview_files, vtk_folders
+    from scanfab.viz.compute_file import table_job
 
     ctx = click.get_current_context()
     figures = ("map",) if kind is MapSettings else ("table", "frames")
@@ -64,20 +63,13 @@ def write_table(
                 file = outputs.scheduler_file
                 dask = scanfab.dask_executor(outputs.scheduler, scheduler_file=file)
                 executor = stack.enter_context(dask)
-            vtk, resume = outputs.vtk, outputs.resume
-            resumed = outputs.output if resume else None
-            drawn = [] if outputs.plot is None else [outputs.plot]
-            drawn += [] if vtk is None else paraview_files(vtk)
-            job = Job(
+            listed = as_listed(ctx)
+            job = table_job(
                 series,
                 settings,
-                outputs.output,
+                outputs,
                 excerpt,
-                resume=resume,
-                manifest_path=outputs.manifest,
-                drawn=drawn,
-                more={"settings_file": listed} if (listed := as_listed(ctx)) else {},
-                observers=vtk_folders(vtk, series, settings, resumed) if vtk else (),
+                more={"settings_file": listed} if listed else {},
                 told=ctx.obj,
                 executor=executor,
             )

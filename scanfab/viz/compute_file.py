@@ -22,7 +22,7 @@ from scanfab.io.sources import READING, open_sources
 from scanfab.pipeline.frame import FrameResult
 from scanfab.pipeline.job import Job
 from scanfab.pipeline.map_settings import BLOCK_OPTIONS, MapSettings, is_map
-from scanfab.pipeline.options import listening
+from scanfab.pipeline.options import Output, listening
 from scanfab.pipeline.record import part_of
 from scanfab.pipeline.settings import Settings
 from scanfab.table.table import Table, load
@@ -118,29 +118,40 @@ def compute_file(
     if kind is Settings:
         options = {name: value for name, value in options.items() if name not in BLOCK_OPTIONS}
     if vtk is not None and executor is not None:
-        raise SettingsError(
-            "vtk: files for ParaView cannot be written with `executor`: leave out one"
-        )
+        raise SettingsError("vtk: it cannot be written with an `executor`: leave out one of them")
+    outputs = Output(
+        output=Path(output),
+        resume=resume,
+        vtk=None if vtk is None else Path(vtk),
+        manifest=None if manifest is None else Path(manifest),
+    )
     with listening() as told:
         series = _opened(source, options)
         settings = kind(**options)
-        resumed = Path(output) if resume else None
-        folders = () if vtk is None else vtk_folders(Path(vtk), series, settings, resumed)
-        job = Job(
-            series,
-            settings,
-            Path(output),
-            Excerpt.make(settings.columns, fields, digits),
-            resume=resume,
-            manifest_path=None if manifest is None else Path(manifest),
-            drawn=() if vtk is None else paraview_files(Path(vtk)),
-            observers=folders,
-            told=told,
-            executor=executor,
-        )
+        excerpt = Excerpt.make(settings.columns, fields, digits)
+        job = table_job(series, settings, outputs, excerpt, told=told, executor=executor)
         with job.begun():
             job.write(lambda: progress and progress(job.done, job.frames()))
     return load(Path(output))
+
+
+def table_job(
+    series: Sequence[Series], settings: Settings, outputs: Output, excerpt: Excerpt, **more: Any
+) -> Job:
+    """
+    The computation of a table into the files that the options of output name.
+
+    It refuses to replace an input by a figure or by files for ParaView. ``more`` are its further
+    arguments.
+    """
+    drawn = [] if outputs.plot is None else [outputs.plot]
+    folders: list[VtkFolder] = []
+    if outputs.vtk is not None:
+        resumed = outputs.output if outputs.resume else None
+        folders = vtk_folders(outputs.vtk, series, settings, resumed)
+        drawn += [*outputs.vtk.rglob("*.vt[pu]"), *outputs.vtk.rglob("*.pvd")]
+    more |= {"resume": outputs.resume, "manifest_path": outputs.manifest}
+    return Job(series, settings, outputs.output, excerpt, drawn=drawn, observers=folders, **more)
 
 
 def _opened(source: Source | Sequence[Source], options: dict[str, Any]) -> Sequence[Series]:
@@ -158,11 +169,6 @@ def _opened(source: Source | Sequence[Source], options: dict[str, Any]) -> Seque
         )
     paths = [os.fspath(path) for one in given for path in expanded(one)]
     return open_sources(paths, **take_reading(options))
-
-
-def paraview_files(folder: Path) -> list[Path]:
-    """The files of a folder that files for ParaView may replace."""
-    return [path for path in folder.rglob("*") if path.suffix in (".vtp", ".vtu", ".pvd")]
 
 
 def vtk_folders(
