@@ -13,7 +13,7 @@ from scanfab.base.spelling import counted
 from scanfab.pipeline.options import MEANINGS
 from scanfab.pipeline.record import HIDDEN, given_settings
 from scanfab.scan.directions import direction_rule
-from scanfab.table.curves import STRAINS, is_turned, spelt_strain, strain_column
+from scanfab.table.curves import STRAINS, is_turned, strain_column
 from scanfab.table.row import Row as TableRow
 from scanfab.table.row import groups_of, number_of, numbers_of, total_error, variant_of, with_error
 from scanfab.table.selection import MAP
@@ -29,23 +29,6 @@ NOTABLE = 0.1
 # The report warns of scan directions with a larger bias than this.
 SOME_BIAS = 1e-5
 
-TURNED = (
-    "The loading axis is not the axis of the contact fabric, as in simple shear, so no line of the "
-    "values along it is given. Intensities are largest minus smallest principal value, whichever "
-    "way the axes point: never negative, so noise raises them. The table has no errors of them."
-)
-
-# Lines of the results with their columns below, for the first frame, the last, and turned axes; {}
-# stands for the strain or the frame.
-FIRST_LINES = {"α_vs{}": "α_vs ±", "α_c{}": "α_c ±"}
-ERROR_LINES = {"its error: scan": "scan", "its error: sample": "sample"}
-LAST_LINES = {"α_vs{}": "α_vs ±", **ERROR_LINES, "α_c{}": "α_c ±"}
-TURNED_LINES = {
-    "intensity α_vs{}": "void intensity",
-    "intensity α_c{}": "contact intensity",
-    "angle between their axes{}": "angle",
-    "α_vs along the loading axis{}": "α_vs ±",
-}
 # Columns of the table that are shown as they are, with the titles that readers see.
 TITLES = {
     **{name: name for name in ("frame", "block", "x", "y", "z", "r_inner", "r_outer", "grains")},
@@ -53,12 +36,28 @@ TITLES = {
     "solid_fraction": "solid fraction",
     "mean_length": "mean void length",
     "segments": "void segments",
+    "alpha_vs": "void intensity",
+    "alpha_c": "contact intensity",
 }
+# Names of the lines of the results with their titles in the table of frames.
+RESULTS = {
+    **{name: name for name in ("frame", "axial strain", "shear strain")},
+    "α_vs along the loading axis": "α_vs ±",
+    "its error: scan": "scan",
+    "its error: sample": "sample",
+    "α_c along the loading axis": "α_c ±",
+    **{name: name for name in ("void intensity", "contact intensity", "angle between their axes")},
+}
+INTENSITIES = (
+    "Intensities are largest minus smallest principal value, whichever way the axes point: never "
+    "negative, so noise raises them. The table has no errors of them."
+)
 # Titles of the columns of frames, and of blocks; a column that is empty in all rows is left out.
-INTENSITIES = ("void intensity", "contact intensity")
 FRAME_COLUMNS = (
-    "α_vs", "± total", "scan", "sample", "α_c", "± of α_c", "grains", "rattlers", "contacts",
-    "coordination", "solid fraction", "mean void length", "void segments",
+    "frame", "variant", "axial strain", "shear strain", "α_vs", "± total", "scan", "sample", "α_c",
+    "± of α_c", "grains", "rattlers", "contacts", "coordination", "solid fraction",
+    "mean void length", "void segments", "void intensity", "contact intensity",
+    "angle between their axes",
 )  # fmt: skip
 BLOCK_COLUMNS = (
     "block", "variant", "x", "y", "z", "r_inner", "r_outer", "grains", "α_vs", "± total", "α_c",
@@ -106,67 +105,26 @@ def _span(rows: Sequence[Row], column: str, spelling: str, factor: float = 1.0) 
     return " to ".join(dict.fromkeys(ends)) or "-"
 
 
-def results_tables(summary: Iterable[TableRow], rows: Sequence[Row]) -> list[Part]:
-    """A table for each source, with a column for each variant."""
-    sources = dict.fromkeys(one.source for one in summary)
-    return [_results(source, summary, rows) for source in sources]
-
-
-def _results(source: str, summary: Iterable[TableRow], rows: Sequence[Row]) -> Part:
-    summary = [one for one in summary if one.source == source]
-    rows = [row for row in rows if row["source"] == source]
-    turned = is_turned(rows)
+def results_tables(summary: Sequence[TableRow], rows: Sequence[Row]) -> list[Part]:
+    """A table for each source: the last frame and the fitted line, a column for each variant."""
     filled = groups_of(row for row in rows if row[VOID] is not None)
-    each = [filled.get((source, variant_of(one)), [{}]) for one in summary]
-    first, last = [one[0] for one in each], [one[-1] for one in each]
-    column = strain_column(rows)
-    if len({spelt_strain(row, column) for row in (*first, *last)}) < 2:
-        column = None
-    # no line is fitted to turned axes, as axial values miss their fabric
-    at_end, at_start = (TURNED_LINES, TURNED_LINES) if turned else (LAST_LINES, FIRST_LINES)
-    lines: dict[str, list[str]] = {}
-    for names, which, ends in ((at_end, "last", last), (at_start, "first", first)):
-        at, cells = _where(which, ends, column), [_cells(row) if row else {} for row in ends]
-        for name, cell in names.items():
-            lines[name.format(at)] = [one.get(cell, "-") for one in cells]
-    if first != last and not turned:
-        lines |= {
-            "slope of α_vs on α_c": [with_error(one.slope, one.slope_se, ".5f") for one in summary],
-            "R² of that line": [_spell(one.r2) for one in summary],
-            "largest α_vs": [_spell(one.peak) for one in summary],
-            "frames in the line": [str(one.frames) for one in summary],
-        }
-    # leave out lines that are empty for all variants
-    shown = [[name, *cells] for name, cells in lines.items() if any(one != "-" for one in cells)]
-    return Part(["variant", *map(variant_of, summary)], shown, TURNED if turned else "", source)
-
-
-def _where(which: str, rows: Sequence[Row], column: str | None) -> str:
-    """Spell the strain or the frame, if it is the same for all variants."""
-    row = next((row for row in rows if row), {})
-    if not row or len({one["frame"] for one in rows if one}) > 1:
-        return f", {which} frame that has one"
-    strain = spelt_strain(row, column)
-    return f" at {strain}" if strain else f", frame {row['frame']}"
-
-
-def _value(row: Row, name: str) -> str:
-    """Spell a value with its total error, or with the digits that the scan's error allows."""
-    error = total_error(row, name)
-    if error is None:
-        return _alone(number_of(row, name), number_of(row, f"{name}_se"))
-    return with_error(number_of(row, name), error, ".5f")
-
-
-def _intensity(row: Row, axial: str) -> str:
-    """Spell an intensity with the digits that the error of the axial value allows."""
-    error = total_error(row, axial) or number_of(row, f"{axial}_se")
-    return _alone(number_of(row, axial.removesuffix("_axial")), error)
-
-
-def _alone(value: float | None, error: float | None) -> str:
-    """Spell a value with the digits that its error allows."""
-    return with_error(value, error, ".5f").partition(" ±")[0]
+    parts = []
+    for source in dict.fromkeys(one.source for one in summary):
+        own = [one for one in summary if one.source == source]
+        groups = [filled.get((source, variant_of(one))) for one in own]
+        cells = [_cells(group[-1]) if group else {} for group in groups]
+        lines = {name: [one.get(title, "-") for one in cells] for name, title in RESULTS.items()}
+        # no line is fitted to turned axes, as axial values miss their fabric
+        if not is_turned([row for row in rows if row["source"] == source]):
+            lines |= {
+                "slope of α_vs on α_c": [with_error(one.slope, one.slope_se, ".5f") for one in own],
+                "R² of that line": [_spell(one.r2) for one in own],
+                "largest α_vs": [_spell(one.peak) for one in own],
+                "frames in the line": [str(one.frames) for one in own],
+            }
+        shown = [[name, *cells] for name, cells in lines.items() if {*cells} != {"-"}]
+        parts.append(Part(["variant", *map(variant_of, own)], shown, INTENSITIES, source))
+    return parts
 
 
 def _spell(value: Any, spelling: str = ".4g", unit: str = "") -> str:
@@ -179,7 +137,9 @@ def _cells(row: Row) -> dict[str, str]:
     """The cells of a frame or block, by the titles of their columns."""
     # spell the value of the table, so that counts stay whole numbers
     numbers = {title: row[name] for name, title in TITLES.items() if numbers_of([row], name)}
-    void, contact = (_value(row, name) for name in (VOID, CONTACT))
+    each = ((number_of(row, name), total_error(row, name)) for name in (VOID, CONTACT))
+    void, contact = (with_error(value, error, ".5f") for value, error in each)
+    strains = {words: number_of(row, name) for name, (words, _) in STRAINS.items()}
     errors = {
         "± total": total_error(row, VOID),
         "scan": number_of(row, f"{VOID}_se"),
@@ -189,14 +149,13 @@ def _cells(row: Row) -> dict[str, str]:
     return {
         **{title: _spell(value) for title, value in numbers.items()},
         **{title: _spell(error, "#.2g") for title, error in errors.items()},
+        **{words: f"{100 * one:.3g} %" for words, one in strains.items() if one is not None},
         "variant": variant_of(row),
         "α_vs ±": void,
         "α_vs": void.partition(" ±")[0],
         "α_c ±": contact,
         "α_c": contact.partition(" ±")[0],
-        "void intensity": _intensity(row, VOID),
-        "contact intensity": _intensity(row, CONTACT),
-        "angle": _spell(number_of(row, "coaxiality_deg"), ".0f", "°"),
+        "angle between their axes": _spell(number_of(row, "coaxiality_deg"), ".0f", "°"),
         "at a surface": "yes" if row.get("at_surface") else "-",
     }
 
@@ -211,20 +170,11 @@ def frame_table(rows: Sequence[Row]) -> Part:
     """A table of some frames; the first columns have the anisotropies and their errors."""
     numbers = list(dict.fromkeys(map(_of_frame, rows)))
     shown = {*numbers[:: -(-len(numbers) // MOST_FRAMES)], numbers[-1]}
-    sources = {source: [row for row in rows if row["source"] == source] for source, _ in numbers}
-    # axial strain is the default, also if it does not tell the frames of a source apart
-    strains = {source: strain_column(own) or "strain" for source, own in sources.items()}
-    turned, lines = is_turned(rows), []
-    for row in rows:
-        if _of_frame(row) in shown:
-            column = strains[row["source"]]
-            strain = "".join(f"{100 * value:.3g} %" for value in numbers_of([row], column)) or "-"
-            source = str(row["source"]) if len(sources) > 1 else "-"
-            lines.append({**_cells(row), column.replace("_", " "): strain, "source": source})
-    main = [*INTENSITIES, "angle", *FRAME_COLUMNS] if turned else [*FRAME_COLUMNS, *INTENSITIES]
+    several = len({source for source, _ in numbers}) > 1
+    chosen = [row for row in rows if _of_frame(row) in shown]
+    lines = [{**_cells(row), "source": str(row["source"]) if several else "-"} for row in chosen]
     note = "" if len(shown) == len(numbers) else f"{len(shown)} of {len(numbers)} frames are shown."
-    columns = ["frame", "variant", "strain", "shear strain", *main, "source"]
-    return _part(columns, lines, note)
+    return _part([*FRAME_COLUMNS, "source"], lines, note)
 
 
 def block_table(rows: Sequence[Row]) -> Part:
