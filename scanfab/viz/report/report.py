@@ -15,7 +15,6 @@ from scanfab.base.files import whole_file
 from scanfab.io.families import PathLike
 from scanfab.io.series import Series
 from scanfab.packing.cell import Cell
-from scanfab.packing.window import SurfaceBox
 from scanfab.pipeline.options import Told, as_options, listening
 from scanfab.pipeline.record import read_manifest, reopen, repeat_command, restored_settings
 from scanfab.pipeline.settings import Settings
@@ -279,40 +278,20 @@ def show_frames(one: Input, manifest: Mapping[str, Any]) -> dict[str, Any]:
 def _facts(look: Look) -> list[tuple[str, str]]:
     """The sample in numbers."""
     first, plan = look.first, look.plan
-    if first is None:
+    if first is None or plan is None:
         return []
     radii, boundary = first.packing.radius[first.grains], first.number(first.boundary)
-    smallest = float(radii.min())
+    smallest, mean = float(radii.min()), float(radii.mean())
     axis = [name for name, part in zip("xyz", look.axis, strict=True) if part == 1.0]
-    facts = [
+    return [
         ("grains", f"{first.number(first.grains)} in the reference frame"),
-        ("radii", f"smallest {smallest:.4g}, mean {radii.mean():.4g}, largest {radii.max():.4g}"),
+        ("radii", f"smallest {smallest:.4g}, mean {mean:.4g}, largest {radii.max():.4g}"),
         ("boundary", f"{boundary} particles" if boundary else "none"),
         ("cell", _cell(look.sample.packing.cell)),
         ("loading axis", axis[0] if axis else _numbers(look.axis)),
+        ("cut-off", f"{plan.cutoff:.4g}, {plan.cutoff / smallest:.3g} smallest radii"),
+        *(("RV", f"{one.shape} about ({_numbers(one.center)})") for one in plan.windows),
     ]
-    if plan is None:
-        return facts
-    facts.append(("cut-off", f"{plan.cutoff:.4g}, {plan.cutoff / smallest:.3g} smallest radii"))
-    if plan.window is not None:
-        facts.append(("centre of the RV", _numbers(plan.window.center)))
-    for window in plan.windows:
-        radius = window.radius
-        if not window.shape.is_sphere:
-            facts.append(("shape of the RV", str(window.shape)))
-            continue
-        # relative to the first sample, and to the sample of this frame if that differs
-        part, *others = (
-            f"{2 * radius / SurfaceBox.of(one.packing, one.gathered).smallest_extent:.3g}"
-            for one in (first, look.sample)
-            if one.gathered.any()
-        )
-        now = ""
-        if others not in ([], [part]):
-            now = f" in the reference frame, {others[0]} in frame {look.number}"
-        size = f"{radius:.4g}, {part} of half the sample's smallest extent{now}"
-        facts.append(("radius of the RV", f"{size}, {radius / radii.mean():.3g} mean radii"))
-    return facts
 
 
 def _cell(cell: Cell | None) -> str:
