@@ -165,16 +165,9 @@ class ScannedFrames:
 
     @cached_property
     def frames(self) -> list[ScannedFrame]:
-        """The frames, scanned for the variant alone."""
-        return self._scan(self.variant)
-
-    @cached_property
-    def with_lines_of_table(self) -> list[ScannedFrame]:
-        """The frames, scanned along the lines of the table, which all its variants share."""
-        variants = self.settings.variants
-        return self.frames if variants == self.variant else self._scan(variants)
-
-    def _scan(self, variants: str) -> list[ScannedFrame]:
+        """The frames, scanned along the lines of the table, which a and b share, or c and d."""
+        group = "cd" if VARIANTS[self.variant].in_window else "ab"
+        variants = "".join(name for name in self.settings.variants if name in group)
         first, last = self._ends
         chosen = slice(first, last + 1, max(last - first, 1))
         settings = replace(self.settings, variants=variants, frames=chosen, cutoffs=())

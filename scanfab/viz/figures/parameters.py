@@ -153,7 +153,7 @@ class Cutoffs(OnePanel):
     @cached_property
     def curves(self) -> list[CutoffCurve]:
         """What is drawn of each frame."""
-        return [_curve_of(one) for one in self.chosen(self.data.with_lines_of_table)]
+        return [_curve_of(one) for one in self.chosen(self.data.frames)]
 
     def draw(self, ax: Axes) -> None:
         """Draw a curve for each frame, and the cut-off of the table."""
