@@ -19,7 +19,7 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.distribution import direction_points
 from scanfab.table.curves import short_names
-from scanfab.table.row import column_of, numbers_of, total_error, total_errors
+from scanfab.table.row import column_of, numbers_of, total_errors
 from scanfab.viz.figures import style
 from scanfab.viz.figures.figure import Figure, FrameFigure
 
@@ -30,6 +30,7 @@ ALPHA = "alpha_vs_axial"
 LINES = 6_000
 # cut-offs that are drawn, in units of the smallest radius
 CUTOFFS = (0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0)
+BANDS = "bands: standard error of scan and sample, where known"
 # For each ladder: label and scale of the x axis, and the value in the 2017 paper.
 PANELS: dict[str, tuple[str, str, float | None]] = {
     "spacing": ("spacing of lines $s/r_{min}$", "log", 0.1),
@@ -167,10 +168,7 @@ class Cutoffs(OnePanel):
         ax.axhline(0, color="0.6", lw=0.6, zorder=0)
         ax.set(xlabel=r"cut-off / $r_{min}$", ylabel=style.LABELS[ALPHA])
         style.widen(ax, 1.0)
-        hole = any(lacks_errors(one.rows) for one in self.curves)
-        without = "\n(none where either is not known)" if hole else ""
-        note = f"bands: one total standard error, scan and sample{without}\nbars: the scan's part"
-        ax.legend(title=note)
+        ax.legend(title=f"{BANDS}\nbars: the scan's part")
 
 
 def draw_alpha(ax: Axes, rows: Sequence[Any], look: dict[str, Any], label: str) -> None:
@@ -178,11 +176,6 @@ def draw_alpha(ax: Axes, rows: Sequence[Any], look: dict[str, Any], label: str) 
     x, alpha, scan = (column_of(rows, name) for name in ("value", ALPHA, f"{ALPHA}_se"))
     style.band(ax, x, 1e3 * alpha, 1e3 * total_errors(rows, ALPHA), look)
     ax.errorbar(x, 1e3 * alpha, 1e3 * np.nan_to_num(scan), label=label, elinewidth=0.9, **look)
-
-
-def lacks_errors(rows: Sequence[Any]) -> bool:
-    """Whether a row has a void anisotropy without a total error."""
-    return any(numbers_of([row], ALPHA) and total_error(row, ALPHA) is None for row in rows)
 
 
 def _curve_of(frame: ScannedFrame) -> CutoffCurve:
@@ -242,10 +235,7 @@ class Ladders(Figure):
         for panel, ladder in zip(panels, PANELS, strict=True):
             self._draw_ladder(panel, ladder)
         # the legend's title names the frame and explains bands, bars and dotted lines
-        lines = ["bands: one total standard error, of scan and sample together"]
-        if lacks_errors(self.data):
-            lines.append("no band where either part is not known")
-        lines.append("bars: the scan's part; dotted: the choice of the 2017 paper")
+        lines = [BANDS, "bars: the scan's part; dotted: the choice of the 2017 paper"]
         if self.data:
             source, frame = self.data[0].source, self.data[0].frame
             name = style.plain(short_names([source])[source])

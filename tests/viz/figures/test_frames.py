@@ -19,7 +19,6 @@ from scanfab.pipeline.settings import Settings
 from scanfab.table.row import column_of, total_errors
 from scanfab.viz.figures import projection
 from scanfab.viz.figures.figure import drawn_page, find_figure, make_figures
-from scanfab.viz.figures.parameters import CutoffCurve, Cutoffs
 from scanfab.viz.figures.rose import contact_ring
 from scanfab.viz.scanned_frames import ScannedFrames
 from tests.conftest import ROOT, SAMPLE
@@ -315,7 +314,7 @@ def test_cut_offs_have_the_values_and_errors_of_the_table(figures, computed):
             assert curve.rows[place][name] == pytest.approx(row[name], rel=1e-9)
         assert line.get_ydata()[place] == pytest.approx(1e3 * row["alpha_vs_axial"])
         assert_bands_are_wider_than_bars(curve)
-    assert "bands: one total standard error" in ax.get_legend().get_title().get_text()
+    assert "bands: standard error of scan and sample" in ax.get_legend().get_title().get_text()
 
 
 @pytest.mark.filterwarnings("ignore:frames? .* above the tolerance:scanfab.ScanfabWarning")
@@ -339,16 +338,3 @@ def test_a_rough_scan_has_its_bands_and_its_own_cut_off_and_tells_nothing(series
     for curve in curves:
         assert_bands_are_wider_than_bars(curve)
         assert curve.chosen in column_of(curve.rows, "value")
-
-
-def test_a_cut_off_without_a_total_error_is_told():
-    errors = {"alpha_vs_axial_se": 1.0, "alpha_vs_axial_sample_se": 1.0}
-    row = {"alpha_vs_axial": 1.0, "predicted": 1.0, **errors}
-    for sample, told in ((1.0, False), (None, True)):
-        second = {**row, "alpha_vs_axial_sample_se": sample}
-        rows = [{**one, "value": k} for k, one in enumerate((row, second, row))]
-        figure = Cutoffs(None)
-        figure.curves = [CutoffCurve("one", 1.0, rows)]
-        with drawn_page([figure]) as page:
-            note = page.legends[0].get_title().get_text()
-        assert ("(none where either is not known)" in note) == told
