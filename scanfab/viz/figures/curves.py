@@ -18,18 +18,10 @@ from scanfab.table.curves import ABSCISSAS, Curve, abscissa, curves_of
 from scanfab.table.row import numbers_of
 from scanfab.table.table import Table
 from scanfab.viz.figures.figure import Figure
-from scanfab.viz.figures.style import COLOURS, LOOKS, WIDTH, band, plain, widen
+from scanfab.viz.figures.style import LOOKS, MANY_LOOKS, WIDTH, band, plain, widen
 
 Look = dict[str, Any]
 
-COLOURS_OF_MANY = ("blue", "vermilion", "green", "purple", "orange", "sky", "black")
-LINES = ("-", "--", "-.", ":")
-# Looks of curves that differ by their source or by the size of their RV; the second half is open.
-MANY_LOOKS: tuple[Look, ...] = tuple(
-    {"color": COLOURS[colour], "marker": marker, "ls": LINES[(place + turn) % 4], **more}
-    for turn, more in enumerate(({}, {"mfc": "white", "ms": 5.5}))
-    for place, (colour, marker) in enumerate(zip(COLOURS_OF_MANY, "o^DsvPX", strict=True))
-)
 OTHER: Look = {"color": "0.3", "marker": "v", "ls": "-"}
 MEANINGS = {"a": "whole", "b": "whole, rattlers void", "c": "RV", "d": "RV, rattlers void"}
 # Height of each further row of panels, inches.

@@ -17,7 +17,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.fabric.contact import contact_fabric
 from scanfab.fabric.invariants import fabric_deviator
 from scanfab.viz.figures.figure import DirectionalFigure
-from scanfab.viz.figures.style import COLOURS, WIDTH, rounded_down
+from scanfab.viz.figures.style import MANY_LOOKS, WIDTH, rounded_down
 
 if TYPE_CHECKING:
     from scanfab.viz.scanned_frames import ScannedFrame, ScannedFrames
@@ -30,12 +30,7 @@ THETA_STEP = 15.0
 CONTACT_STEP = 30.0
 POLAR_ANGLES = (90.0, 60.0, 30.0)
 EQUATOR = (90.0,)
-LOOKS: tuple[dict[str, Any], ...] = (
-    {"color": COLOURS["vermilion"], "marker": "^", "ls": "-"},
-    {"color": COLOURS["blue"], "marker": "o", "ls": "--"},
-    {"color": COLOURS["green"], "marker": "D", "ls": "-."},
-    {"color": COLOURS["purple"], "marker": "s", "ls": ":"},
-)
+LOOKS = MANY_LOOKS[:4]
 # At most so many columns in the legend.
 MOST_COLUMNS = 3
 # Azimuths of smooth curves, degrees.

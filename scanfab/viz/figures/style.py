@@ -48,6 +48,14 @@ LOOKS: dict[str, dict[str, Any]] = {
     "d": {"color": COLOURS["green"], "marker": "D", "ls": "--", "mfc": "white", "ms": 5.5},
 }
 
+COLOURS_OF_MANY = ("blue", "vermilion", "green", "purple", "orange", "sky", "black")
+LINES = ("-", "--", "-.", ":")
+# Looks of curves that differ by source, size of the RV or polar angle; the second half is open.
+MANY_LOOKS: tuple[dict[str, Any], ...] = tuple(
+    {"color": COLOURS[colour], "marker": marker, "ls": LINES[(place + turn) % 4], **more}
+    for turn, more in enumerate(({}, {"mfc": "white", "ms": 5.5}))
+    for place, (colour, marker) in enumerate(zip(COLOURS_OF_MANY, "o^DsvPX", strict=True))
+)
 # Looks of the first and the last frame in one panel.
 FRAME_LOOKS: tuple[dict[str, Any], ...] = (
     {"color": COLOURS["blue"], "marker": "o", "ls": "--", "markerfacecolor": "white"},
