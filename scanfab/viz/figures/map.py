@@ -187,12 +187,11 @@ class Map(Figure):
         x, y = places[..., across], places[..., up]
         # the colours hold for all blocks, which may have no value where another frame has some
         known = values[np.isfinite(values)] if np.isfinite(values).any() else np.zeros(1)
-        signed = one.total
         largest = float(np.abs(known).max()) or 1.0
-        ends = (
-            (-largest, largest) if signed else AutoLocator().nonsingular(known.min(), known.max())
-        )
-        colours = colormaps["RdBu_r" if signed else "viridis"].with_extremes(bad=MISSING)
+        ends = -largest, largest
+        if not one.total:
+            ends = AutoLocator().nonsingular(known.min(), known.max())
+        colours = colormaps["RdBu_r" if one.total else "viridis"].with_extremes(bad=MISSING)
         values = np.ma.masked_invalid(picture)
         drawn = axes.pcolormesh(x, y, values, cmap=colours, norm=Normalize(*ends))
         for line, column in np.argwhere(hatched):
