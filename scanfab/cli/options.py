@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
-from scanfab.base.errors import ReadError, SettingsError, UnknownFormatError
+from scanfab.base.errors import ReadError, SettingsError, UnknownFormatError, note
 from scanfab.base.files import kind_of
 from scanfab.base.option import GROUPS, Option
 from scanfab.cli.console import AS_CSV, Command
-from scanfab.cli.settings_file import take_settings_file, tell_used
+from scanfab.cli.settings_file import as_listed, take_settings_file
 from scanfab.io.options import READING_OPTIONS, take_reading
 from scanfab.pipeline.options import DECLARED, Output, as_options
 from scanfab.pipeline.settings import Settings
@@ -240,9 +240,11 @@ def checked(chosen: dict[str, Any], kind: type[S]) -> tuple[dict[str, Any], S]:
     """
     The options of reading, taken out of ``chosen``, and the settings that the others are.
 
-    Wrong values are usage errors.
+    Wrong values are usage errors. A note names the options that the settings file has set.
     """
-    tell_used(click.get_current_context())
+    file = as_listed(click.get_current_context())
+    if file and file["used"]:
+        note(f"options from {file['path']}: {', '.join(file['used'])}")
     with usage_errors():
         return take_reading(chosen), kind(**chosen)
 

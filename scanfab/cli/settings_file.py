@@ -11,7 +11,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from scanfab.base.errors import SettingsError, note
+from scanfab.base.errors import SettingsError
 from scanfab.pipeline.options import OPTIONS
 
 SECTION = "compute"
@@ -57,12 +57,6 @@ def as_listed(ctx: click.Context) -> dict[str, Any]:
     taken = ParameterSource.DEFAULT_MAP
     used = [key for key in keys if ctx.get_parameter_source(KEYS[key].name) is taken]
     return {"path": str(path), "used": used, "not_used": [key for key in keys if key not in used]}
-
-
-def tell_used(ctx: click.Context) -> None:
-    """Write a note that names the options taken from the file."""
-    if (file := as_listed(ctx)) and file["used"]:
-        note(f"options from {file['path']}: {', '.join(file['used'])}")
 
 
 def _read(path: Path) -> dict[str, Any]:
