@@ -13,7 +13,6 @@ def formats() -> None:
     from scanfab.io.reader import installed_readers, lacking
     from scanfab.io.writer import installed_writers
     from scanfab.table.formats import known_formats
-    from scanfab.viz.figures.style import PLOT_FORMATS
 
     lines = []
     for kind, offers in (("reader", installed_readers()), ("writer", installed_writers())):
@@ -24,12 +23,6 @@ def formats() -> None:
     for suffix, form in known_formats().items():
         package = type(form).__module__.split(".")[0]
         lines.append(("table", suffix.lstrip("."), suffix, package, form.description))
-    for suffix, description in PLOT_FORMATS.items():
-        lines.append(("figure", suffix.lstrip("."), suffix, "scanfab", description))
-    lines += [
-        ("folder", "paraview", ".vtp .vtu .pvd", "scanfab", "what compute and map --vtk write"),
-        ("page", "html", ".html", "scanfab", "what report writes"),
-    ]
     titles = ("kind", "name", "extensions", "package", "description")
     rows = [dict(zip(titles, line, strict=True)) for line in lines]
     print_rows(rows, titles, len(titles))

@@ -20,11 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-PLOT_FORMATS = {
-    ".png": "pixels, 300 per inch",
-    ".svg": "vectors, for pages of the web and for editing",
-    ".pdf": "vectors, for print",
-}
+PLOT_FORMATS = (".png", ".svg", ".pdf")
 
 # Pixels an inch, also of the coloured disks in vector files.
 DPI = 300
