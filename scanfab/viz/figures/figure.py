@@ -62,9 +62,6 @@ class Figure:
     """Figures on a page and in lists are sorted by this number, then by name."""
     columns: ClassVar[tuple[str, ...]] = ()
     """The columns that the table must have."""
-    lettered: ClassVar[bool] = True
-    """Whether several panels have letters, (a), (b) ...; on a page of several figures they always
-    have."""
     slow: ClassVar[bool] = False
     """Whether it scans along further lines, which takes too long for a report."""
     projection: ClassVar[str | None] = None
@@ -116,9 +113,7 @@ class Figure:
                 page = pyplot.figure(layout="constrained")
                 return self.on(page.subplots(subplot_kw={"projection": self.projection}))
         if hasattr(place, "subplots"):
-            panels = self.panels(place)
-            if self.lettered:
-                style.letter(panels)
+            style.letter(self.panels(place))
             return place
         if not hasattr(place, "plot"):
             expected = "Axes, a Figure or a SubFigure of matplotlib"
@@ -338,6 +333,5 @@ def drawn_page(figures: Sequence[Figure]) -> Iterator[Page]:
         if len(figures) > 1:
             parts = page.subfigures(len(figures), 1, height_ratios=heights)
         every = [one.panels(part) for part, one in zip(parts, figures, strict=True)]
-        if len(figures) > 1 or figures[0].lettered:
-            style.letter([axes for panels in every for axes in panels])
+        style.letter([axes for panels in every for axes in panels])
         yield page

@@ -60,7 +60,7 @@ class Map(Figure):
         If there is nothing to draw.
     """
 
-    kind, order, lettered = "map", 9, False
+    kind, order = "map", 9
     columns = ("block", "x", "y", "z", "variant", "alpha_vs_axial")
 
     def __init__(self, data: Any, variant: str | None = None, quantity: str | None = None) -> None:
@@ -91,7 +91,7 @@ class Map(Figure):
     def size(self) -> tuple[float, float]:
         """Two profiles a row; of a grid three planes a row."""
         if self.is_profile:
-            return WIDTH, 0.4 + 1.75 * ((len(self.quantities) + 1) // 2)
+            return WIDTH, 0.4 + 1.9 * ((len(self.quantities) + 1) // 2)
         return WIDTH, 1.7 * len(self.quantities)
 
     @property
