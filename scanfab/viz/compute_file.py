@@ -25,6 +25,7 @@ from scanfab.pipeline.map_settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.options import Output, listening
 from scanfab.pipeline.record import part_of
 from scanfab.pipeline.settings import Settings
+from scanfab.table.selection import MAP
 from scanfab.table.table import Table, load
 from scanfab.table.writing import Excerpt
 
@@ -229,12 +230,13 @@ class VtkFolder:
     def __call__(self, result: FrameResult) -> None:
         """Write all files of a frame, and the collections with it."""
         # loaded here, as VTK takes a second that a run without these files need not wait
-        from scanfab.viz.meshes import meshes_of, save_mesh
+        from scanfab.viz.meshes import frame_meshes, map_meshes, save_mesh
 
         packing = result.sample.packing
         known = [one for one in (packing.time, packing.step, result.number) if one is not None]
+        meshes = map_meshes(result) if MAP in result.rows[0] else frame_meshes(result)
         with self._lock:
-            for kind, mesh, fields in meshes_of(result):
+            for kind, mesh, fields in meshes:
                 path = save_mesh(mesh, self.folder / f"{kind}_{result.number:06d}", fields)
                 self._collect(kind, path.name, float(known[0]))
 

@@ -25,7 +25,6 @@ from scanfab.pipeline.measurement import Measurement
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.lines import line_triads, sample_segments
 from scanfab.table.row import Row, number_of
-from scanfab.table.selection import MAP
 from scanfab.table.table import Table
 from scanfab.viz.scene import Grains, grains_of, inside
 
@@ -38,11 +37,6 @@ LINES = 120
 Fields = Mapping[str, Any]
 Meshes = Iterator[tuple[str, Any, Fields]]
 """The kind of a mesh, the mesh, and its field data."""
-
-
-def meshes_of(result: FrameResult) -> Meshes:
-    """The meshes of a frame, or those of the blocks of a map."""
-    return map_meshes(result) if MAP in result.rows[0] else frame_meshes(result)
 
 
 def frame_meshes(result: FrameResult) -> Meshes:
