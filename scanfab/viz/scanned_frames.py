@@ -9,7 +9,6 @@ from typing import Any
 
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
-from scanfab.base.option import options_of, refuse_unknown
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.io.series import Series
@@ -71,12 +70,12 @@ def scan_frames(
     >>> frames.plot.histogram(ax=ax).get_ylabel()
     'probability density'
     """
-    refuse_unknown("scan_frames", options, [one.name for one in options_of(Settings)])
+    settings = Settings(**options)
     rows = None if table is None else list(table)
     if rows is not None and len({row["source"] for row in rows}) > 1:
-        name = Frames(source, Settings()).name
+        name = Frames(source, settings).name
         rows = [row for row in rows if row["source"] == name]
-    return ScannedFrames(source, Settings(**options), rows)
+    return ScannedFrames(source, settings, rows)
 
 
 class ScannedFrame:

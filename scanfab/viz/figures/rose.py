@@ -12,6 +12,7 @@ from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.option import numbers
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.contact import contact_fabric
@@ -31,6 +32,10 @@ CONTACT_STEP = 30.0
 POLAR_ANGLES = (90.0, 60.0, 30.0)
 EQUATOR = (90.0,)
 LOOKS = MANY_LOOKS[:4]
+parse_angles = numbers(
+    "one to four polar angles above 0 and up to 90 degrees, such as rose:30,60,90",
+    lambda angles: 0 < len(angles) <= len(LOOKS) and all(0 < angle <= 90 for angle in angles),
+)
 # At most so many columns in the legend.
 MOST_COLUMNS = 3
 # Azimuths of smooth curves, degrees.
@@ -119,16 +124,12 @@ class Rose(DirectionalFigure):
         of: str | None = None,
     ) -> None:
         super().__init__(data, frame, of)
-        self.angles = _checked_angles(angles, angles)
+        self.angles = parse_angles("angles", angles)
 
     @classmethod
     def parse(cls, argument: str) -> dict[str, Any]:
         """Polar angles such as ``30,60,90``."""
-        try:
-            angles = [float(word) for word in argument.split(",")]
-        except ValueError:
-            angles = []
-        return {"angles": _checked_angles(angles, f"rose:{argument}")}
+        return {"angles": parse_angles("figure", argument)}
 
     @property
     def space(self) -> Space:
@@ -198,13 +199,6 @@ class Rose(DirectionalFigure):
         if isinstance(place, FigureBase):
             where = {"loc": "outside lower center", "ncols": min(len(labels), MOST_COLUMNS)}
         place.legend(handles, labels, title=note, **where)
-
-
-def _checked_angles(angles: Sequence[float], found: object) -> tuple[float, ...]:
-    if not 0 < len(angles) <= len(LOOKS) or not all(0 < angle <= 90 for angle in angles):
-        expected = "one to four polar angles above 0 and up to 90 degrees, such as rose:30,60,90"
-        raise SettingsError(f"figure: expected {expected}, found {found!r}")
-    return tuple(angles)
 
 
 def _scale(reach: float) -> tuple[float, list[float]]:

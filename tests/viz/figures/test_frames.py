@@ -121,7 +121,7 @@ def test_a_notebook_scans_frames_by_the_options_of_compute(series, computed):
     assert repr(middle) == f"ScannedFrames(variant b of {SAMPLE}, frames 2 and 3)"
     (frame,) = scanfab.scan_frames(series, **WORDS, frames=6).frames
     assert frame.title.startswith(r"variant c, frame 6, $\varepsilon_a$ = 15")
-    with pytest.raises(TypeError, match="scan_frames has no option 'tolerence': did you mean"):
+    with pytest.raises(TypeError, match="Settings has no option 'tolerence': did you mean"):
         scanfab.scan_frames(series, tolerence=1e-3)
     rows = [{**row, "alpha_vs_axial": None} for row in computed.rows]
     with pytest.raises(SettingsError, match="no frame has a void fabric of variant c"):
@@ -154,7 +154,7 @@ def test_one_panel_is_drawn_on_the_axes_that_it_gets(scanned):
     # beside it the scale
     assert page.axes[1].get_ylabel() == "deviation from the mean in %"
     for error, message, words in (
-        (SettingsError, r"figure: expected one to four .*found \(95,\)", {"angles": (95,)}),
+        (SettingsError, r"angles: expected one to four .*found \(95,\)", {"angles": (95,)}),
         (SettingsError, "frame: expected 0 and 6, found 3", {"frame": 3}),
         (SettingsError, "of: expected voids or contacts, found 'void'", {"of": "void"}),
         (TypeError, "the figure rose has no option 'angel': did you mean", {"angel": (90,)}),
@@ -167,7 +167,7 @@ def test_one_panel_is_drawn_on_the_axes_that_it_gets(scanned):
 
 def test_angles_that_cannot_be_are_an_error():
     for text in ("rose:", "rose:0", "rose:91", "rose:x", "rose:1,2,3,4,5"):
-        with pytest.raises(SettingsError, match=f"figure: expected one to four .*'{text}'"):
+        with pytest.raises(SettingsError, match=f"figure: expected one to four .*'{text[5:]}'"):
             find_figure(text, "frames")
 
 
