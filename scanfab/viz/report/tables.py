@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -244,30 +244,24 @@ def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, A
         )
     groups = groups_of(filled)
     for (source, variant), group in groups.items():
+        peak = max(group, key=lambda row: abs(float(row[VOID])))
+        signal, total = abs(float(peak[VOID])), total_error(peak, VOID)
         if not numbers_of(group, f"{VOID}_se"):
             found.append(
                 f"Variant {variant} of {source} has no standard error of the scan: it was made of "
                 f"one replicate, or the table lacks the column {VOID}_se. Without that part there "
                 f"is no error in all, and none behind ±."
             )
-    found += _large_errors(groups)
-    if groups and max(map(len, groups.values())) < 3:
-        found.append(
-            "There are fewer than three frames: no line is fitted to void against contact fabric."
-        )
-    return list(dict.fromkeys(found))
-
-
-def _large_errors(groups: Mapping[tuple[str, str], Sequence[Row]]) -> Iterator[str]:
-    """Warn of variants with a large total error, and say what would make it smaller."""
-    for (source, variant), group in groups.items():
-        peak = max(group, key=lambda row: abs(float(row[VOID])))
-        signal, total = abs(float(peak[VOID])), total_error(peak, VOID)
-        if total is not None and total > NOTABLE * signal:
+        elif total is not None and total > NOTABLE * signal:
             scan, sample = (_cells(peak)[part] for part in ("scan", "sample"))
-            yield (
+            found.append(
                 f"{source}, variant {variant}: where α_vs is largest, its standard error is more "
                 f"than a tenth of it ({total:.2g} beside {signal:.2g}). A smaller `tolerance` or "
                 f"`spacing` makes the scan's part smaller ({scan}), only more grains the sample's "
                 f"part ({sample})."
             )
+    if groups and max(map(len, groups.values())) < 3:
+        found.append(
+            "There are fewer than three frames: no line is fitted to void against contact fabric."
+        )
+    return list(dict.fromkeys(found))
