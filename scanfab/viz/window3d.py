@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 import pyvista
 
-from scanfab.base.convex import Convex
 from scanfab.base.errors import ScanfabError
 from scanfab.base.files import whole_file
 from scanfab.base.typing import BoolArray, FloatArray
@@ -111,7 +110,13 @@ def _draw(plotter: Any, scene: Scene, up: FloatArray, title: str) -> None:
         shown &= grains.in_window | ((grains.places - scene.center) @ look <= 0.0)
     names = _add_grains(plotter, scene, shown, toward)
     for one in reversed(scene.windows):
-        _add_window(plotter, scene, one, toward)
+        mesh, smooth = window_mesh(scene.center, one, nsub=5), not len(one.planes)
+        style: dict[str, Any] = {"opacity": 0.12, "smooth_shading": smooth}
+        if scene.is_section:
+            # its outline
+            cut = mesh if one.is_flat else mesh.slice(normal=toward, origin=scene.center)
+            mesh, style = cut.tube(radius=0.004 * one.reach), {"lighting": False}
+        plotter.add_mesh(mesh, color=COLOURS["blue"], **style)
     if scene.lines is not None:
         names |= _add_lines(plotter, scene)
     points, radius = grains.position[shown], grains.radius[shown]
@@ -165,16 +170,6 @@ def _glyphs(places: FloatArray, radius: FloatArray, shape: Any, colours: FloatAr
     cloud.point_data["diameter"] = 2.0 * radius
     cloud.point_data["colour"] = np.rint(255.0 * colours).astype(np.uint8)
     return cloud.glyph(geom=shape, scale="diameter", orient=False)
-
-
-def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) -> None:
-    """Draw the surface of an RV, or its outline in a section."""
-    mesh, smooth = window_mesh(scene.center, window, nsub=5), not len(window.planes)
-    look: dict[str, Any] = {"opacity": 0.12, "smooth_shading": smooth}
-    if scene.lines is not None or window.is_flat:
-        cut = mesh if window.is_flat else mesh.slice(normal=toward, origin=scene.center)
-        mesh, look = cut.tube(radius=0.004 * window.reach), {"lighting": False}
-    plotter.add_mesh(mesh, color=COLOURS["blue"], **look)
 
 
 def _add_lines(plotter: Any, scene: Scene) -> dict[str, str]:
