@@ -215,8 +215,8 @@ def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
     """
     Parallel scan lines, inclined to the axis, in a plane through the centre that holds the axis.
 
-    In the dump's coordinates; clipped to the RV, if there is one, in which periodic images of the
-    grains are solid too.
+    In the dump's coordinates; clipped to the RV, if there is one. The scene of a periodic sample
+    must hold the images that reach into the RV, as :func:`about_window` adds them.
     """
     grains, solid = scene.grains, ~scene.grains.boundary
     up = np.asarray(axis, dtype=np.float64)
@@ -229,9 +229,6 @@ def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
     reach = float(np.linalg.norm(position, axis=1).max(initial=0.0))
     if scene.window is not None:
         reach = scene.window.reach
-    if scene.cell is not None and scene.window is not None:
-        position, row = scene.cell.images_near_origin(position, radius + reach)
-        radius = radius[row]
     spacing = max(2.5 * float(radius.mean()), reach / 40) if len(radius) else reach
     steps = np.arange(-reach + 0.5 * spacing, reach, spacing) if spacing > 0 else np.zeros(0)
     points = np.column_stack([steps, np.zeros_like(steps)])

@@ -85,8 +85,8 @@ def test_a_section_cuts_periodic_images_too():
     """A crystal looks the same about each of its grains, also one at the corner of the cell."""
     sample = sample_of(*simple_cubic(4), cell=scanfab.Cell([4.0, 4.0, 4.0]))
     middle, corner = (
-        section_lines(scene_of(sample, Window(np.array(place), sphere(1.6))), (0, 0, 1))
-        for place in ([2.5, 2.5, 2.5], [0.5, 3.5, 0.5])
+        section_lines(about_window(scene_of(sample, Window(np.array(one), sphere(1.6)))), (0, 0, 1))
+        for one in ([2.5, 2.5, 2.5], [0.5, 3.5, 0.5])
     )
     np.testing.assert_allclose(np.sort(corner.length), np.sort(middle.length), atol=1e-9)
     assert corner.length[corner.void].max() < 1.6
