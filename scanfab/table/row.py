@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -11,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from scanfab.base.column import NoColumnError
-from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
 
 Rows = Sequence[Mapping[str, Any]]
@@ -184,25 +182,6 @@ def total_errors(rows: Iterable[Mapping[str, Any]], name: str) -> FloatArray:
     return np.array([total_error(row, name) for row in rows], np.float64)
 
 
-def as_text(rows: Rows, names: Sequence[str]) -> str:
-    """A table as text: the number of rows, and the first and last rows."""
-    lines = _lines(rows, names) if rows else []
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    padded = ["  ".join(map(str.rjust, line, widths)) for line in lines]
-    return "\n".join([f"Table of {counted(len(rows), 'row')}", *padded])
-
-
-def as_html(rows: Rows, names: Sequence[str]) -> str:
-    """A table as HTML for notebooks: the number of rows, and the first and last rows."""
-    heads, *lines = [[html.escape(cell) for cell in line] for line in _lines(rows, names)]
-    head = "".join(f"<th>{title}</th>" for title in heads)
-    body = "".join(f"<tr><td>{'</td><td>'.join(line)}</td></tr>" for line in lines)
-    return (
-        f"<table><caption>Table of {counted(len(rows), 'row')}</caption>"
-        f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-    )
-
-
 def same_in_all(rows: Rows, names: Iterable[str]) -> set[str]:
     """Those of the columns that have one value in all rows, or are in none."""
     return {name for name in names if len({row.get(name) for row in rows}) <= 1}
@@ -229,8 +208,8 @@ def with_error(value: float | None, error: float | None, alone: str = ".3g") -> 
     return f"{value:.{decimals}f} ± {error:.{decimals}f}"
 
 
-def _lines(rows: Rows, names: Sequence[str]) -> list[list[str]]:
-    """Titles, then the cells of each row; dots replace the middle of a long table."""
+def shown_cells(rows: Rows, names: Sequence[str]) -> list[list[str]]:
+    """Titles, then the cells of the first and last rows; dots stand for those between them."""
 
     def cell(row: Mapping[str, Any], name: str) -> str:
         value = row.get(name)

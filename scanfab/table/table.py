@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,12 +13,13 @@ import numpy.typing as npt
 
 from scanfab.base.column import DEFAULT_DIGITS, Column, NoColumnError
 from scanfab.base.errors import ReadError, SettingsError
+from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.tensor import COMPONENTS
 from scanfab.table.columns import MORE_COLUMNS, table_columns
 from scanfab.table.formats import data_frame, read_rows
 from scanfab.table.plots import Plots
-from scanfab.table.row import Row, as_html, as_text
+from scanfab.table.row import Row, shown_cells
 from scanfab.table.selection import MAP
 from scanfab.table.writing import Excerpt, plain, write_rows
 
@@ -289,10 +291,20 @@ class Table(Sequence[Row]):
         return self._frame.clone()
 
     def __repr__(self) -> str:
-        return as_text(list(self), self.names)
+        lines = shown_cells(list(self), self.names) if len(self) else []
+        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+        padded = ["  ".join(map(str.rjust, line, widths)) for line in lines]
+        return "\n".join([f"Table of {counted(len(self), 'row')}", *padded])
 
     def _repr_html_(self) -> str:
-        return as_html(list(self), self.names)
+        cells = shown_cells(list(self), self.names)
+        heads, *lines = [[html.escape(cell) for cell in line] for line in cells]
+        head = "".join(f"<th>{title}</th>" for title in heads)
+        body = "".join(f"<tr><td>{'</td><td>'.join(line)}</td></tr>" for line in lines)
+        return (
+            f"<table><caption>Table of {counted(len(self), 'row')}</caption>"
+            f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+        )
 
 
 def _columns(rows: Sequence[Mapping[str, Any]]) -> tuple[Column, ...]:
