@@ -14,7 +14,6 @@ from scanfab.base.errors import ScanfabError, SettingsError
 from scanfab.base.files import whole_file
 from scanfab.io.families import PathLike
 from scanfab.io.series import Series
-from scanfab.packing.cell import Cell
 from scanfab.pipeline.options import Told, as_options, listening
 from scanfab.pipeline.record import read_manifest, reopen, repeat_command, restored_settings
 from scanfab.pipeline.settings import Settings
@@ -283,22 +282,19 @@ def _facts(look: Look) -> list[tuple[str, str]]:
     radii, boundary = first.packing.radius[first.grains], first.number(first.boundary)
     smallest, mean = float(radii.min()), float(radii.mean())
     axis = [name for name, part in zip("xyz", look.axis, strict=True) if part == 1.0]
+    cell, told = look.sample.packing.cell, "not periodic"
+    if cell is not None and any(cell.periodic):
+        along = "".join(name for name, repeats in zip("xyz", cell.periodic, strict=True) if repeats)
+        told = f"periodic along {along}, vectors ({'; '.join(map(_numbers, cell.vectors))})"
     return [
         ("grains", f"{first.number(first.grains)} in the reference frame"),
         ("radii", f"smallest {smallest:.4g}, mean {mean:.4g}, largest {radii.max():.4g}"),
         ("boundary", f"{boundary} particles" if boundary else "none"),
-        ("cell", _cell(look.sample.packing.cell)),
+        ("cell", told),
         ("loading axis", axis[0] if axis else _numbers(look.axis)),
         ("cut-off", f"{plan.cutoff:.4g}, {plan.cutoff / smallest:.3g} smallest radii"),
         *(("RV", f"{one.shape} about ({_numbers(one.center)})") for one in plan.windows),
     ]
-
-
-def _cell(cell: Cell | None) -> str:
-    if cell is None or not any(cell.periodic):
-        return "not periodic"
-    along = "".join(name for name, repeats in zip("xyz", cell.periodic, strict=True) if repeats)
-    return f"periodic along {along}, vectors ({'; '.join(map(_numbers, cell.vectors))})"
 
 
 def _numbers(vector: Any) -> str:
