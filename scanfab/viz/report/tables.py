@@ -39,6 +39,7 @@ TITLES = {
     "alpha_vs": "void intensity",
     "alpha_c": "contact intensity",
 }
+INTENSITIES = ("void intensity", "contact intensity", "angle between their axes")
 # Names of the lines of the results with their titles in the table of frames.
 RESULTS = {
     **{name: name for name in ("frame", "axial strain", "shear strain")},
@@ -46,9 +47,9 @@ RESULTS = {
     "its error: scan": "scan",
     "its error: sample": "sample",
     "α_c along the loading axis": "α_c ±",
-    **{name: name for name in ("void intensity", "contact intensity", "angle between their axes")},
+    **{name: name for name in INTENSITIES},
 }
-INTENSITIES = (
+OF_INTENSITIES = (
     "Intensities are largest minus smallest principal value, whichever way the axes point: never "
     "negative, so noise raises them. The table has no errors of them."
 )
@@ -113,9 +114,11 @@ def results_tables(summary: Sequence[TableRow], rows: Sequence[Row]) -> list[Par
         own = [one for one in summary if one.source == source]
         groups = [filled.get((source, variant_of(one))) for one in own]
         cells = [_cells(group[-1]) if group else {} for group in groups]
-        lines = {name: [one.get(title, "-") for one in cells] for name, title in RESULTS.items()}
-        # no line is fitted to turned axes, as axial values miss their fabric
-        if not is_turned([row for row in rows if row["source"] == source]):
+        turned = is_turned([row for row in rows if row["source"] == source])
+        # axial values miss the fabric of turned axes: intensities lead, and no line is fitted
+        names = [*INTENSITIES * turned, *RESULTS]
+        lines = {name: [one.get(RESULTS[name], "-") for one in cells] for name in names}
+        if not turned:
             lines |= {
                 "slope of α_vs on α_c": [with_error(one.slope, one.slope_se, ".5f") for one in own],
                 "R² of that line": [_spell(one.r2) for one in own],
@@ -123,7 +126,7 @@ def results_tables(summary: Sequence[TableRow], rows: Sequence[Row]) -> list[Par
                 "frames in the line": [str(one.frames) for one in own],
             }
         shown = [[name, *cells] for name, cells in lines.items() if {*cells} != {"-"}]
-        parts.append(Part(["variant", *map(variant_of, own)], shown, INTENSITIES, source))
+        parts.append(Part(["variant", *map(variant_of, own)], shown, OF_INTENSITIES, source))
     return parts
 
 
