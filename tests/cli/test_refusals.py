@@ -66,6 +66,7 @@ LINES = [
     ("compare row.csv --variants x", 2, "--variants: expected letters out of abcd, found 'x'"),
     ("convert cube - --to csv", 2, "nothing is written to standard output"),
     ("view cube --screenshot x.jpg", 2, "screenshots are PNG files"),
+    ("view cube --screenshot absent/x.png", 2, "there is no folder absent to write to"),
     # what does not fit the sample
     ("compute notes", 1, "no reader knows this format"),
     ("compute cube --spacing 50 -o out.csv", 1, "spacing: expected a length from"),

@@ -215,7 +215,10 @@ def test_frames_are_chosen_and_named_by_step_or_number(tmp_path):
 
     source = series(tmp_path / "dumps")
     assert names(source, "1:") == ["g-100", "g-2000"]
-    assert names(repeat(PLAIN), "1:4:2") == ["g-1", "g-3"]
+    # those behind the chosen ones are not asked for
+    packings = repeat(PLAIN, 5)
+    assert names(packings, ":4:2") == ["g-0", "g-2"]
+    assert list(packings) == [PLAIN]
     assert names(packing for packing in (EVERYTHING, PLAIN)) == ["g-123456789012", "g-1"]
     for one, step in ((source, 2000), ([PLAIN, EVERYTHING], EVERYTHING.step)):
         (path,) = scanfab.convert(one, tmp_path / "last.npz", frames=-1)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from scanfab import SettingsError, direction_rule, scan_lines
+import scanfab
+from scanfab import Cell, Packing, Sample, SettingsError, direction_rule, scan_lines
 from scanfab.base.arrays import concatenated
 from scanfab.scan.lines import line_triads, turned_triads
 from scanfab.scan.solids import MAX_LINES
@@ -109,6 +110,12 @@ def test_spacing_that_asks_for_too_many_lines_is_an_error(solids):
     spacing = 2 * 3.0 / MAX_LINES**0.5
     with pytest.raises(SettingsError, match=r"^spacing: .* choose a wider spacing"):
         scan_lines(solids, RULE, spacing=spacing, cutoff=0.3)
+    # of a column in a cell that does not repeat along it, the height counts
+    cell = Cell([1, 1, 1], (True, True, False))
+    column = Packing([[0, 0, 0], [0, 0, 1000]], 0.5, contacts=[], cell=cell)
+    high = scanfab.solids_of(Sample(column, np.zeros(2, bool)), variants="a")
+    with pytest.raises(SettingsError, match=r"^spacing: .* choose a wider spacing"):
+        scan_lines(high, RULE, spacing=0.1, cutoff=0.3, replicates=[0])
     for spacing in (0.0, -0.5, np.nan):
         with pytest.raises(SettingsError, match="spacing: expected a length above 0, found"):
             scan_lines(solids, RULE, spacing=spacing, cutoff=0.3)
