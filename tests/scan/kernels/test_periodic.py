@@ -198,15 +198,16 @@ def test_without_solids_all_lines_are_channels(corner):
 def test_without_overlap_the_mean_gap_is_that_of_stereology():
     """Porosity / (N_V π⟨r²⟩) at cut-off 0, in every direction without channels."""
     random = np.random.default_rng(3)
-    vectors = np.array([[3.0, 0, 0], [1.0, 3, 0], [-1.0, 0.5, 3]])
-    position = simple_cubic(3).position / 3 @ vectors + random.uniform(-0.04, 0.04, (27, 3))
-    radius = random.uniform(0.25, 0.42, 27)
+    # of a hundredth, as no length is absolute
+    vectors = np.array([[0.03, 0, 0], [0.01, 0.03, 0], [-0.01, 0.005, 0.03]])
+    position = simple_cubic(3).position / 3 @ vectors + random.uniform(-4e-4, 4e-4, (27, 3))
+    radius = random.uniform(0.0025, 0.0042, 27)
     medium = medium_of(position, radius, vectors)
     volume = abs(np.linalg.det(vectors))
     porosity = 1 - 4 / 3 * np.pi * np.sum(radius**3) / volume
     expected = porosity * volume / (np.pi * np.sum(radius**2))
     total = sum(
-        tallies_of(medium, unit_vectors(random), random.random(2), 0.04, 0.0)[0] for _ in range(60)
+        tallies_of(medium, unit_vectors(random), random.random(2), 4e-4, 0.0)[0] for _ in range(60)
     )
     assert total[sweep.LENGTH] / total[sweep.KEPT] == pytest.approx(expected, rel=0.01)
     assert total[sweep.VOID] / total[sweep.LINE_LENGTH] == pytest.approx(porosity, rel=0.01)
