@@ -23,7 +23,7 @@ from scanfab.base.errors import (
 from scanfab.cli.main import run
 from scanfab.io import frame as frame_module
 from scanfab.io.formats.lammps import LiggghtsReader
-from scanfab.io.reader import installed_readers, reader_for
+from scanfab.io.reader import installed_readers
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
 from tests.helpers.dumps import PAIRS, cubic_rows, dump_text, pairs_text, refuses, write
@@ -130,7 +130,6 @@ NO_CONTACTS = [
     ("dump_9.txt", "expected contacts, found grains"),
     ("nowhere.txt", "there is no such file"),
     ("nowhere_*.txt", "matches nothing"),
-    ("pairs_10.txt", "no contact file for step 9"),
 ]
 
 
@@ -286,12 +285,6 @@ def test_a_name_that_does_not_exist_is_an_error_that_lists_those_that_do():
     assert installed_readers()["yade"].package == "scanfab"
     with pytest.raises(UnknownFormatError, match=r"called 'rocky'.* liggghts, .*, vtk, xyz, yade"):
         scanfab.read(FLOOR / "tutorial.txt", format="rocky")
-
-
-def test_the_name_of_a_file_does_not_matter(tmp_path):
-    for name in ("log.txt", "deck.vtk", "notes.dump", "x.vtu", "no_ending_at_all"):
-        assert reader_for(write(tmp_path / name, "hello\n")) is None
-        assert reader_for(write(tmp_path / name, dump_text())).name == "liggghts"
 
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "a"}

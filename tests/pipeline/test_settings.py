@@ -3,7 +3,6 @@
 import dataclasses
 import inspect
 import warnings
-from functools import partial
 
 import numpy as np
 import pytest
@@ -134,12 +133,6 @@ CONTRADICTIONS = [
 def test_settings_must_go_together(options, words):
     with pytest.raises(SettingsError, match=words):
         Settings(**options)
-
-
-@pytest.mark.parametrize("function", [partial(scanfab.compute, []), Settings])
-def test_a_wrong_name_is_named_with_the_nearest(function):
-    with pytest.raises(TypeError, match=r"^\w+ has no option 'tolerence': did .* 'toler"):
-        function(tolerence=1e-3)
 
 
 def test_the_signature_and_the_help_of_compute_have_every_option():

@@ -13,7 +13,6 @@ import pytest
 from scanfab.base.errors import ReadError, ScanfabError, SettingsError
 from scanfab.table import formats
 from scanfab.table.columns import COLUMNS, table_columns
-from scanfab.table.compare import compare_tables
 from scanfab.table.formats import OWN_FORMATS
 from scanfab.table.row import Row
 from scanfab.table.table import Table, load
@@ -144,14 +143,6 @@ def test_tensors_have_their_components_and_their_symmetry(results):
     assert np.isnan(found[0, 0, 2])
     with pytest.raises(ScanfabError, match="no column 'gv_xx': did you mean gvs_xx"):
         results.tensor("gv")
-
-
-def test_a_table_compares_itself(results):
-    found = results.compare()
-    assert compare_tables(results).summary == found.summary
-    (row,) = found.summary
-    assert (row.slope, row.peak, row.slope_se) == (pytest.approx(0.1), pytest.approx(0.002), None)
-    assert "variant c: slope 0.1, 3 frames" in repr(found)
 
 
 @pytest.mark.parametrize("suffix", [one.suffix for one in OWN_FORMATS])

@@ -18,7 +18,6 @@ WRONG = {
     "esys": [
         ("snap_t=30_0.txt", "_2.txt", "_1.txt", "each worker's file once"),
         ("snap_t=30_0.txt", " snap_t=30_2.txt", "", "and 1 other files: it is cut"),
-        ("snap_t=30_1.txt", "2\n1 1", "9\n1 1", "30_1.txt: the header counts 9 particles"),
         ("snap_t=30_1.txt", "2\n1 1", "1\n1 1", "30_1.txt: .* counts 1 particles, found 2"),
         ("snap_t=30_1.txt", "0.25 4 77", "0.25 4", "30_1.txt: .* counts 2 particles, found 0"),
         ("snap_t=30_2.txt", "1\n3.75", "x\n3.75", "30_2.txt: expected the number of particles"),
@@ -33,7 +32,6 @@ WRONG = {
     "lammps": [
         ("a.yaml", "natoms: 3", "natoms: 4", "counts 4 rows, found 3"),
         ("a.yaml", "0.39", "oops", "a.yaml, line 19: .* found 'oops'"),
-        ("a.yaml", ", -3, ]\n  -", ", ]\n  -", "line 18: expected 7 columns, found 6"),
         ("a.yaml", "p, f", "p, q", "expected three boundary flags"),
         ("a.yaml", "box:", "bax:", "expected 6 numbers"),
         ("a.yaml", "data:\n  - [", "", "whole number"),
@@ -55,14 +53,11 @@ WRONG = {
             for bad in all_bad
         ),
         ("one.txt", "ff ff ff", "zz zz zz", "BOX BOUNDS.*expected"),
-        ("one.txt", "ff ff ff", "pp pp", "BOX BOUNDS.*expected"),
         ("one.txt", "ITEM: TIMESTEP\n0\n", "", "expected the header of a frame"),
         ("one.txt", "ff ff ff\n0 1\n", "ff ff ff\n", "BOX BOUNDS.*expected 6 numbers"),
         ("one.txt", "ITEM: TIMESTEP", TIME, "ITEM: TIME: expected 1 num"),
         ("one.txt", "ATOMS\n3", "ATOMS\n9", "step 0: .*counts 9 rows, found 3: .* incomplete"),
-        ("one.txt", "ATOMS\n3", "ATOMS\n2", "counts 2 rows, found 3"),
         ("one.txt", "0.39", "oops", "one.txt, line 11: .* found 'oops'"),
-        ("one.txt", "2 1 0.39", "2 1", "one.txt, line 11: expected 6 columns, found 5"),
         ("plain.data", "data file", "Description", "expected diameters.*YADE's radii"),
         ("plain.data", " 1.0 2500 0", " 1.0 0 2500", "density, found '1 1 1 0 2500.*names them"),
         ("plain.data", " 1.0 2500", " 0 2500", "expected a positive diameter"),
@@ -71,10 +66,8 @@ WRONG = {
         ("plain.data", "Atoms\n", "Atoms # atomic\n", "found 'Atoms # atomic'"),
         ("plain.data", "Atoms\n", "Masses\n", "expected .* a section Atoms"),
         ("plain.data", "3 atoms", "99999 atoms", "counts 99999 atoms, found 3"),
-        ("plain.data", "\nVelocities", "4\n\nVelocities", "counts 3 atoms, found 4"),
         ("plain.data", "-1 3 xlo", "-1 xlo", "xlo xhi.*: expected 6 numbers"),
         ("plain.data", "2 1 1.0", "2 1 word", "line 12: expected a number .* found 'word'"),
-        ("plain.data", "2 1 1.0 2500", "2 1 1.0", "line 12: expected 7 columns, found 6"),
         ("plain.data", "Atoms\n\n1 1 1.0", "Atoms # sphere\n\n1 1 nan", "must be finite"),
     ],
     "mercurydpm": [
@@ -110,7 +103,6 @@ WRONG = {
         ("save.xml", "<m00>1.0</m00>", "<m00>0.0</m00>", "span no volume"),
         ("attrs.txt", "r_attrs", "r_nothing", "line 1 names 5 columns, but the rows have 6"),
         ("attrs.txt", "1 2 3\n", "oops 2 3\n", "attrs.txt, line 3: .*oops"),
-        ("pack.txt", "2 0 0 1 -1", "2 0 0 1", "pack.txt, line 3: expected 5 columns"),
         # a sign of a comment inside a row is damage, which must not cut the row short
         ("pack.txt", "2 0 0 1 -1", "2 0 0 1 -1#5", "line 3: expected a number .* found '-1#5'"),
         ("pack.txt", "4 4 4", "4 4", "line 1: expected 3 numbers"),
@@ -157,9 +149,7 @@ TEXTS = [
 TABLES = [
     ("".join(f"{k}e300 0 0 1e-300\n" for k in range(12)), "below 1e-100"),
     ("", "expected a table, found no row"),
-    ("x,y,z,radius\n1,2,3,4\n1,2,3\n", "line 3: expected 4 columns, found 3"),
     ("x,y,z,radius,q\n1,2,3,4\n", "expected 5 columns, one for each name, found 4"),
-    ("x,y,z,radius\n-,m,m,m\n1,2,3,4\n", "line 2: expected a number in the column x"),
     ("x,y,z,radius\n1,2,3,4\x01\n", "line 2: expected text, found the byte 1"),
     ("x,y,z,radius\r1,2,3,4\r", "without a line end"),
     ("1 " * 5000 + "\n", "at most 4096 columns, found 5000"),
