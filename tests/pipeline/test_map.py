@@ -84,7 +84,7 @@ def layers(random, flat):
 
 
 def test_slices_tell_two_layers_of_known_fabric_apart():
-    table, told = mapped(layers(np.random.default_rng(1), 1.0), slices=4, cutoff=0.2)
+    table, told = mapped(layers(np.random.default_rng(1), 1.0), slices=4, cutoff=0.2, spacing=0.3)
     lower, upper = table["alpha_vs_axial"][:2], table["alpha_vs_axial"][2:]
     errors = np.hypot(table["alpha_vs_axial_se"], table["alpha_vs_axial_sample_se"])
     assert lower.min() - upper.max() > 6 * errors.max()
@@ -98,7 +98,7 @@ def test_blocks_of_a_homogeneous_medium_agree_with_the_whole():
     packing = Packing(position, radius, cell=Cell([20.0] * 3))
     beta, solid = 0.15 * np.pi * 13 / 12, 1 - np.exp(-0.15 * 4 / 3 * np.pi * 1.25)
     for kind in ({"grid": (2, 2, 2)}, {"shells": 2}):
-        table, told = mapped(packing, spacing=0.3, **kind)
+        table, told = mapped(packing, spacing=0.5, **kind)
         errors = np.hypot(table["alpha_vs_axial_se"], table["alpha_vs_axial_sample_se"])
         # the errors of eight parts are uncertain, and this sample's density is off by chance
         assert np.all(np.abs(table["alpha_vs_axial"]) < 6 * errors)
@@ -110,7 +110,8 @@ def test_blocks_of_a_homogeneous_medium_agree_with_the_whole():
 @pytest.mark.parametrize("kind", [{"grid": (4, 4, 4)}, {"shells": 4}])
 def test_solid_fraction_is_that_of_a_lattice_and_empty_at_an_open_surface(kind):
     position, radius = simple_cubic(16)
-    table, _ = mapped(Packing(position, radius * 0.98), contact_tolerance=0.05, **kind)
+    words = {"contact_tolerance": 0.05, "spacing": 0.3, **kind}
+    table, _ = mapped(Packing(position, radius * 0.98), **words)
     outer = table["at_surface"] == 1
     # all but the middle ones
     assert np.count_nonzero(~outer) == (8 if "grid" in kind else 3)
@@ -165,11 +166,11 @@ def test_blocks_of_later_frames_and_of_frames_without_grains():
             Packing(position * one, radius * 0.9, cell=cell)
             for one, cell in zip((np.ones(3), squeeze), cells, strict=True)
         ]
-        table, _ = mapped(frames, slices=2, contact_tolerance=0.2)
+        table, _ = mapped(frames, slices=2, contact_tolerance=0.2, spacing=0.6)
         assert table["grains"].tolist() == [256, 256, *grains]
         assert table["z"].tolist() == pytest.approx([2.0, 6.0, *z], abs=0.06)
     empty = Packing(np.zeros((0, 3)), np.zeros(0))
-    table, _ = mapped([empty, frames[0]], slices=2, contact_tolerance=0.2)
+    table, _ = mapped([empty, frames[0]], slices=2, contact_tolerance=0.2, spacing=0.6)
     assert table["grains"].tolist()[:2] == [0, 0]
     assert (table[0].alpha_vs_axial is None, table[3].alpha_vs_axial is None) == (True, False)
     assert [row.z for row in table[:2]] == [row.z for row in table[2:]]
@@ -183,7 +184,7 @@ def test_what_holds_for_one_frame_is_told_for_it(packing):
     assert frames == ["frame 0", "frame 1"]
     position, radius = simple_cubic(8)
     frames = [Packing(one * position, 0.9 * radius, contacts=[[0, 1]]) for one in (1.0, 1.1)]
-    _, told = mapped(frames, grid=(2, 2, 2))
+    _, told = mapped(frames, grid=(2, 2, 2), spacing=0.6)
     (outside,) = [one for one in told if "lie outside the blocks" in one]
     edges = ((1.1 * position < position.min()) | (1.1 * position > position.max())).any(axis=1)
     assert outside.startswith(f"frame 1, variant a: {edges.sum()} of 512 grains")
