@@ -11,8 +11,6 @@ from scanfab.pipeline.state import sample_state
 from tests.helpers.truth import (
     BOX,
     COMPONENTS,
-    FLOOR,
-    PERIODIC,
     SAMPLE_DATA,
     TRIAXIAL,
     csv_rows,
@@ -78,35 +76,6 @@ def test_contacts_are_found_by_geometry_but_for_a_few(series_options, name):
     assert set(whole["contacts_from"].tolist()) == {"geometric"}
     for column in ("contacts", "rattlers"):
         assert np.abs(whole[column] - engine[column]).max() <= 3
-
-
-@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
-def test_without_walls_in_the_table_the_extent_of_the_grains_tells_the_strain_if_asked():
-    for strain, expected in (("grains", PLATES["strain"]), ("auto", np.full(7, np.nan))):
-        found = scanfab.compute(scanfab.read_series(BOX), strain=strain, variants="a", **SCAN)
-        np.testing.assert_allclose(found["strain"], expected, rtol=0, atol=1e-2)
-
-
-@pytest.mark.parametrize(
-    ("state", "files"),
-    [
-        ("floor", [FLOOR / "tutorial.txt", FLOOR / "pairs_all.txt.gz", FLOOR / "walls_all.txt"]),
-        ("periodic", [PERIODIC / "precise.txt", PERIODIC / "pairs.txt"]),
-    ],
-)
-def test_the_small_liggghts_states_have_their_true_numbers(state, files):
-    truth = next(row for row in csv_rows(FLOOR.parent / "truth.csv") if row["state"] == state)
-    (frame,) = scanfab.read_series(files)
-    packing = frame.read()
-    sample = Sample(packing, np.zeros(len(packing), bool))
-    assert len(packing) == truth["grains"]
-    assert len(packing.contacts) == truth["contacts"]
-    assert packing.wall_contacts.sum() == truth["contacts_wall"]
-    assert sample.rattlers.sum() == truth["rattlers"]
-    assert sample.contact_numbers.mean() == pytest.approx(truth["coordination"], rel=1e-13)
-    fabric = scanfab.contact_fabric(packing.contacts.normal).components()
-    for name in COMPONENTS:
-        assert fabric[name] == pytest.approx(truth[f"gc_{name}"], abs=1e-5)
 
 
 POURED, SHEARED = SAMPLE_DATA / "liggghts_clumps", SAMPLE_DATA / "yade_clumps"
