@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, ScanfabNote, Settings, SettingsError, compute, find_contacts
-from scanfab.packing.sample import Sample
+from scanfab import Cell, Packing, ScanfabNote, Settings, SettingsError, compute
 from scanfab.packing.window import SurfaceBox
 from scanfab.pipeline.measurement import measure
 from scanfab.pipeline.plan import make_plan
@@ -12,15 +11,10 @@ from scanfab.pipeline.rv import rvs_of
 from scanfab.scan.scan import scan_lines
 from scanfab.scan.solids import Solids
 from tests.helpers.lattices import rotation, shaken_cubic
+from tests.helpers.packed import sample_of
 from tests.helpers.windows import corners_of_a_box, surface
 
 LINES = {"directions": "lebedev:5", "spacing": 0.3, "cutoff": 0.2}
-
-
-def sample_of(packing, boundary=None):
-    packing = find_contacts(packing) if packing.contacts is None else packing
-    none = np.zeros(len(packing), bool)
-    return Sample(packing, none if boundary is None else np.asarray(boundary))
 
 
 @pytest.fixture(scope="module")
@@ -169,7 +163,7 @@ def test_a_window_that_follows_the_cell_is_deformed_as_the_cell(tilted):
 
 @pytest.mark.parametrize("mode", ["boundary", "grains"])
 def test_a_window_follows_the_extents_along_three_axes(flat, mode):
-    boundary = np.abs(flat.packing.position[:, 0] - 5.0) > 4.0
+    boundary = np.flatnonzero(np.abs(flat.packing.position[:, 0] - 5.0) > 4.0)
     first = sample_of(flat.packing, boundary)
     stretch, shift = np.array([1.1, 0.9, 0.8]), np.array([1.0, -2.0, 3.0])
     packing = Packing(flat.packing.position * stretch + shift, flat.packing.radius)
