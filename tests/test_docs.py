@@ -223,7 +223,9 @@ def test_the_commands_of_the_pages_draw_their_figures(
     monkeypatch.setattr(figures, "FIGURES", tmp_path)
 
     def rough(words: list[str]) -> int:
-        return run([*words, *([] if words[0] == "compare" else ["--tolerance", "1e-2"])])
+        more = [] if words[0] == "compare" else ["--tolerance", "1e-2"]
+        more += ["--frames", "::3"] if words[0] == "compute" and "--frames" not in words else []
+        return run([*words, *more])
 
     monkeypatch.setattr(figures, "run", rough)
     # what is drawn becomes no image: other tests look at images

@@ -128,17 +128,6 @@ def test_yade_clumps_have_its_own_counts_places_and_fabric():
         assert np.abs(off).max() < (1e-7 if packing is last else 1e-15)
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabNote")
-def test_tables_of_clumps_have_the_counts_of_the_programs():
-    for source, name in [(POURED, POURED), (SHEARED / "saved_*.xml.bz2", SHEARED)]:
-        table = scanfab.compute(scanfab.read_series(source), variants="ab", **SCAN)
-        engine = csv_rows(name / "engine.csv")
-        whole, without = table.select(variant="a"), table.select(variant="b")
-        for column in GRAINS:
-            np.testing.assert_allclose(whole[column], engine[column], rtol=1e-14)
-        np.testing.assert_array_equal(without["grains"], engine["grains"] - engine["rattlers"])
-
-
 def test_the_stress_of_clumps_is_what_yade_controlled():
     """30 kPa within 1 %; branches from sphere to sphere would give a fifth less."""
     packing = scanfab.read(SHEARED / "saved_86500.xml.bz2")
