@@ -8,13 +8,7 @@ import pytest
 import scanfab
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.pipeline.state import sample_state
-from tests.helpers.truth import (
-    BOX,
-    COMPONENTS,
-    SAMPLE_DATA,
-    TRIAXIAL,
-    csv_rows,
-)
+from tests.helpers.truth import BOX, COMPONENTS, SAMPLE_DATA, TRIAXIAL, csv_rows
 
 SCAN = {"directions": 9, "spacing": "3rmin"}
 SHELL = csv_rows(TRIAXIAL / "engine.csv")
