@@ -135,7 +135,7 @@ def _scan_blocks(
         most_steps -= float(sums.scan.steps.sum())
         if solids.edge == START:
             # this edge rule also counts the parts of segments outside the window
-            voids = gap_scan(clipped, plan, finer, cutoffs, [replicate])
+            voids = gap_scan(clipped, plan, finer, [0.0], [replicate])
         parts = {}
         for name in plan.variants:
             by_part = blocks[name in "cd"].by_part
