@@ -196,15 +196,25 @@ class Convex:
         return np.asarray(inside)
 
     def share(self, start: FloatArray, branch: FloatArray) -> FloatArray:
-        """The fraction of each straight segment that lies inside the region; see :meth:`cut`."""
+        """
+        The fraction of each straight segment that lies inside the region.
+
+        Parameters
+        ----------
+        start, branch : ndarray, shape (N, 3)
+            As for :meth:`cut`.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Length inside over length, 0 to 1.
+        """
         first, last = self.cut(start, branch)
         return np.asarray(np.maximum(last - first, 0.0))
 
     def cut(self, start: FloatArray, branch: FloatArray) -> tuple[FloatArray, FloatArray]:
         """
-        Where each straight segment enters and leaves the region, from 0 (its start) to 1.
-
-        A segment outside leaves before it enters.
+        Where each straight segment enters and leaves the region.
 
         Parameters
         ----------
@@ -215,8 +225,8 @@ class Convex:
 
         Returns
         -------
-        ndarray, shape (N,)
-            Length inside over length, 0 to 1.
+        first, last : ndarray, shape (N,)
+            From 0, the start of the segment, to 1, its end. Outside, first is not below last.
         """
         form, level = self.quadric.form, self.quadric.level
         first, last = np.zeros(len(start)), np.ones(len(start))

@@ -24,6 +24,7 @@ from scanfab.packing.sample import VARIANTS, Sample, Variant
 from scanfab.packing.window import Window
 from scanfab.pipeline.map_blocks import near_surface, volumes_inside
 from scanfab.pipeline.measurement import (
+    coarse_spacing,
     doubts_of_lines,
     edge_of,
     gap_scan,
@@ -33,12 +34,19 @@ from scanfab.pipeline.measurement import (
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.tolerance import Errors, scan_to_tolerance
 from scanfab.scan.blocks import Blocks
+from scanfab.scan.directions import design_of
 from scanfab.scan.edges import CLIP, ENDS, START
 from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Solids
 from scanfab.table.columns import row_of
 from scanfab.table.row import Row
 
+# A separate scan measures the error of each block due to the sample. Its replicates show its noise.
+# Its axes are so many that their choice adds little: with 16 axes, the error of a block of a
+# hundred grains would scatter by a quarter.
+PART_REPLICATES, PART_AXES = range(4), 96
+# most chords of this scan; lines are set further apart to keep to it
+MOST_CHORDS = 1e9
 # p-value below which a sample is reported as not homogeneous
 UNLIKELY = 0.01
 # degrees of freedom of the error of a block: its number of parts minus one
@@ -74,10 +82,10 @@ def map_rows(
     for part in plan.scans():
         solids = solids_of(sample, part.window, variants=part.variants, edge=part.settings.edge)
         sums, final, missed = scan_to_tolerance(solids, part, aims, where, scan, _median_errors)
-        notes += missed
+        parts, notes = _scan_parts(solids, final, blocks, sums), [*notes, *missed]
         for name in part.variants:
             variant, own = VARIANTS[name], blocks[VARIANTS[name].in_window]
-            mapped = VariantMap(sample, final, solids, variant, own, sums)
+            mapped = VariantMap(sample, final, solids, variant, own, sums, parts[name])
             rows += [row_of(plan.settings.columns, {**known, **row}) for row in mapped.rows()]
             notes += mapped.notes()
     return rows, joined(notes), blocks
@@ -99,25 +107,11 @@ def places_of(blocks: Blocks) -> dict[str, FloatArray | IntArray]:
 
 
 @dataclass(frozen=True, eq=False)
-class PartSums:
-    """Results for the blocks of a variant, and for the eight parts of each; shapes (R, B, 8)."""
-
-    fabrics: BlockFabrics
-    """Fabrics of the blocks."""
-    rest: BlockFabrics
-    """Fabrics of the blocks without each part."""
-    segments: FloatArray
-    """Number of kept segments in each part."""
-    void: FloatArray
-    """Volume of void whose segments have their middle in each part."""
-
-
-@dataclass(frozen=True, eq=False)
 class MapSums(ScanSums):
-    """Sums of the scan of a map, with the results for its blocks."""
+    """Sums of the scan of a map, with the fabric of each block."""
 
-    parts: dict[str, PartSums]
-    """Results by variant."""
+    fabrics: dict[str, BlockFabrics]
+    """Fabrics of the blocks, by variant."""
 
 
 def _scan_blocks(
@@ -128,43 +122,70 @@ def _scan_blocks(
     most_steps: float = math.inf,
 ) -> MapSums:
     """Scan one replicate after the other; sums by axis of all together would be too large."""
-    finer, cutoffs = (blocks[0].finer(), blocks[1].finer()), [0.0, plan.cutoff]
-    clipped, weights, found = replace(solids, edge=CLIP), plan.rule.weights, []
+    parts = []
     for replicate in replicates:
-        sums = voids = gap_scan(solids, plan, finer, cutoffs, [replicate], most_steps)
+        sums = gap_scan(solids, plan, blocks, [plan.cutoff], [replicate], most_steps)
         most_steps -= float(sums.scan.steps.sum())
-        if solids.edge == START:
-            # this edge rule also counts the parts of segments outside the window
-            voids = gap_scan(clipped, plan, finer, [0.0], [replicate])
-        parts = {}
-        for name in plan.variants:
-            by_part = blocks[name in "cd"].by_part
-            length, number = map(by_part, sums.in_blocks(name, 1, plan.settings.moment))
-            whole = length.sum(axis=-1), number.sum(axis=-1)
-            # rounding must not leave negative numbers
-            left = np.maximum(whole[1][..., None] - number, 0.0)
-            void = np.einsum("d,rdbp->rbp", weights, by_part(voids.in_blocks(name)[0]))
-            void *= plan.spacing**2 / weights.sum()
-            parts[name] = PartSums(
-                block_fabrics(sums.axes, weights, *whole),
-                block_fabrics(sums.axes, weights, whole[0][..., None] - length, left),
-                number.sum(axis=1),
-                void,
-            )
-        found.append(MapSums(**vars(sums.scan), parts=parts))
-    together: MapSums = concatenated(found)
-    return together
+        kept = {name: sums.in_blocks(name, 0, plan.settings.moment) for name in plan.variants}
+        fabrics = {
+            name: block_fabrics(sums.axes, plan.rule.weights, *own) for name, own in kept.items()
+        }
+        parts.append(MapSums(**vars(sums.scan), fabrics=fabrics))
+    whole: MapSums = concatenated(parts)
+    return whole
 
 
 def _median_errors(sums: MapSums, plan: Plan, variant: str) -> Errors:
     """Median error of the blocks with segments; over many blocks it is certain enough."""
-    fabrics = sums.parts[variant].fabrics
+    fabrics = sums.fabrics[variant]
     is_met = fabrics.is_met
     if not is_met.any():
         return Errors(math.inf, math.inf, 1.0)
     errors = fabrics.axial_errors(np.asarray(plan.settings.axis))
     median = float(np.median(np.where(fabrics.exists, errors, np.inf)[is_met]))
     return Errors(median, median, float(np.median(fabrics.filled.mean(axis=0)[is_met])))
+
+
+@dataclass(frozen=True, eq=False)
+class PartSums:
+    """Results for the eight parts of each block of a variant; shapes (R, B, 8)."""
+
+    rest: BlockFabrics
+    """Fabrics of the blocks without each part."""
+    segments: FloatArray
+    """Number of kept segments in each part."""
+    void: FloatArray
+    """Volume of void whose segments have their middle in each part."""
+
+
+def _scan_parts(
+    solids: Solids, plan: Plan, blocks: tuple[Blocks, Blocks], before: ScanSums
+) -> dict[str, PartSums]:
+    """Scan fewer lines, with blocks in eight parts, for errors due to the sample and the void."""
+    rule, replicates = design_of(PART_AXES), []
+    most = min(MOST_CHORDS, plan.max_chords)
+    spacing = coarse_spacing(solids, len(PART_REPLICATES) * len(rule), plan, most, before)
+    finer, cutoffs = (blocks[0].finer(), blocks[1].finer()), [0.0, plan.cutoff]
+    lines, clipped = replace(plan, rule=rule, spacing=spacing), replace(solids, edge=CLIP)
+    for replicate in PART_REPLICATES:
+        sums = voids = gap_scan(solids, lines, finer, cutoffs, [replicate])
+        if solids.edge == START:
+            # this edge rule also counts the parts of segments outside the window
+            voids = gap_scan(clipped, lines, finer, cutoffs, [replicate])
+        variants = {}
+        for name in plan.variants:
+            by_part = blocks[name in "cd"].by_part
+            length, number = map(by_part, sums.in_blocks(name, 1, plan.settings.moment))
+            rest = length.sum(axis=-1, keepdims=True) - length
+            # rounding must not leave negative numbers
+            left = np.maximum(number.sum(axis=-1, keepdims=True) - number, 0.0)
+            void = np.einsum("d,rdbp->rbp", rule.weights, by_part(voids.in_blocks(name)[0]))
+            void *= spacing**2 / rule.weights.sum()
+            without = block_fabrics(sums.axes, rule.weights, rest, left)
+            variants[name] = PartSums(without, number.sum(axis=1), void)
+        replicates.append(variants)
+    whole: dict[str, PartSums] = concatenated(replicates)
+    return whole
 
 
 @dataclass(frozen=True)
@@ -179,6 +200,7 @@ class VariantMap:
     blocks: Blocks
     """Blocks in the dump's coordinates."""
     scan: MapSums
+    parts: PartSums
 
     @property
     def window(self) -> Window | None:
@@ -186,9 +208,9 @@ class VariantMap:
         return self.plan.window if self.variant.in_window else None
 
     @property
-    def parts(self) -> PartSums:
-        """Void fabrics of the blocks, and the results for their parts."""
-        return self.scan.parts[self.variant.name]
+    def fabrics(self) -> BlockFabrics:
+        """Void fabrics of the blocks."""
+        return self.scan.fabrics[self.variant.name]
 
     @cached_property
     def at_surface(self) -> BoolArray:
@@ -203,7 +225,7 @@ class VariantMap:
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Values of each block, by column."""
-        blocks, sample, fabrics, plan = self.blocks, self.sample, self.parts.fabrics, self.plan
+        blocks, sample, fabrics, plan = self.blocks, self.sample, self.fabrics, self.plan
         axis, replicates = np.asarray(plan.settings.axis), self.scan.replicates
         chosen = sample.fabric_contacts(self.variant, self.window)
         normals = compressed(chosen, sample.contacts.normal)
@@ -252,7 +274,7 @@ class VariantMap:
     @cached_property
     def exists(self) -> BoolArray:
         """Which blocks have a void fabric, shape (B,): not those that hold no centre of a grain."""
-        return np.asarray(self.parts.fabrics.exists & (self.grains["grains"] > 0))
+        return np.asarray(self.fabrics.exists & (self.grains["grains"] > 0))
 
     @cached_property
     def grains(self) -> dict[str, Any]:
@@ -277,8 +299,7 @@ class VariantMap:
     @cached_property
     def void(self) -> dict[str, FloatArray]:
         """Columns of the void fabric and its errors; NaN for blocks without a fabric."""
-        fabrics, rest = self.parts.fabrics, self.parts.rest
-        axis = np.asarray(self.plan.settings.axis)
+        fabrics, rest, axis = self.fabrics, self.parts.rest, np.asarray(self.plan.settings.axis)
         held = self.parts.segments.sum(axis=0) > 0
         columns = {
             "mean_length": ratio(fabrics.length.sum(axis=0), fabrics.number.sum(axis=0)),
@@ -314,7 +335,7 @@ class VariantMap:
 
     def notes(self) -> Iterator[Note]:
         """Notes on doubtful lines and blocks, and on the homogeneity of the sample."""
-        fabrics, variant = self.parts.fabrics, self.variant
+        fabrics, variant = self.fabrics, self.variant
         kept = float(fabrics.segments.sum())
         left_out = left_out_of(self.scan, variant, edge_of(variant, self.plan, self.solids), kept)
         texts = doubts_of_lines(self.scan, variant, left_out)
@@ -347,7 +368,7 @@ class VariantMap:
         values = np.where(inner, self.void["alpha_vs_axial"], np.nan)
         variances = self.void["alpha_vs_axial_sample_se"] ** 2
         variances = variances + np.nan_to_num(self.void["alpha_vs_axial_se"]) ** 2
-        test = homogeneity_of(values, variances, self.parts.fabrics.segments.sum(axis=0), FREEDOM)
+        test = homogeneity_of(values, variances, self.fabrics.segments.sum(axis=0), FREEDOM)
         if test is not None:
             chance = "p < 0.0001" if test.chance < 1e-4 else f"p = {test.chance:.2g}"
             is_homogeneous = test.chance >= UNLIKELY

@@ -220,7 +220,9 @@ def _octants(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
     return whole, Blocks.about(window.center, window.radius + largest, axis, space)
 
 
-def coarse_spacing(solids: Solids, axes: int, plan: Plan, most: float) -> float:
+def coarse_spacing(
+    solids: Solids, axes: int, plan: Plan, most: float, before: ScanSums | None = None
+) -> float:
     """
     Spacing of a scan for errors: as close as is useful, but with at most ``most`` chords.
 
@@ -229,9 +231,12 @@ def coarse_spacing(solids: Solids, axes: int, plan: Plan, most: float) -> float:
     """
     if not len(solids.grain_radius):
         return solids.reach
-    spacing = NOISE[solids.space.dimension].close * float(solids.grain_radius.mean())
+    spacing, steps = NOISE[solids.space.dimension].close * float(solids.grain_radius.mean()), 0.0
+    if before is not None:
+        steps = float(before.steps.mean()) / len(plan.rule)
+        steps = plan.space.lines(steps, spacing / plan.spacing)
     # each line costs as much as a chord, even if it meets nothing
-    chords = axes * (solids.chords(spacing) + most_lines(solids, spacing))
+    chords = axes * (solids.chords(spacing) + most_lines(solids, spacing) + steps)
     return spacing * plan.space.apart(max(chords / most, 1.0))
 
 
