@@ -2,14 +2,13 @@
 Files: the kind of a path, files that are written completely or not at all, and locks.
 
 The steps that clean up before the process ends, also if a signal ends it, are kept here, and so is
-the memory left for the process, because it limits how much can be read.
+the memory left for the process, of which messages speak.
 """
 
 from __future__ import annotations
 
 import atexit
 import os
-import re
 import stat
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -27,8 +26,6 @@ KINDS |= {stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
 INHERITED = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")
 # Windows lets nobody read a locked byte, so a byte far beyond the end of any table is locked.
 FAR = 1 << 40
-# holds the memory limit of the container
-CONTAINER = Path("/sys/fs/cgroup/memory.max")
 
 Step = Callable[[], object]
 _steps: list[Step] = []
@@ -146,18 +143,6 @@ def locked(path: Path) -> Iterator[IO[bytes]]:
                 f"another `output=FILE`"
             )
         yield stream
-
-
-def free_memory() -> int:
-    """Bytes left for this process: the least of what machine, container and its limit allow."""
-    limits = [sys.maxsize if (own := address_space()) is None else own]
-    with suppress(OSError):
-        text = Path("/proc/meminfo").read_text("ascii")
-        limits += [int(kB) << 10 for kB in re.findall(r"MemAvailable:\s*(\d+) kB", text)]
-    # outside a container the file is missing; without a limit it holds the word "max"
-    with suppress(OSError, ValueError):
-        limits.append(int(CONTAINER.read_text("ascii")))
-    return max(min(limits), 0)
 
 
 def address_space() -> int | None:

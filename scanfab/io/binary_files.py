@@ -12,7 +12,7 @@ import numpy as np
 from scanfab.base.errors import PackingError, ReadError, note, warn
 from scanfab.base.typing import Columns
 from scanfab.io.fence import fenced
-from scanfab.io.files import bare_name, check_memory, first_bytes, plain
+from scanfab.io.files import bare_name, first_bytes, plain
 from scanfab.io.writer import flat
 from scanfab.packing.cell import Cell
 
@@ -87,7 +87,6 @@ def _read_xyzd(path: Path) -> Columns:
     if size == 0 or size % 32:
         found = f"found {size} bytes" if size else "the file is empty"
         raise ReadError(f"{path}: expected whole rows of four doubles, 32 bytes each, {found}")
-    check_memory(path, 3.0 * size)
     x, y, z, diameter = np.fromfile(file, "<f8").reshape(-1, 4).astype(np.float64).T
     info = packing_info(path)
     if info is None:

@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from scanfab.base.errors import ReadError
-from scanfab.base.files import at_end, free_memory
-from scanfab.io.files import check_memory, plain
+from scanfab.base.files import at_end
+from scanfab.io.files import plain
 
 Answer = TypeVar("Answer")
 # a file may take this many seconds, and one more second for each PER_SECOND bytes
@@ -53,8 +53,7 @@ def fenced(function: Callable[..., Answer], path: Path, *more: Any) -> Answer:
     """
     file = plain(path)
     size = file.stat().st_size
-    check_memory(path, 2.0 * size)
-    limits = min(MEMORY + GROWTH * size, free_memory()), SECONDS + size / PER_SECOND
+    limits = MEMORY + GROWTH * size, SECONDS + size / PER_SECOND
     lock, idle = _workers.setdefault(os.getpid(), (threading.Lock(), []))
     with lock:
         worker = idle.pop() if idle else _start()

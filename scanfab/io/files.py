@@ -19,7 +19,7 @@ from typing import Any
 from weakref import finalize
 
 from scanfab.base.errors import ReadError, warn, within
-from scanfab.base.files import at_end, check_file, free_memory
+from scanfab.base.files import at_end, check_file
 
 COMPRESSED_SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".lz4")
 # zstd is in the standard library since Python 3.14
@@ -118,14 +118,6 @@ def check_times(path: Path, packed: int, unpacked: float) -> None:
     if unpacked > max(ANYWAY, times * packed):
         problem = f"{packed:,} bytes of it decompress to more than {times:g} times their size"
         raise ReadError(f"{path}: {problem}: if it is a dump, allow more with `max_unpacked`")
-
-
-def check_memory(path: Path, needed: float) -> None:
-    """ReadError if there is not enough free memory for the content of a file."""
-    free = free_memory()
-    if needed > free:
-        sizes = f"about {needed / 1e9:.1f} GB of memory, but only {free / 1e9:.1f} GB are free"
-        raise ReadError(f"{path}: reading it takes {sizes}")
 
 
 def file_inside(index: Path, name: str) -> Path:

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from scanfab.base.errors import ReadError, warn
 from scanfab.base.typing import Columns
 from scanfab.io.fence import fenced
-from scanfab.io.files import check_memory, grows, plain
+from scanfab.io.files import grows, plain
 from scanfab.io.reader import Snapshot
 
 NUMBER = re.compile(
@@ -31,8 +31,6 @@ NUMBER = re.compile(
 )
 # polars would try to decompress a text that begins with these bytes
 LIKE_COMPRESSED = (b"\x1f\x8b", b"x\x01", b"x^", b"x\x9c", b"x\xda", b"(\xb5")
-# how many times its size a text needs in memory: the text, its numbers, the packing's columns
-IN_MEMORY = 6.0
 # most bytes of a word or line that a message quotes
 SHOWN = 80
 # a process that was forked after polars was imported lacks the threads of polars, and polars would
@@ -286,10 +284,9 @@ def spelt(text: bytes) -> str:
 
 
 def text_of(snapshot: Snapshot) -> bytes:
-    """The bytes of a snapshot or file, without a byte order mark; ReadError if memory lacks."""
-    path, file = snapshot.path, plain(snapshot.path)
+    """The bytes of a snapshot or file, without a byte order mark."""
+    file = plain(snapshot.path)
     stop = file.stat().st_size if snapshot.stop is None else snapshot.stop
-    check_memory(path, IN_MEMORY * (stop - snapshot.start))
     with open(file, "rb") as stream:
         stream.seek(snapshot.start)
         data = stream.read(max(stop - snapshot.start, 0))

@@ -132,15 +132,3 @@ def test_what_fails_for_lack_of_memory_is_one_message(monkeypatch, capsys, error
     told = capsys.readouterr().err
     assert told.startswith("scanfab: error: not enough memory (")
     assert "fewer --workers need less" in told
-
-
-def test_what_is_free_is_the_least_of_all_limits(monkeypatch, tmp_path):
-    assert files.free_memory() > 0
-    monkeypatch.setattr(files, "address_space", lambda: 1000)
-    assert files.free_memory() == 1000
-    container = tmp_path / "memory.max"
-    monkeypatch.setattr(files, "CONTAINER", container)
-    for text, free in (("900\n", 900), ("max\n", 1000)):
-        container.write_text(text)
-        assert files.free_memory() == free
-    assert group.LEAST_SPACE > main.LITTLE

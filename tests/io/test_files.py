@@ -160,12 +160,6 @@ def test_an_array_of_one_value_is_no_bomb(tmp_path):
     np.testing.assert_array_equal(mesh.point_arrays["radius"], np.zeros(count))
 
 
-def test_what_does_not_fit_into_memory_is_told(tmp_path, monkeypatch):
-    monkeypatch.setattr(files, "free_memory", lambda: 1_000)
-    path = polydata(tmp_path / "a.vtp", 100, SOME_POINTS)
-    refuses(path, r"takes about 0.0 GB of memory, but only 0.0 GB are free")
-
-
 @pytest.mark.parametrize("unit", [b"<a/>", b"<a>", b"x"])
 def test_endless_xml_is_left_early(tmp_path, monkeypatch, unit):
     monkeypatch.setattr(files, "ANYWAY", BLOCK)
