@@ -14,6 +14,7 @@ from scanfab.io.writer import installed_writers
 from scanfab.packing import rattlers
 from scanfab.table import formats
 from scanfab.table.columns import installed_fabrics
+from scanfab.table.plots import installed_figures
 from tests.helpers.plugins import offer
 
 
@@ -48,6 +49,7 @@ def test_one_name_twice_is_an_error_that_names_both_packages(offered):
         ("scanfab.rattlers", rattlers.installed_rules),
         ("scanfab.table_formats", formats.foreign_formats),
         ("scanfab.fabrics", installed_fabrics),
+        ("scanfab.figures", installed_figures),
         ("scanfab.readers", installed_readers),
         ("scanfab.writers", installed_writers),
     ],

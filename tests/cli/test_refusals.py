@@ -50,6 +50,8 @@ LINES = [
     ("compute cube --vtk out.csv/vtk", 2, "out.csv/vtk"),
     ("compute cube --figure rose", 2, "--figure goes with --plot FILE"),
     ("compute cube --plot x.docx", 2, "figures can be written as .png, .svg, .pdf, not as"),
+    ("compute cube --plot x", 2, "without a suffix"),
+    ("compute cube --plot no/x.png", 2, "there is no folder"),
     ("compute cube --plot x.png --figure pie", 2, "--figure: expected evolution"),
     ("compute cube other --plot x.png --figure rose", 2, "draws one series"),
     ("compare out.csv --summary --differences", 2, "print different tables"),

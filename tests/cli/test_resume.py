@@ -290,13 +290,13 @@ def test_columns_digits_and_warnings_are_those_of_the_table(compute, last_frame,
 
 def test_a_figure_is_drawn_of_the_columns_that_the_rows_have(compute):
     few = ("--fields", "source,frame,variant,alpha_vs_axial")
-    figure = ("--resume", "--plot", "plot.png")
+    figure = ("--resume", "--plot", "plot.PNG")
     assert compute("table.csv", *few) == (0, 4)
     # one of frames is drawn of the dumps
     for more in ((), ("--figure", "histogram")):
-        Path("plot.png").unlink(missing_ok=True)
+        Path("plot.PNG").unlink(missing_ok=True)
         assert compute("table.csv", *few, *figure, *more)[0] == 0
-        assert Path("plot.png").stat().st_size > 1000
+        assert Path("plot.PNG").stat().st_size > 1000
 
 
 @pytest.mark.parametrize("last", ["job.write_rows", "job.write_manifest", "record.PartFile.remove"])

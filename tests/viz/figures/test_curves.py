@@ -11,7 +11,6 @@ from matplotlib.figure import Figure as Page
 import scanfab
 from scanfab.base.errors import ScanfabNote, SettingsError
 from scanfab.table.compare import compare_tables
-from scanfab.table.curves import ABSCISSAS, abscissa
 from scanfab.table.table import Table
 from scanfab.viz.figures.anisotropy import PAPER_SLOPE, Correlation
 from scanfab.viz.figures.curves import Columns, groups_of
@@ -100,15 +99,6 @@ def test_one_frame_has_its_error_as_a_bar_and_no_line(drawn):
     assert "no line" in legend_of(figure.axes[5])[0]
 
 
-def test_without_strain_the_frame_is_the_abscissa(drawn):
-    rows = with_all(curve(), strain=None)
-    assert ABSCISSAS[abscissa(rows)][0] == "frame"
-    assert drawn(rows).axes[0].lines[0].get_xdata().tolist() == [0, 1, 2, 3, 4]
-    for caption in captions(rows)[:2]:
-        assert ", over the number of the frame" in caption
-        assert "strain" not in caption
-
-
 @pytest.mark.parametrize("column", ["alpha_vs_axial", "alpha_vs_axial_se", "alpha_c_axial"])
 def test_what_is_missing_or_too_large_to_draw_is_a_hole(drawn, column):
     for value in (None, 1e308):
@@ -194,12 +184,7 @@ AXES = "and the angle between their major axes"
         (curve(), SAMPLES, 0, "strain; with total standard errors of voids and contacts."),
         (curve(), VOID_SAMPLE, 0, "strain; with total standard errors of voids."),
         (curve(), CONTACT_SAMPLE, 0, "strain; with total standard errors of contacts."),
-        (
-            curve(),
-            SAMPLES,
-            1,
-            "largest absolute value; with total standard errors of voids and con",
-        ),
+        (curve(), {"strain": None}, 0, ", over the number of the frame; without"),
         (curve(), {}, 2, "along the loading axis, with fitted lines and the paper's slope."),
         (sheared(), SAMPLES, 0, f"{AXES}, over the shear strain; without total errors."),
         (sheared(), SAMPLES, 1, "Intensity of void and contact anisotropy, over"),

@@ -5,15 +5,13 @@ from __future__ import annotations
 import inspect
 import re
 import warnings
-from importlib.metadata import EntryPoint
 
 import numpy as np
 import pytest
 from click import Context
 from matplotlib.figure import Figure
 
-from scanfab.base import plugins
-from scanfab.base.errors import ScanfabWarning, SettingsError
+from scanfab.base.errors import SettingsError
 from scanfab.cli.group import cli
 from scanfab.cli.main import run
 from scanfab.pipeline.settings import Settings
@@ -22,11 +20,11 @@ from scanfab.table.plots import figures_of, installed_figures
 from scanfab.table.table import Table, load
 from scanfab.viz.figures.figure import Figure as PackagesFigure
 from scanfab.viz.figures.figure import FrameFigure, drawn_page, make_figures
-from scanfab.viz.figures.style import check_plot_file
 from scanfab.viz.report.report import report
 from scanfab.viz.scanned_frames import ScannedFrames
 from tests.conftest import SAMPLE
 from tests.helpers.figures import BYTES, save_rows
+from tests.helpers.plugins import offer
 from tests.helpers.tables import curve, sheared
 
 pytestmark = pytest.mark.filterwarnings("ignore:skipped:scanfab.base.errors.ScanfabNote")
@@ -66,25 +64,13 @@ def table(tmp_path):
 
 
 @pytest.fixture
-def offered(monkeypatch):
-    """Packages that offer figures besides what is installed."""
-    installed = plugins.entry_points
-
-    def offer(**values):
-        points = [EntryPoint(name, value, "scanfab.figures") for name, value in values.items()]
-        of = {"scanfab.figures": points}
-        monkeypatch.setattr(
-            plugins, "entry_points", lambda group: [*installed(group=group), *of.get(group, [])]
-        )
-        installed_figures.cache_clear()
-
-    yield offer
+def made_up(monkeypatch):
+    """A package offers figures besides what is installed."""
+    for name, figure in (("made_up", Rattlers), ("heights", Contacts)):
+        offer(monkeypatch, "scanfab.figures", name, lambda figure=figure: figure)
     installed_figures.cache_clear()
-
-
-@pytest.fixture
-def made_up(offered):
-    offered(made_up=f"{__name__}:Rattlers", heights=f"{__name__}:Contacts")
+    yield
+    installed_figures.cache_clear()
 
 
 def test_the_figures_of_the_package_stand_first_and_in_their_order(made_up):
@@ -144,12 +130,6 @@ def test_a_table_without_its_columns_goes_without_it(tmp_path, capsys):
     assert f"expected {known}, found" in capsys.readouterr().err
 
 
-def test_what_is_no_figure_is_told_and_spoils_no_other(offered):
-    offered(odd="math:hypot")
-    with pytest.warns(ScanfabWarning, match="the figure 'odd' of .* expected a subclass of"):
-        assert tuple(installed_figures()) == OWN
-
-
 def test_a_notebook_shows_what_a_figure_takes_and_gets_axes_in_the_style_of_the_package():
     from matplotlib import pyplot
 
@@ -204,12 +184,3 @@ def test_files_are_what_their_names_say_and_repeat(tmp_path):
         # of the same second; no file tells when it was made
         assert not re.search(b"CreationDate|dc:date", one.read_bytes())
     assert len(list(tmp_path.iterdir())) == 6
-
-
-def test_files_that_cannot_be_written_are_told_before(tmp_path):
-    for name, message in (
-        ("x.docx", "not as .docx"), ("x", "without a suffix"), ("no/x.png", "there is no folder"),
-    ):  # fmt: skip
-        with pytest.raises(SettingsError, match=message):
-            check_plot_file(tmp_path / name)
-    check_plot_file(tmp_path / "x.PNG")

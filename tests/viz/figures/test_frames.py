@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -68,14 +67,6 @@ def test_every_figure_of_the_sample_is_drawn(scanned, figures):
             assert all("variant c, frame " in title for title in titles)
         else:
             assert titles == [""]
-
-
-def test_titles_name_variant_frame_and_strain_and_rows_are_the_table_s(scanned, computed):
-    for number, frame in zip((0, 6), scanned.frames, strict=True):
-        row = row_of(computed, number)
-        title = rf"variant c, frame {number}, $\varepsilon_a$ = {100 * row['strain']:.3g} %"
-        assert frame.title == title
-        assert dict(frame.row) == row
 
 
 def test_frames_are_scanned_once_for_all_figures_and_when_one_needs_them(
@@ -274,18 +265,6 @@ def test_the_noise_of_contacts_is_that_of_isotropic_ones():
     # as neighbours are not independent, less of it is chance
     half = projection.contact_noise({**row, "alpha_c_axial_sample_se": 0.5 * alone})
     assert half == pytest.approx(0.5 * noise)
-
-
-def test_lobes_below_the_noise_are_called_so():
-    row = {"alpha_vs_axial_se": 0.0, "alpha_vs_axial_sample_se": 2e-3}
-    frame = SimpleNamespace(space=SPACE, row=row, number=3)
-    for largest, end in ((1.0, "so they are noise."), (4.0, "is 1 %.")):
-        text = projection.noise_note(frame, {"voids": np.array([-largest, 0.5]), "contacts": None})
-        start = f"Frame 3: lobes of void lengths reach {largest:g} %, one standard error is 1 %"
-        assert text.startswith(start)
-        assert text.endswith(end)
-    row["alpha_vs_axial_sample_se"] = None
-    assert projection.noise_note(frame, {"voids": np.array([-1.0, 0.5]), "contacts": None}) == ""
 
 
 def test_lengths_have_the_mean_of_the_table(figures, computed):
