@@ -11,6 +11,7 @@ from tests.helpers.truth import SAMPLE_DATA
 
 FILES = {
     "out.csv": "precious",
+    "old.html": "precious",
     "notes": "-",
     "head.csv": "source,frame\n",
     "letters.csv": "a,b\n1,2\n",
@@ -63,6 +64,15 @@ LINES = [
     ("compare map.csv", 1, "a table of scanfab map, which scanfab report shows"),
     ("compare row.csv --variants ab", 1, "expected variants of the tables, c, found 'ab'"),
     ("compare row.csv --variants x", 2, "--variants: expected letters out of abcd, found 'x'"),
+    ("report row.csv -o r.pdf", 2, "reports are HTML"),
+    ("report row.csv -o nowhere/r.html", 2, "there is no folder"),
+    (
+        "report row.csv --label a --label b -o r.html",
+        2,
+        "--label: expected one per table: 1, found 2",
+    ),
+    ("report row.csv", 2, "Missing option '-o'"),
+    ("report head.csv -o old.html", 1, "nothing to report"),
     ("convert cube - --to csv", 2, "nothing is written to standard output"),
     ("view cube --screenshot x.jpg", 2, "screenshots are PNG files"),
     ("view cube --screenshot absent/x.png", 2, "there is no folder absent to write to"),
