@@ -7,7 +7,6 @@ import pytest
 
 import scanfab
 from scanfab.base.shapes import sphere
-from scanfab.packing.sample import Sample
 from scanfab.packing.window import Window
 from scanfab.viz.figures.style import rounded_down
 from scanfab.viz.meshes import contact_mesh
@@ -23,6 +22,7 @@ from scanfab.viz.scene import (
 )
 from scanfab.viz.window3d import BOTTOM, SIZE, TOP, aim
 from tests.helpers.lattices import simple_cubic
+from tests.helpers.packed import sample_of
 from tests.helpers.truth import SAMPLE_DATA
 
 
@@ -31,16 +31,11 @@ def sample():
     """Five in a row, the last one is boundary."""
     position = [[0.0, 0, 0], [2, 0, 0], [4, 0, 0], [9, 0, 0], [6, 0, 0]]
     packing = scanfab.Packing(position, 1.0, contacts=[[0, 1], [1, 2], [2, 4]], id=[5, 6, 7, 8, 9])
-    return Sample(packing, np.array([False, False, False, False, True]))
+    return sample_of(packing, [4])
 
 
 WINDOW = Window(np.array([1.0, 0.0, 0.0]), sphere(2.5))
 CELL = scanfab.Cell([10.0, 10.0, 10.0])
-
-
-def sample_of(position, radius, **options):
-    packing = scanfab.Packing(position, radius, **{"contacts": [], **options})
-    return Sample(packing, np.zeros(len(packing), bool))
 
 
 def test_grains_are_told_apart(sample):
@@ -59,7 +54,9 @@ def test_contacts_are_lines_between_centres_and_stay_short_through_a_face(sample
     assert mesh.points.reshape(-1, 2, 3)[:, :, 0].tolist() == [[0, 2], [2, 4], [4, 6]]
     assert mesh["boundary"].tolist() == [False, False, True]
     assert mesh["in_window"].tolist() == [True, True, False]
-    through = sample_of([[0.5, 5, 5], [9.5, 5, 5]], 0.5, contacts=[[0, 1]], cell=CELL)
+    through = sample_of(
+        scanfab.Packing([[0.5, 5, 5], [9.5, 5, 5]], 0.5, contacts=[[0, 1]], cell=CELL)
+    )
     one, two = contact_mesh(through, None).points
     assert np.linalg.norm(two - one) == pytest.approx(1.0)
 
@@ -76,14 +73,15 @@ def test_a_section_lies_in_one_plane_and_in_the_window(sample, axis):
 
 
 def test_a_section_has_as_many_lines_in_any_unit():
-    scenes = [scene_of(sample_of(*simple_cubic(5, unit))) for unit in (1.0, 1e-3)]
+    cubes = (scanfab.Packing(*simple_cubic(5, unit)) for unit in (1.0, 1e-3))
+    scenes = [scene_of(sample_of(cube)) for cube in cubes]
     found = [len(np.unique(section_lines(scene, (0, 0, 1)).line)) for scene in scenes]
     assert found[0] == found[1] > 0
 
 
 def test_a_section_cuts_periodic_images_too():
     """A crystal looks the same about each of its grains, also one at the corner of the cell."""
-    sample = sample_of(*simple_cubic(4), cell=scanfab.Cell([4.0, 4.0, 4.0]))
+    sample = sample_of(scanfab.Packing(*simple_cubic(4), cell=scanfab.Cell([4.0, 4.0, 4.0])))
     middle, corner = (
         section_lines(about_window(scene_of(sample, Window(np.array(one), sphere(1.6)))), (0, 0, 1))
         for one in ([2.5, 2.5, 2.5], [0.5, 3.5, 0.5])
@@ -94,15 +92,15 @@ def test_a_section_cuts_periodic_images_too():
 
 def test_a_section_without_window_or_grains_is_no_error(sample):
     assert section_lines(scene_of(sample), (0, 0, 1)).line.ndim == 1
-    empty = Scene(grains_of(sample_of(np.zeros((0, 3)), 1.0), None), np.zeros(3))
+    nothing = sample_of(scanfab.Packing(np.zeros((0, 3)), 1.0))
+    empty = Scene(grains_of(nothing, None), np.zeros(3))
     assert len(section_lines(empty, (0, 0, 1)).length) == 0
 
 
 def test_grains_of_clumps_have_their_numbers_and_places_and_are_seen_whole():
     """Two of them, one through the face x = 10, and a sphere alone."""
     position = [[9.6, 5, 5], [0.8, 5, 5], [4.0, 5, 5], [5.2, 5, 5], [2.6, 5, 5]]
-    packing = scanfab.Packing(position, 1.0, bodies=[3, 3, 8, 8, -1], cell=CELL)
-    sample = Sample(scanfab.find_contacts(packing), np.zeros(5, bool))
+    sample = sample_of(scanfab.Packing(position, 1.0, bodies=[3, 3, 8, 8, -1], cell=CELL))
     grains = grains_of(sample, Window(np.array([0.2, 5.0, 5.0]), sphere(0.1)))
     assert grains.body.tolist() == [3, 3, 8, 8, -1]
     assert grains.contacts.tolist() == [1, 1, 1, 1, 2]
