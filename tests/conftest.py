@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ import pytest
 
 from scanfab.cli.main import run
 from scanfab.table.formats import read_rows
+from tests.helpers.dumps import write
 
 # programs that tests start would otherwise compile all modules anew
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -31,6 +33,14 @@ def signals_as_they_were() -> Iterator[None]:
     before = [signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)]
     yield
     assert [signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)] == before
+
+
+@pytest.fixture
+def table(tmp_path):
+    """Write rows into a file."""
+    return lambda rows, name="table.jsonl": write(
+        tmp_path / name, "".join(json.dumps(row) + "\n" for row in rows)
+    )
 
 
 class Computed(NamedTuple):

@@ -41,10 +41,7 @@ def test_a_broken_frame_can_be_skipped_also_the_first(tmp_path, ask):
 def test_one_grain_far_away_is_too_far_for_the_whole_alone(tmp_path, ask):
     file = grains(tmp_path, changed(4, 4000.0))
     assert "far away from all others" in ask("compute", *FAST, file, code=1).err
-    words = ("--directions", "9", "--spacing", "1rmin", "--variants", "c")
-    found, near = (ask("compute", one, *words) for one in (file, grains(tmp_path, name="near.txt")))
-    assert '--boundary "id=7"' in found.err
-    assert found.rows[0]["grains"] == near.rows[0]["grains"]
+    assert '--boundary "id=7"' in ask("compute", *FAST, file, "--variants", "c").err
 
 
 def test_an_rv_at_the_surface_is_a_warning(tmp_path, ask):

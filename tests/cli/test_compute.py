@@ -12,7 +12,6 @@ import pytest
 
 import scanfab
 from scanfab.table.formats import read_rows
-from tests.helpers.dumps import write
 from tests.helpers.interruptions import PROGRAM
 from tests.helpers.truth import TRIAXIAL
 
@@ -95,11 +94,3 @@ def test_a_dash_is_standard_output_as_csv(series, monkeypatch, ask, command):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
     assert {row["variant"] for row in ask(command, series, *words, "-o", "-").rows} == {"c"}
     assert not os.path.exists("-")
-
-
-def test_a_dash_goes_with_columns_and_digits_and_is_compared(series, ask, tmp_path):
-    printed = ask("compute", series, *SMALL, "--digits", "3", "-o", "-").out
-    table, names = write(tmp_path / "table.csv", printed), "variant,frame,alpha_vs_axial"
-    for row in ask("compare", table, "--fields", names, "--digits", "2", "-o", "-").rows:
-        assert list(row) == names.split(",")
-        assert float(row["alpha_vs_axial"]) == float(f"{float(row['alpha_vs_axial']):.2g}")

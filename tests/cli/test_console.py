@@ -10,7 +10,6 @@ import scanfab
 from scanfab.cli import console
 from scanfab.cli.compare import print_comparison
 from scanfab.cli.console import OFTEN_SAME, SHOWN, STAY, print_table, working
-from scanfab.table.columns import table_columns
 from scanfab.table.compare import compare_tables
 from scanfab.table.row import Row
 from scanfab.table.writing import Excerpt
@@ -90,12 +89,6 @@ def test_a_map_says_which_block_a_row_is_of(lines):
     assert "at surface" not in narrow
 
 
-def test_columns_and_digits_that_were_asked_for_are_shown(lines):
-    excerpt = Excerpt.make(table_columns(), "variant,alpha_vs_axial", 5)
-    head, row, *_ = lines(80, print_table, ROWS, excerpt)
-    assert (heads(head), row.split()) == (["variant", "α_vs axial"], ["d", "-0.012346"])
-
-
 def compared(*sources):
     every = [row for name in sources for v in "abcd" for row in curve(name, v, 0.0123456)]
     return compare_tables([{**row, **ERRORS} for row in every])
@@ -148,9 +141,9 @@ def test_merged_tables_and_differences_are_shown_as_tables(ask, series, tmp_path
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")
 
 
-@pytest.fixture(scope="module")
-def settled(tmp_path_factory):
-    folder = write_series(tmp_path_factory.mktemp("talk") / "series", 3)
+@pytest.fixture
+def settled(tmp_path):
+    folder = write_series(tmp_path / "series", 3)
     write(folder / "scanfab.toml", "[compute]\nrv = 0.6\n")
     return folder
 
@@ -159,8 +152,8 @@ def settled(tmp_path_factory):
 def said(settled, ask):
     """Standard output, and what was said, as lines."""
 
-    def call(command: str, *words: str, code: int = 0) -> tuple[str, list[str]]:
-        answer = ask(command, settled, *words, code=code)
+    def call(*words: str, code: int = 0) -> tuple[str, list[str]]:
+        answer = ask("compute", settled, *words, code=code)
         return answer.out, answer.err.splitlines()
 
     return call
@@ -173,24 +166,24 @@ def notes(lines: list[str]) -> list[str]:
 def test_quiet_leaves_out_notes_but_no_warning_and_no_error(said):
     words = (*FAST[2:], "--directions", "equal-angle:30")
     # first, as kernels that no earlier run has needed are compiled with a word
-    quiet_result, quiet = said("compute", *words, "--quiet")
-    result, lines = said("compute", *words)
+    quiet_result, quiet = said(*words, "--quiet")
+    result, lines = said(*words)
     assert result == quiet_result
     assert len(notes(lines)) > 1
     assert [line for line in lines if line not in notes(lines)] == quiet
     assert any("an isotropic sample would get alpha = " in line for line in quiet)
-    _, lines = said("compute", "--quiet", "--boundary", "type=9", code=1)
+    _, lines = said("--quiet", "--boundary", "type=9", code=1)
     assert lines[-1].startswith("scanfab: error: --boundary: no particle of any frame has type=9")
 
 
 def test_verbose_says_what_is_used_and_how_long_each_frame_takes(said, settled):
-    result, lines = said("compute", *FAST, "--verbose", "--workers", "2")
+    result, lines = said(*FAST, "--verbose", "--workers", "2")
     text = "\n".join(lines)
     assert re.search(r"scanfab: scanfab \S+, numpy [\d.]+, numba [\d.]+, Python .*; 2 work", text)
     assert f"scanfab: {settled}: grains from {settled}/dump_*.txt by liggghts, 3 files" in lines
     found = re.findall(rf"scanfab: {settled}: frame (\d): 64 grains in [\d.e-]+ s", text)
     assert sorted(found) == ["0", "1", "2"]
-    assert result == said("compute", *FAST)[0]
+    assert result == said(*FAST)[0]
 
 
 PROGRESS = [((), 0.002, 1), (("--quiet",), 0.002, 0), ((), 60.0, 0)]
@@ -201,7 +194,7 @@ def test_a_log_gets_a_line_of_progress_each_minute(said, monkeypatch, words, eve
     """Here of a few milliseconds; nothing in a run that takes less."""
     assert console.EVERY == 60.0
     monkeypatch.setattr(console, "EVERY", every)
-    _, lines = said("compute", "--tolerance", "2e-3", "--workers", "1", "--variants", "ac", *words)
+    _, lines = said("--tolerance", "2e-3", "--workers", "1", "--variants", "ac", *words)
     states = [line for line in lines if re.match(r"scanfab: \d of 3 frames", line)]
     assert bool(states) == bool(says)
     if states:

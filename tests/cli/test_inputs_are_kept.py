@@ -54,17 +54,3 @@ def test_a_whole_series_may_be_rewritten_and_a_device_takes_a_table(files, tmp_p
     shutil.copy("dump.1", "dumps")
     for _ in range(2):
         ask("compute", "dumps", *FAST, "-o", "dumps/t.csv")
-
-
-def test_damaged_tables_and_settings_are_one_message(files, tmp_path, ask):
-    text = (tmp_path / "t.csv").read_text()
-    head, row = text.splitlines()
-    cells = row.split(",")
-    cells[head.split(",").index("mean_length")] = "nan"
-    (tmp_path / "t.csv").write_text(f"{head}\n{','.join(cells)}\n")
-    assert "found nan in the column mean_length" in ask("merge", "t.csv", code=1).told
-    manifest = tmp_path / "t.csv.manifest.json"
-    manifest.write_text(manifest.read_text().replace('"seed": 0', f'"seed": {"9" * 5000}'))
-    assert "expected a manifest" in ask("merge", "t.csv", code=1).told
-    (tmp_path / "scanfab.toml").write_text(f"[compute]\nrv = {'[' * 20_000}{']' * 20_000}")
-    assert "scanfab.toml" in ask("inspect", "g.csv", code=2).told

@@ -164,6 +164,13 @@ def told(value: Any, *place: Any) -> Callable[[Path], object]:
     return spoil
 
 
+def with_nan(part: Path) -> None:
+    head, row, *rest = part.read_text().splitlines()
+    cells = row.split(",")
+    cells[head.split(",").index("mean_length")] = "nan"
+    part.write_text("\n".join([head, ",".join(cells), *rest, ""]))
+
+
 def with_foreign_column(part: Path) -> None:
     first, *lines = part.read_text().splitlines()
     part.write_text("\n".join([f"{first},mine", *(f"{line},1" for line in lines), ""]))
@@ -175,8 +182,10 @@ SPOILT = [
     (1, lambda part: Path(f"{part}.manifest.json").unlink(), "there is no part_1.csv.manifest"),
     (1, lambda part: part.rename(f"{part}.part"), "is not finished"),
     (1, Path.unlink, "there is no such part"),
+    (1, with_nan, "found nan in the column mean_length"),
     (0, with_foreign_column, "nothing here makes its columns mine"),
     (0, told(5, "inputs", 0), "expected a manifest of scanfab compute"),
+    (1, lambda part: Path(f"{part}.manifest.json").write_text("9" * 5000), "expected a manifest"),
     (0, told("gone.csv", "settings", "strain"), "the manifest cannot be used: strain"),
     (2, told("0" * 64, "inputs", 1, "sha256"), "dump_100.txt has changed between the jobs"),
 ]

@@ -132,11 +132,6 @@ def test_an_interrupted_run_is_gone_on_with(stop, last_frame, resumes, suffix, r
         assert resumes(table, computed, *words, "--workers", "1")
 
 
-def test_without_a_part_everything_is_computed(compute, resumes):
-    assert resumes("table.csv", 4)
-    assert compute("table.csv") == (0, 4)
-
-
 def test_without_resume_the_part_is_kept_under_another_name(compute, stop, resumes):
     """And what made it goes on with it there."""
     told = "note: table.csv.part: 2 finished frames of an earlier run are kept as table.1.csv"

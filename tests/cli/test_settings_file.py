@@ -64,6 +64,7 @@ MEANINGLESS = [
     ('[compute]\nvariant = "a"', "'variant' cannot be set in a settings file: did you mean"),
     ("[compute]\nresume = true", "'resume' cannot be set"),
     ("[compute", "Expected"),
+    (f"[compute]\nrv = {'[' * 20_000}{']' * 20_000}", ""),
     ("[compute]\nrv = 0.6\nboundary = mask=3", "Invalid value (at line 3"),
     ("[compute]\ncutoff = 1rmin # one", "text needs quotes"),
     ("[compute]\nrv-center = [1, 2]", "rv-center: expected three finite numbers"),
@@ -76,7 +77,7 @@ MEANINGLESS = [
 ]
 
 
-@pytest.mark.parametrize(("text", "message"), MEANINGLESS)
+@pytest.mark.parametrize(("text", "message"), MEANINGLESS, ids=lambda text: text[:40])
 def test_what_has_no_meaning_is_refused_with_the_name_of_the_file(series, ask, text, message):
     write(series / "scanfab.toml", f"{text}\n")
     told = ask("compute", series, code=2).told

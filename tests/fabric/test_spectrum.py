@@ -86,14 +86,3 @@ def test_where_there_is_none():
     assert NAME not in scanfab.compute(packing, **scan).columns
     second = scanfab.compute(packing, cutoffs="0", moment=2, **scan)
     assert all(row[NAME] is None for row in second)
-
-
-def test_discs_in_a_row_that_overlap():
-    """In a plane a pair closes 2 |n·m| √(2 R* δ) of gaps."""
-    plane = Space(2)
-    pairs = NearPairs(np.eye(3)[1:2], np.array([0.02]), np.array([0.25]), 1.0, 1.0, plane)
-    angle = (np.arange(10000) + 0.5) * np.pi / 10000
-    number = 1.0 - 2 * np.abs(np.sin(angle)) * np.sqrt(2 * 0.25 * 0.02)
-    expected = np.sum(-np.cos(2 * angle) / number) / np.sum(1 / number)
-    found = predicted_alpha(pairs, 0.2, 0.0, (0, 1, 0))
-    assert found == pytest.approx(expected, rel=1e-3)

@@ -16,12 +16,6 @@ EDGES = np.array([2.0, 3.0, 4.0])
 TILTED = np.array([[2.0, 0, 0], [0.7, 3, 0], [-0.5, 0.4, 4]])
 
 
-def test_vectors_are_rows():
-    cell = Cell(TILTED, (True, False, False), [1, 1, 1])
-    np.testing.assert_allclose(cell.fractional(1 + TILTED[1]), [0, 1, 0], atol=1e-15)
-    np.testing.assert_allclose(cell.center, 1 + TILTED.sum(axis=0) / 2)
-
-
 def test_heights_are_distances_of_opposite_faces():
     np.testing.assert_allclose(Cell(EDGES).heights, EDGES)
     a, b, c = TILTED

@@ -7,10 +7,10 @@ import pytest
 
 from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_contacts
 from scanfab.packing.doubts import doubts_of
-from scanfab.packing.sample import Sample
 from scanfab.pipeline.plan import make_plan
 from scanfab.pipeline.strain import axial_length
 from tests.helpers.lattices import ball_points, shaken_cubic, simple_cubic
+from tests.helpers.packed import sample_of
 
 SPHERES = shaken_cubic(np.random.default_rng(5), 9)
 
@@ -22,20 +22,9 @@ def with_flown(*places, radius=0.5, cell=None) -> Packing:
     return Packing(position, radii, cell=cell)
 
 
-def sample_of(packing: Packing) -> Sample:
-    return Sample(packing, np.zeros(len(packing), bool))
-
-
 def escaped_of(packing: Packing) -> list[int]:
     """Those that the extents leave out."""
     return np.flatnonzero(~sample_of(packing).gathered).tolist()
-
-
-def told_of(packing: Packing) -> list[str]:
-    """What is said of grains that flew away."""
-    return [
-        one.text for one in doubts_of(sample_of(find_contacts(packing))) if one.code == "escaped"
-    ]
 
 
 def window_of(packing: Packing):
@@ -71,7 +60,7 @@ def test_more_than_a_few_stay_but_not_without_a_word(number, far):
     packing = with_flown(*(4 + directions * (5 + far + 2 * np.arange(number)[:, None])))
     assert escaped_of(packing) == []
     assert np.array_equal(sample_of(packing).gathered, np.ones(729 + number, bool))
-    (told,) = told_of(packing)
+    (told,) = (one.text for one in doubts_of(sample_of(packing)) if one.code == "escaped")
     assert "include them, as they are too many to be left out" in told
     assert '`boundary="id=7' in told
 

@@ -157,12 +157,6 @@ def test_other_contacts_keep_everything_else():
     assert packing.contacts is None
 
 
-def test_centres_are_wrapped_into_the_cell():
-    for x in (-1e-17, -1e-300, 5.7, 11.4, -5.7):
-        packing = Packing([[x, 0, 0]], 1.0, cell=Cell([5.7, 9, 9]))
-        assert 0 <= packing.position[0, 0] < 5.7
-
-
 # forces
 
 

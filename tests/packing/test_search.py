@@ -236,15 +236,6 @@ def test_all_contacts_along_one_axis():
         assert tensor.axial(axis) == pytest.approx(1.0)
 
 
-def test_a_pair_touches_through_each_image_that_is_near_enough():
-    steps = list(itertools.product(range(-9, 10), repeat=2))
-    near = [(i, j) for i, j in steps if np.hypot(0.3 + 0.6 * i, 1.2 + 1.5 * j) < 2.0]
-    own = [(i, j) for i, j in steps if (i, j) > (0, 0) and np.hypot(0.6 * i, 1.5 * j) < 2.0]
-    expected = {(0, 1, (i, j, 0)) for i, j in near}
-    expected |= {(row, row, (i, j, 0)) for row in (0, 1) for i, j in own}
-    assert canonical(THROUGH_IMAGES.contacts) == expected
-
-
 @pytest.mark.parametrize("edges", [(0.5, 0.5, 0.5), (0.7, 2.5, 8.0), (2.9, 2.9, 2.9)])
 def test_cells_thinner_than_a_grain(edges):
     position = np.random.default_rng(3).random((4, 3)) * edges

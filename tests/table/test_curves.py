@@ -66,13 +66,6 @@ def test_a_single_frame_has_the_strain_that_is_not_zero():
         assert curves.frame_strain_column({"strain": axial, "shear_strain": shear}) == column
 
 
-def test_a_strain_is_spelt_for_titles():
-    row = {"strain": 0.1234567, "shear_strain": None}
-    assert curves.spelt_strain(row, "strain") == "axial strain 12.3 %"
-    assert curves.spelt_strain(row, "strain", symbol=True) == r"$\varepsilon_a$ = 12.3 %"
-    assert curves.spelt_strain(row, "shear_strain") == curves.spelt_strain(row, None) == ""
-
-
 def test_sources_are_called_by_the_last_part_of_their_path():
     for first, second in (("runs/dense", "runs/loose"), ("one/x", "two/x")):
         named = [one.source for one in curves.curves_of([*curve(first), *curve(second)])]
@@ -134,12 +127,6 @@ def test_rows_that_are_there_already_count_once_with_one_warning(source):
     assert (len(first), second) == (5, [])
     (text,) = {str(one.message) for one in caught}
     assert text == f"2.csv: rows of {source} that 1.csv also holds are used once"
-
-
-@pytest.mark.filterwarnings("error")
-def test_other_results_of_the_same_source_are_not_dropped():
-    first, second = choose_rows([("1.csv", curve()), ("2.csv", curve(factor=2.0))])
-    assert len(first) == len(second) == 5
 
 
 VALUES = ["abc", True, [1], {"a": [1]}, float("nan"), float("inf"), 10**400, b"x"]

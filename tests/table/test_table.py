@@ -232,9 +232,6 @@ def test_a_foreign_format_is_like_the_own_ones_and_takes_no_files_from_them(
     assert load(tmp_path / "t.csv") == results
 
 
-def test_figures_are_named_and_refuse_other_options(results):
-    assert "evolution" in dir(results.plot)
+def test_a_figure_that_does_not_exist_is_an_error_that_names_the_nearest(results):
     with pytest.raises(AttributeError, match="no figure 'evolutoin': did you mean evol"):
         results.plot.evolutoin  # noqa: B018
-    with pytest.raises(TypeError, match="evolution has no option 'fo'"):
-        results.plot.evolution(fo="contacts")

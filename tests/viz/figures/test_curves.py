@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure as Page
 
 import scanfab
 from scanfab.base.errors import ScanfabNote, SettingsError
@@ -196,12 +195,6 @@ AXES = "and the angle between their major axes"
 )
 def test_captions_say_what_is_drawn(rows, values, number, said):
     assert said in captions(rows, **values)[number]
-
-
-def test_the_paper_s_line_can_be_left_out():
-    plain = Correlation(Table(curve()), paper_line=False)
-    assert plain.caption.endswith("along the loading axis, with fitted lines.")
-    assert ":" not in {line.get_linestyle() for line in plain.on(Page()).axes[0].lines}
 
 
 def test_columns_have_a_panel_each_with_the_table_s_numbers(drawn):

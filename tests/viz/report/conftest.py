@@ -2,22 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
 from scanfab.viz.report.page import Picture
-from tests.helpers.dumps import write
-
-
-@pytest.fixture
-def table(tmp_path):
-    """Write rows into a file."""
-
-    def make(rows, name="t.jsonl"):
-        return write(tmp_path / name, "".join(json.dumps(row) + "\n" for row in rows))
-
-    return make
 
 
 @pytest.fixture

@@ -33,7 +33,7 @@ def test_tables_of_other_programs_and_of_compare_are_refused(table, tmp_path, ca
 def test_few_columns_are_enough(table):
     few = ("frame", "variant", "alpha_vs_axial", "alpha_c_axial")
     text = words_of(page_of([table([{name: row[name] for name in few} for row in curve()])]))
-    assert "5 frames of t; variants c." in text
+    assert "5 frames of table; variants c." in text
     assert "lacks the column alpha_vs_axial_se" in text
     with pytest.raises(SettingsError, match="there is no column variant"):
         report([table([{k: v for k, v in row.items() if k != "variant"} for row in curve()])])

@@ -144,7 +144,7 @@ def test_a_hundred_frames_without_a_manifest_stay_light_and_it_says_so(table):
     assert page.count("data:image/") == 3
     for part in (
         "12 of 100 frames are shown",
-        "There is no t.jsonl.manifest.json beside",
+        "There is no table.jsonl.manifest.json beside",
         "the frames are not known, so there is no view",
     ):
         assert part in words_of(page)
