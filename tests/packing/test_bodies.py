@@ -1,7 +1,5 @@
 """Clumps: which spheres are one grain, what touches it, where it is; a twin that tries it all."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Which particles are boundary: every operator, errors that help, and the class that encloses."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

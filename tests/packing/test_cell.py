@@ -1,7 +1,5 @@
 """The cell: wrapping, nearest images, images outside it, and what cannot be a cell."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Volumes, branches and stress of clumps: closed forms."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What looks wrong in a frame is said, and nothing is said of what is right."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The common table: every check on grains and contacts, and the geometry of contacts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

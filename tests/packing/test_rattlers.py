@@ -1,7 +1,5 @@
 """The rules for rattlers: known networks of contacts, identities, a twin that goes one by one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Comparison of variants: normalised curves, fits, differences."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

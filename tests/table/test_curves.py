@@ -1,7 +1,5 @@
 """Rows and curves of tables that stand side by side."""
 
-from __future__ import annotations
-
 import math
 import re
 

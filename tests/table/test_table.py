@@ -1,7 +1,5 @@
 """The fabric table as rows and columns."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import sys

@@ -1,7 +1,5 @@
 """Tables that read back the same, and files that are broken, complete or untouched."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

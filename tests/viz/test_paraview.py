@@ -1,7 +1,5 @@
 """ParaView files, read back by pyvista: every array is there, and says what the table says."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import pyvista

@@ -1,7 +1,5 @@
 """Scenes and their views: what is known of grains and contacts, sections, camera, report."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What tests of figures look at: a drawn page, and the sample's frames."""
 
-from __future__ import annotations
-
 import pytest
 
 import scanfab

@@ -1,7 +1,5 @@
 """Figures of a table: what is drawn is what the table says, and captions say what is drawn."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures by name, on a page and in files; made-up ones are reached wherever the package's are."""
 
-from __future__ import annotations
-
 import inspect
 import re
 import warnings

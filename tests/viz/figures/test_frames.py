@@ -1,7 +1,5 @@
 """Figures of scanned frames: which frames, and that what is drawn is what table and scan say."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The figure of maps: what is drawn where only some blocks, or some frames, have a value."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from matplotlib import pyplot

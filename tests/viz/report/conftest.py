@@ -1,7 +1,5 @@
 """What tests of the report share: tables in files, and reports without figures."""
 
-from __future__ import annotations
-
 import pytest
 
 from scanfab.viz.report.page import Picture

@@ -1,7 +1,5 @@
 """The report in a real browser: it works alone, and the view turns."""
 
-from __future__ import annotations
-
 from contextlib import chdir
 
 import pytest

@@ -1,7 +1,5 @@
 """Which tables a report takes, and in what words it refuses others."""
 
-from __future__ import annotations
-
 import pytest
 
 from scanfab.base.errors import SettingsError

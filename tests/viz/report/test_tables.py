@@ -1,7 +1,5 @@
 """Numbers of the report with their errors, settings with their meanings, and warnings."""
 
-from __future__ import annotations
-
 import inspect
 from dataclasses import fields
 
