@@ -10,6 +10,7 @@ import scanfab
 from scanfab.cli import console
 from scanfab.cli.compare import print_comparison
 from scanfab.cli.console import OFTEN_SAME, SHOWN, STAY, print_table, working
+from scanfab.table.columns import table_columns
 from scanfab.table.compare import compare_tables
 from scanfab.table.row import Row
 from scanfab.table.writing import Excerpt
@@ -87,6 +88,12 @@ def test_a_map_says_which_block_a_row_is_of(lines):
     assert {"x", "y", "z", "at surface"} <= set(heads(head))
     assert "r inner" not in heads(head)
     assert "at surface" not in narrow
+
+
+def test_columns_and_digits_that_were_asked_for_are_shown(lines):
+    excerpt = Excerpt.make(table_columns(), "variant,alpha_vs_axial", 5)
+    head, row, *_ = lines(80, print_table, ROWS, excerpt)
+    assert (heads(head), row.split()) == (["variant", "α_vs axial"], ["d", "-0.012346"])
 
 
 def compared(*sources):
