@@ -1,12 +1,15 @@
-"""What looks wrong in a frame is said, and nothing is said of what is right."""
+"""What looks wrong in a frame is said, and grains that flew away move neither extents nor RV."""
 
 import numpy as np
 import pytest
 
 import scanfab
-from scanfab import Cell, Packing
+from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_contacts
 from scanfab.packing.doubts import cell_hint, doubts_of
+from scanfab.pipeline.plan import make_plan
+from scanfab.pipeline.strain import axial_length
 from tests.helpers import truth
+from tests.helpers.lattices import ball_points, shaken_cubic, simple_cubic
 from tests.helpers.packed import along_x, sample_of
 
 BOX, CELL, FLOOR, TRIAXIAL, YADE = (
@@ -124,3 +127,113 @@ def test_a_format_without_a_cell_is_told(loose, carries, cure):
     assert f"{cure} if the sample is periodic" in cell_hint(sample_of(loose), carries)
     whole = Packing(loose.position, loose.radius, cell=Cell([1.0, 1.0, 1.0]))
     assert cell_hint(sample_of(whole), carries) == ""
+
+
+# grains that flew away
+
+SPHERES = shaken_cubic(np.random.default_rng(5), 9)
+
+
+def with_flown(*places, radius=0.5, cell=None) -> Packing:
+    """729 grains in a cube of edge 9, and some elsewhere."""
+    position = np.vstack([SPHERES.position, np.reshape(places, (-1, 3))])
+    radii = np.concatenate([SPHERES.radius, np.full(len(places), radius)])
+    return Packing(position, radii, cell=cell)
+
+
+def escaped_of(packing: Packing) -> list[int]:
+    """Those that the extents leave out."""
+    return np.flatnonzero(~sample_of(packing).gathered).tolist()
+
+
+def window_of(packing: Packing):
+    return make_plan(Settings(), sample_of(packing)).window
+
+
+def test_a_grain_far_away_moves_neither_the_rv_nor_the_result_in_it():
+    alone, flown = (find_contacts(one) for one in (with_flown(), with_flown((25, 25, 4))))
+    assert escaped_of(flown) == [729]
+    assert np.array_equal(window_of(alone).center, window_of(flown).center)
+    assert window_of(alone).radius == window_of(flown).radius
+    lines = {"variants": "cd", "directions": "lebedev:9", "spacing": 0.1}
+    with pytest.warns(
+        ScanfabWarning, match=r'all others: 1 grain \(id 729\), .* at \(25, 25, 4\); .*"id=729"'
+    ):
+        found = compute(flown, **lines)
+    for one, other in zip(compute(alone, **lines), found, strict=True):
+        assert one == other
+
+
+def test_grains_that_flew_away_together_and_to_several_sides_are_all_found():
+    packing = with_flown((30, 4, 4), (31, 4, 4), (4, -30, 4), (4, 4, 1e6))
+    assert escaped_of(packing) == [729, 730, 731, 732]
+
+
+@pytest.mark.parametrize("far", [3.0, 13.0])
+@pytest.mark.parametrize("number", [8, 9, 16, 30])
+def test_more_than_a_few_stay_but_not_without_a_word(number, far):
+    """One in a hundred of 729, and up to four times as many, each on its own."""
+    random = np.random.default_rng(number)
+    directions = random.normal(size=(number, 3))
+    directions /= np.abs(directions).max(axis=1, keepdims=True)
+    packing = with_flown(*(4 + directions * (5 + far + 2 * np.arange(number)[:, None])))
+    assert escaped_of(packing) == []
+    assert np.array_equal(sample_of(packing).gathered, np.ones(729 + number, bool))
+    told = doubts(packing)["escaped"]
+    assert "include them, as they are too many to be left out" in told
+    assert '`boundary="id=7' in told
+
+
+@pytest.mark.parametrize("solid_fraction", [1e-6, 1e-3, 0.03])
+@pytest.mark.parametrize("count", [60, 1000])
+def test_in_a_gas_no_grain_is_farther_out_than_others(count, solid_fraction):
+    """Neither in a box, nor in a ball, nor in a pyramid with its thin tip."""
+    random = np.random.default_rng(count)
+    radius = random.uniform(0.5, 1.5, count)
+    edge = np.cbrt(4 / 3 * np.pi * np.sum(radius**3) / solid_fraction)
+    for box in random.random((20, count, 3)):
+        ball = ball_points(random, count, 0.6)
+        pyramid = np.column_stack([box[:, :2] * np.cbrt(box[:, 2:]), np.cbrt(box[:, 2])])
+        for shape in (box, ball, pyramid):
+            assert not sample_of(Packing(edge * shape, radius)).escaped.any()
+
+
+def test_one_grain_of_a_small_sample_may_escape_but_not_a_second_part_of_a_sample():
+    """Although it is more than one of a hundred, as eight of 737 grains are."""
+    packing = Packing(np.vstack([simple_cubic(4).position, [20.0, 2.0, 2.0]]), 0.5)
+    assert escaped_of(packing) == [64]
+    corners = np.array([[60.0, y, z] for y in (0, 1) for z in range(4)])
+    assert escaped_of(with_flown(*corners)) == []
+
+
+def test_through_a_periodic_face_nothing_is_far_away():
+    """Open along z alone: a grain above the sample has escaped, one beside it has not."""
+    cell = Cell(np.diag([9.0, 9.0, 9.0]), (True, True, False))
+    assert escaped_of(with_flown((25, 4, 4), cell=cell)) == []
+    assert escaped_of(with_flown((4, 4, 40), cell=cell)) == [729]
+
+
+def test_strain_of_the_grains_does_not_follow_one_that_flies_away():
+    lengths = [
+        axial_length(sample_of(with_flown((25, 4, 4 + 30 * k))), "grains", (0.0, 0.0, 1.0))
+        for k in range(2)
+    ]
+    assert lengths[0] == lengths[1] < 10
+
+
+def test_a_few_bodies_of_many_spheres_are_no_crowd():
+    """Each at a place of its own: none is far away from a crowd that there is not."""
+    for count in (2, 7, 20):
+        random = np.random.default_rng(3)
+        bodies = np.arange(60) % count
+        position = 10.0 * random.random((count, 3))[bodies] + random.random((60, 3))
+        packing = Packing(position, 0.5, bodies=bodies)
+        assert not sample_of(packing).escaped.any()
+
+
+@pytest.mark.parametrize("distance", [0.5, 1.0, 1.5, 2.0, 6.0])
+def test_a_grain_farther_outside_than_any_other_does_not_move_the_rv(distance):
+    flown = with_flown((9 + distance, 4, 4))
+    assert escaped_of(flown) == ([729] if distance > 1.0 else [])
+    still = np.array_equal(window_of(flown).center, window_of(with_flown()).center)
+    assert still == (distance > 1.0)
