@@ -83,7 +83,6 @@ def test_bodies_that_span_a_thin_sample_raise_no_doubt():
     ("factor", "words"),
     [
         (2.5, "contacts a grain by geometry (radii"),
-        (30.0, "contacts a grain by geometry (radii"),
         (1e-3, "no contact at all by geometry: right for a gas, else check the units"),
     ],
 )

@@ -234,10 +234,3 @@ def test_all_contacts_along_one_axis():
         assert len(packing.contacts) == 5
         assert tensor.matrix == pytest.approx(np.diag(axis), abs=1e-12)
         assert tensor.axial(axis) == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize("edges", [(0.5, 0.5, 0.5), (0.7, 2.5, 8.0), (2.9, 2.9, 2.9)])
-def test_cells_thinner_than_a_grain(edges):
-    position = np.random.default_rng(3).random((4, 3)) * edges
-    cell = {"vectors": edges, "periodic": (True, True, True)}
-    assert_those_of_the_slow_twin(position, np.array([0.49, 0.3, 0.1, 0.48]), **cell)
