@@ -42,16 +42,11 @@ def test_tables_on_a_terminal_are_not_cut(ask, monkeypatch, width):
     assert head.split() == ["ladder", "value"]
 
 
-@pytest.fixture
-def cube(tmp_path, monkeypatch):
-    """64 grains that overlap their neighbours, and ladders of two steps."""
+def test_with_a_file_the_words_are_the_output(ask, tmp_path, monkeypatch):
+    """The size of an RV that a file draws is left out; it follows the strain that is named."""
     monkeypatch.setattr("scanfab.pipeline.calibration.SPACINGS", (2.0, 1.0))
     monkeypatch.setattr("scanfab.pipeline.calibration.DEGREES", (5, 9))
-    return write(tmp_path / "dump_0.txt", dump_text(cubic_rows(), box=((0, 4),) * 3))
-
-
-def test_with_a_file_the_words_are_the_output(ask, cube, tmp_path):
-    """The size of an RV that a file draws is left out; it follows the strain that is named."""
+    cube = write(tmp_path / "dump_0.txt", dump_text(cubic_rows(), box=((0, 4),) * 3))
     table, figure = tmp_path / "steps.csv", tmp_path / "ladders.png"
     words = ("--variants", "c", "--tolerance", "2e-2", "--max-chords", "1e6", "--cutoff", "0.2rmin")
     words += ("--rv-shape", surface(tmp_path / "box.stl", 2 + corners_of_a_box(1.2)))

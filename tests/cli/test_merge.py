@@ -55,15 +55,11 @@ def parts(finished, tmp_path):
 
 
 @pytest.fixture
-def refused(tmp_path, capsys):
+def refused(tmp_path, ask):
     """What is said where nothing is written."""
 
     def refused(*words: str) -> str:
-        output = tmp_path / "merged.csv"
-        capsys.readouterr()
-        code = run(["merge", *words, "-o", str(output)])
-        said = capsys.readouterr().err
-        assert code == 1
+        said = ask("merge", *words, "-o", tmp_path / "merged.csv", code=1).err
         assert not list(tmp_path.glob("merged.csv*"))
         assert said.startswith("scanfab: error: ")
         assert said.count("\n") == 1

@@ -216,17 +216,16 @@ def test_through_a_face_it_is_the_same():
     np.testing.assert_allclose(one, two, atol=1e-12)
 
 
-@pytest.fixture
-def dumbbells():
-    """Two of them in a cell, that press on each other at two points, each with a force of 3."""
+def test_stress_and_branches_run_from_body_to_body():
+    """
+    Two dumbbells in a cell press on each other at two points, each with a force of 3.
+
+    A body's place has y = 2 + 3 v for the volume v of its upper sphere over that of both.
+    """
     position = [[2, 2, 2], [2, 5, 2], [3.9, 2, 2], [3.9, 5, 2]]
     listed = ContactList([[0, 2], [3, 1]], force=[[3.0, 0.2, 0], [-3.0, 0, 0]])
     more = {"bodies": [0, 0, 1, 1], "contacts": listed, "cell": Cell([9.0] * 3)}
-    return sample_of(Packing(position, [1.0, 0.9, 1.0, 1.1], **more))
-
-
-def test_stress_and_branches_run_from_body_to_body(dumbbells):
-    """A body's place has y = 2 + 3 v for the volume v of its upper sphere over that of both."""
+    dumbbells = sample_of(Packing(position, [1.0, 0.9, 1.0, 1.1], **more))
     y = [2 + 3 * r**3 / (1 + r**3) for r in (0.9, 1.1)]
     state = sample_state(dumbbells, VARIANTS["a"], None)
     branch = np.array([1.9, y[1] - y[0], 0.0])

@@ -55,13 +55,6 @@ class Contacts(FrameFigure):
 
 
 @pytest.fixture
-def table(tmp_path):
-    path = tmp_path / "t.csv"
-    Table([{**row, "rattlers": 5 * row["frame"]} for row in curve()]).save(path)
-    return path
-
-
-@pytest.fixture
 def made_up(monkeypatch):
     """A package offers figures besides what is installed."""
     for name, figure in (("made_up", Rattlers), ("heights", Contacts)):
@@ -100,18 +93,21 @@ def test_compute_and_python_draw_a_made_up_figure_of_frames(series, tmp_path):
 
 @pytest.mark.usefixtures("made_up")
 def test_python_compare_and_report_draw_a_made_up_figure_of_a_table(table, tmp_path):
-    ax = Figure().subplots()
-    plot = load(table).plot
+    path, ax = (
+        table([{**row, "rattlers": 5 * row["frame"]} for row in curve()]),
+        Figure().subplots(),
+    )
+    plot = load(path).plot
     assert plot.made_up(ax=ax) is ax
     assert ax.lines[0].get_ydata().tolist() == [0, 5, 10, 15, 20]
     assert repr(plot) == "Plots(evolution, normalised, correlation, columns, made_up)"
     file = tmp_path / "x.svg"
-    assert run(["compare", str(table), "--plot", str(file), "--figure", "made_up"]) == 0
+    assert run(["compare", str(path), "--plot", str(file), "--figure", "made_up"]) == 0
     assert 'id="rattlers"' in file.read_text()
-    with drawn_page(make_figures(load(table), "table")) as page:
+    with drawn_page(make_figures(load(path), "table")) as page:
         letters = [axes.get_title(loc="left") for axes in page.axes if axes.axison]
     assert letters == [f"({letter})" for letter in "abcdef"]
-    page = report([table]).page
+    page = report([path]).page
     assert page.count("data:image/svg") == 4
     assert "<figcaption>Rattlers over the frames.</figcaption>" in page
 
