@@ -17,7 +17,7 @@ from scanfab.base.spelling import counted
 from scanfab.io.options import parse_frames
 from scanfab.packing.sample import VARIANTS
 from scanfab.pipeline.frame import compute_frame
-from scanfab.pipeline.frames import Frames, Source, doubts_of_frame
+from scanfab.pipeline.frames import Frames, NoChosenFrameError, Source, doubts_of_frame
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import make_plan
 from scanfab.pipeline.settings import MAX_CHORDS, OF_SAMPLE, Settings
@@ -194,13 +194,16 @@ class _OneFrame:
 
     def __init__(self, source: Source, settings: Settings, frame: int) -> None:
         frames = Frames(source, replace(settings, frames=parse_frames("frame", frame)))
+        try:
+            self.number, wanted = frames.one()
+        except NoChosenFrameError:
+            raise SettingsError(f"frame: there is no frame {frame}: {frames.extent()}") from None
         # the first frame of the series that has grains makes the plan
         first = frames.reference()
         if first is None:
             raise PackingError("no frame has grains, so there is nothing to calibrate")
-        self.first = first[2]
-        self.number, wanted = next(frames.due())
-        sample = frames.sample(self.number, wanted)
+        number, _, self.first = first
+        sample = self.first if number == self.number else frames.sample(self.number, wanted)
         if sample is None or not sample.grains.any():
             raise PackingError(f"frame {self.number} has no grains: choose another frame")
         self.name, self.sample, self.space = frames.name, sample, self.first.packing.space

@@ -164,6 +164,13 @@ class Frames:
         if not found:
             raise self.no_such_frames()
 
+    def one(self) -> tuple[int, Unread]:
+        """The first chosen frame, unread; SettingsError if there is none."""
+        for number, frame in self:
+            if number in self.chosen:
+                return number, frame
+        raise self.no_such_frames()
+
     def reference(self) -> tuple[int, Unread, Sample] | None:
         """
         The frame that lengths come from: the one that the user names, else the first with grains.
@@ -193,7 +200,7 @@ class Frames:
                         f"reference: packings are not kept, so it must be their first frame that "
                         f"has grains: expected {number}, found {self.named}"
                     )
-                tell(self._check_boundary(sample))
+                tell(self.check_boundary(sample))
                 return number, frame, sample
             if is_named:
                 raise NoReferenceError(f"reference: frame {number} of {self.name} has no grains")
@@ -218,7 +225,7 @@ class Frames:
             tell([Note("skipped", str(error), kind=SkippedFrameWarning)], f"frame {number}")
             return None
 
-    def _check_boundary(self, first: Sample) -> list[Note]:
+    def check_boundary(self, first: Sample) -> list[Note]:
         """
         A note for rules of the boundary that select no particle; SettingsError if no rule does.
 

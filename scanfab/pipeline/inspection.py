@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from typing import Any
 
 from scanfab.base.column import LENGTH, Column
-from scanfab.base.errors import Note, ScanfabNote, collected, tell
+from scanfab.base.errors import PackingError, ReadError, ScanfabNote, collected, tell
 from scanfab.base.option import unusable
 from scanfab.io.frame import Frame
 from scanfab.io.series import Series
 from scanfab.packing.boundary import spelt_rules
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
-from scanfab.pipeline.frames import Frames, doubts_of_frame
+from scanfab.pipeline.frames import Frames, doubts_of_frame, sample_of
 from scanfab.pipeline.rv import rvs_of
 from scanfab.pipeline.settings import Settings
 from scanfab.table.columns import FRAME_COLUMNS, row_of
@@ -106,36 +107,45 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[Row]:
         If a frame cannot be read, or no frame has boundary particles although they are named.
     """
     # the RV is reported whatever the variants
-    frames = Frames(series, replace(settings, variants="c"))
-    with collected() as told_before:
-        reference, window = _reference(frames)
-    for number, frame in frames.due():
-        with collected() as told:
-            sample = frames.sample(number, frame)
-        if sample is not None and isinstance(frame, Frame):
-            told = told_before if number == reference else told
-            doubts = _doubts(frames.settings, frame, sample, told)
+    frames, any_chosen = Frames(series, replace(settings, variants="c")), False
+    window: Window | None = None
+    if settings.reference is not None and (reference := frames.reference()) is not None:
+        window = _rv(frames, reference[2])
+    for number, frame in enumerate(series.whole):
+        is_chosen = number in frames.chosen
+        any_chosen |= is_chosen
+        # a frame before the chosen ones is read only for the RV, so it may be damaged
+        with nullcontext() if is_chosen else suppress(PackingError, ReadError):
+            if is_chosen or window is None:
+                sample, doubts = _read(frames, frame)
+                window = window or _rv(frames, sample)
+        if is_chosen:
             yield _report(series.name, number, frame, sample, doubts, window)
+        if number >= frames.chosen.stop - 1:
+            break
+    if not any_chosen:
+        raise frames.no_such_frames()
 
 
-def _reference(frames: Frames) -> tuple[int, Window | None]:
-    """The number of the reference frame, and its largest RV; -1 and None without grains."""
-    found = frames.reference()
-    if found is None:
-        return -1, None
-    number, _, sample = found
-    return number, rvs_of(frames.settings.in_space(sample.packing.space), sample)[-1].window
+def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
+    """Read a frame and collect doubts about it."""
+    rules = frames.settings.boundary
+    with collected() as told:
+        sample = sample_of(frame, frames.settings)
+    told = [*told, *doubts_of_frame(frame, sample, frames.settings)]
+    tell(one for one in told if one.kind is ScanfabNote)
+    doubts = [one.text for one in told if one.kind is not ScanfabNote]
+    if rules and len(sample.packing) and not sample.boundary.any():
+        doubts.insert(0, f"`boundary`: no particle has {spelt_rules(rules, sample.packing)}")
+    return sample, doubts
 
 
-def _doubts(settings: Settings, frame: Frame, sample: Sample, told: Iterable[Note]) -> list[str]:
-    """Doubts about a frame; what is only a note is told."""
-    found = [*told, *doubts_of_frame(frame, sample, settings)]
-    tell(one for one in found if one.kind is ScanfabNote)
-    doubts = [one.text for one in found if one.kind is not ScanfabNote]
-    if settings.boundary and len(sample.packing) and not sample.boundary.any():
-        named = spelt_rules(settings.boundary, sample.packing)
-        doubts.insert(0, f"`boundary`: no particle has {named}")
-    return doubts
+def _rv(frames: Frames, sample: Sample) -> Window | None:
+    """The largest RV from a frame with grains, else None; also warns about the boundary."""
+    if not sample.grains.any():
+        return None
+    tell(frames.check_boundary(sample))
+    return rvs_of(frames.settings.in_space(sample.packing.space), sample)[-1].window
 
 
 def _report(

@@ -33,7 +33,7 @@ from typing import IO, Any, NamedTuple
 from scanfab.base.errors import ReadError, SettingsError, note
 from scanfab.base.files import locked, named_errors, undone_at_end, whole_file
 from scanfab.base.option import flag_of, options_of
-from scanfab.base.spelling import counted, shortest
+from scanfab.base.spelling import shortest
 from scanfab.io.files import without_temporary
 from scanfab.io.options import READING_OPTIONS
 from scanfab.io.series import Series
@@ -351,9 +351,8 @@ class PartFile:
             other = next(one for one in others if not (one.exists() or part_of(one).exists()))
             # copied, not renamed, because other runs must find this file locked
             shutil.copyfile(self.path, part_of(other))
-            kept = f"{counted(self.frames, 'finished frame')} of an earlier run are kept"
-            how = f"its command goes on with them by `output={other}` `resume`"
-            note(f"{self.path}: {kept} as {part_of(other)}; {how}")
+            kept = f"the finished frames of an earlier run are kept as {part_of(other)}"
+            note(f"{self.path}: {kept}; its command goes on with them by `output={other}` `resume`")
         with named_errors(self.path):
             self._stream.truncate(0)
         self._write({"settings": asked})

@@ -15,12 +15,15 @@ from scanfab.base.errors import Note, ScanfabNote, SettingsError
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.io.surface import read_surface
-from scanfab.packing.packing import spelt_some
+from scanfab.packing.packing import spelt_plane, spelt_some
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import RV_MEANING, SurfaceBox, Window
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import cell_of, centers_of, strain_mode
 from scanfab.pipeline.values import Vector
+
+# in radii of the smallest grain: a smaller RV is refused as a mistake
+SMALLEST = 1e-9
 
 
 class RV(NamedTuple):
@@ -41,13 +44,15 @@ def rvs_of(settings: Settings, sample: Sample) -> tuple[RV, ...]:
     Raises
     ------
     SettingsError
-        If a surface is not convex.
+        If an RV is far smaller than any grain, lies beside the plane of the discs, or has a surface
+        that is not convex.
     ReadError
         If the file of the surface cannot be read.
     """
     sizes = settings.rvs if settings.needs_window else ()
     packing, space = sample.packing, sample.packing.space
     surfaces = SurfaceBox.of(packing, sample.gathered)
+    smallest = float(packing.radius[sample.grains].min())
     rvs = []
     for size in sizes:
         shape, center = _shape(settings, size * (0.5 * surfaces.extents), space)
@@ -56,7 +61,17 @@ def rvs_of(settings: Settings, sample: Sample) -> tuple[RV, ...]:
         elif center is None:
             center = surfaces.center.copy()
         if space.across is not None:
+            # rounding may put the centre beside the plane
+            if abs(center[space.across] - packing.place_across) > packing.radius.max():
+                raise SettingsError(
+                    f"rv_center: lies outside {space} of the discs: expected "
+                    f"{spelt_plane(packing.position, space)}, found {center[space.across]:g}"
+                )
             center[space.across] = packing.place_across
+        if 0.5 * (shape.high - shape.low)[list(space.along)].min() < SMALLEST * smallest:
+            raise SettingsError(
+                f"rv: the {shape} is far too small for grains of radius {smallest:g}"
+            )
         rvs.append(RV(size if len(sizes) > 1 else None, Window(center, shape)))
     return tuple(rvs)
 

@@ -126,7 +126,7 @@ def cell_strains(cell: Cell | None, first: Cell | None) -> tuple[float | None, f
     dimension = cell.space.dimension
     of_norm = np.sqrt((dimension - 1.0) / dimension)
     shear = of_norm * np.linalg.norm(stretch - stretch.mean())
-    return float(shear), -float(stretch.sum())
+    return float(shear), float(np.log(abs(np.linalg.det(before) / np.linalg.det(now))))
 
 
 def is_flipped(cell: Cell | None, before: Cell | None) -> bool:

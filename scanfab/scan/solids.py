@@ -300,17 +300,20 @@ def cells_of(grains: CellGrains, width: float) -> Cells:
     grain, image = np.empty(start[-1], np.int32), np.empty((start[-1], 3), np.int32)
     fill_cells(low, high, grains.periodic, parts, start[:-1].copy(), grain, image)
     sphere = np.column_stack([grains.position[grain] + image @ vectors, grains.radius[grain]])
+    farthest = [_farthest(grains, volume, solid) for solid in (slice(None), ~grains.removed)]
     return Cells(
         sphere, grains.removed[grain], vectors, inverse, corner, grains.periodic, parts, start,
-        _farthest(grains, volume),
+        *farthest,
     )  # fmt: skip
 
 
-def _farthest(grains: CellGrains, volume: float) -> float:
+def _farthest(grains: CellGrains, volume: float, solid: BoolArray | slice) -> float:
     """How far to follow a ray that meets nothing: FAR leaves an open sample."""
+    radius = grains.radius[solid]
+    if not len(radius):
+        return 0.0
     if not grains.periodic.any():
         return FAR
-    kept = grains.radius[~grains.removed]
-    shadow = np.pi * float(np.sum((kept if len(kept) else grains.radius) ** 2))
     periods = float(np.linalg.norm(grains.vectors[grains.periodic], axis=1).sum())
-    return MOST_PERIODS * periods + MOST_FREE_PATHS * volume / shadow
+    free_path = volume / (np.pi * float(np.sum(radius**2)))
+    return MOST_PERIODS * periods + MOST_FREE_PATHS * free_path

@@ -134,7 +134,7 @@ def test_an_interrupted_run_is_gone_on_with(stop, last_frame, resumes, suffix, r
 
 def test_without_resume_the_part_is_kept_under_another_name(compute, stop, resumes):
     """And what made it goes on with it there."""
-    told = "note: table.csv.part: 2 finished frames of an earlier run are kept as table.1.csv"
+    told = "note: table.csv.part: the finished frames of an earlier run are kept as table.1.csv"
     stop("table.csv", "--seed", "1")
     stop("table.csv", "--seed", "2", told=told)
     assert compute("table.csv", told="by -o table.2.csv --resume") == (0, 4)

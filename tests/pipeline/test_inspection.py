@@ -97,6 +97,7 @@ def test_samples_are_told_apart_by_the_options_of_compute(tmp_path):
 
 
 def test_the_rv_is_that_of_the_first_frame_whichever_frames_are_chosen(tmp_path):
+    """A frame before the chosen ones may be damaged: then the next one decides."""
     shifted = [(id, type, x + 0.25, *rest) for id, type, x, *rest in ROWS]
     texts = [dump_text(), dump_text(shifted, step=1), dump_text(shifted, step=2)]
     every = reports(tmp_path, texts)
@@ -104,6 +105,9 @@ def test_the_rv_is_that_of_the_first_frame_whichever_frames_are_chosen(tmp_path)
     assert last.rv_center == every[0].rv_center
     (other,) = reports(tmp_path, texts, frames="2:", variants="ab")
     assert other == last
+    flat = [(*ROWS[0][:5], 0.0), *ROWS[1:]]
+    (last,) = reports(tmp_path, [dump_text(flat), *texts[1:]], frames="2:")
+    assert last.rv_center[0] == pytest.approx(every[0].rv_center[0] + 0.25)
 
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "variants": "a", "contact_tolerance": 0.1}

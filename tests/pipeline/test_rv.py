@@ -115,6 +115,7 @@ def test_a_window_across_periodic_faces_is_that_of_the_repeated_packing(tilted, 
 
 
 REFUSED = [
+    ("flat", "ellipsoid", {"rv_size": "1e-12,1,1"}, "rv: the ellipsoid .* far too small for"),
     ("tilted", "box", {"rv_size": "6.1,1,1"}, r"overlaps its own image, \(.*\) away"),
     ("tilted", "cylinder", {"rv_size": "0.4,100"}, "overlaps its own image"),
     ("tilted", "box", {"rv_size": "1e9,1e9,1e9"}, "more than 10 periods"),

@@ -22,6 +22,9 @@ Int32Array = npt.NDArray[np.int32]
 # allows vector instructions in a loop that looks for the smallest number
 NO_NAN = {"nnan", "nsz", "contract"}
 
+# a ray that misses the grid by less than this fraction of a cell is in it, but for rounding
+SLIGHT = 1e-9
+
 
 class Cells(NamedTuple):
     """Grains by the cell of a grid."""
@@ -45,6 +48,8 @@ class Cells(NamedTuple):
     """First entry of each cell, first edge fastest, and the end of the last cell."""
     farthest: float
     """A ray that has met nothing after this length stays in a channel of the periodic grains."""
+    farthest_kept: float
+    """The same for rays that pass through removed grains."""
 
 
 @inner(inline="always")
@@ -142,21 +147,42 @@ def first_in_cell(cells: Cells, ray: Ray, number: int, without_removed: bool) ->
 
 
 @inner(forceinline=True, error_model="numpy")
-def begin_inside(cells: Cells, ray: Ray) -> None:
+def to_grid(cells: Cells, ray: Ray) -> float:
     """
-    Put the ray into its first cell.
+    Distance at which the ray enters the grid, which has no end where grains repeat; FAR if never.
 
-    Along an edge without a period the outermost cells have no end: no grain lies outside the grid,
-    so a ray from there passes through an outermost cell until it reaches the grid.
+    Fills in the ray's beginning, counted in cells, as ``out``, and its slope as ``width``.
     """
+    first = 0.0
     for i in range(3):
-        at = rise = period = 0.0
+        at = rise = 0.0
         for j in range(3):
             at += (ray.place[j] - cells.corner[j]) * cells.inverse[j, i]
             rise += ray.along[j] * cells.inverse[j, i]
         parts = cells.parts[i]
         at, rise = at * parts, rise * parts
-        cell = np.floor(at)
+        ray.out[i], ray.width[i] = at, rise
+        if not cells.periodic[i] and not 0.0 <= at <= parts:
+            # otherwise it only moves away
+            comes = rise > 0.0 if at < 0.0 else rise < 0.0
+            first = max(first, ((0.0 if at < 0.0 else parts) - at) / rise if comes else FAR)
+    for i in range(3):
+        at = ray.out[i] + first * ray.width[i]
+        if not cells.periodic[i] and not -SLIGHT <= at <= cells.parts[i] + SLIGHT:
+            first = FAR
+    return first
+
+
+@inner(forceinline=True, error_model="numpy")
+def begins_inside(cells: Cells, ray: Ray) -> bool:
+    """Put the ray into its first cell; returns whether there is one."""
+    first = to_grid(cells, ray)
+    if first == FAR:
+        return False
+    for i in range(3):
+        at, rise, parts = ray.out[i], ray.width[i], cells.parts[i]
+        at += first * rise
+        cell, period = np.floor(at), 0.0
         if cells.periodic[i]:
             period = np.floor(cell / parts)
             for j in range(3):
@@ -166,7 +192,8 @@ def begin_inside(cells: Cells, ray: Ray) -> None:
         ray.cell[i] = int(cell) - int(period) * parts
         ray.step[i] = 1 if rise > 0.0 else -1
         ray.width[i] = 1.0 / abs(rise) if rise != 0.0 else FAR
-        ray.out[i] = (cell + (rise > 0.0) - at) / rise if rise != 0.0 else FAR
+        ray.out[i] = first + (cell + (rise > 0.0) - at) / rise if rise != 0.0 else FAR
+    return True
 
 
 @inner(forceinline=True, error_model="numpy")
@@ -194,8 +221,8 @@ def next_solid(
     """
     found, steps = FAR, 0.0
     parts, out = cells.parts, ray.out
-    goes_on = True
-    begin_inside(cells, ray)
+    farthest = cells.farthest_kept if without_removed else cells.farthest
+    goes_on = begins_inside(cells, ray)
     while goes_on:
         number = cell_of(parts, ray.cell[0], ray.cell[1], ray.cell[2])
         here = first_in_cell(cells, ray, number, without_removed)
@@ -205,6 +232,6 @@ def next_solid(
         through = through if out[through] < out[2] else 2
         nearest = out[through]
         # a solid found beyond this cell may lie behind others
-        goes_on = found > nearest and nearest <= cells.farthest and steps <= most_steps
+        goes_on = found > nearest and nearest <= farthest and steps <= most_steps
         goes_on = goes_on and enters_next(cells, ray, through)
     return found, steps
