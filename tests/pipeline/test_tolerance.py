@@ -134,6 +134,14 @@ def test_a_variant_that_cannot_meet_the_tolerance_does_not_hold_back_its_neighbo
     (told,) = {str(one.message) for one in caught if "tolerance" in str(one.message)}
     assert f"variant b: alpha_vs_axial_se is {few.alpha_vs_axial_se:.2g}, where" in told
 
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
+def test_a_variant_without_a_grain_takes_no_steps_from_the_others(repeated):
+    """Lines of b, for which all of a periodic sample is void, are not followed."""
+    options = {"directions": "lebedev:5", "spacing": 0.5, "min_contacts": 99}
+    whole, _ = compute(repeated, variants="ab", **options)
+    (alone,) = compute(repeated, variants="a", **options)
+    assert whole.alpha_vs_axial_sample_se == alone.alpha_vs_axial_sample_se
+
 
 @pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
 @pytest.mark.parametrize("sample", ["packing", "loose"])
