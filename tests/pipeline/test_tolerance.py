@@ -134,6 +134,7 @@ def test_a_variant_that_cannot_meet_the_tolerance_does_not_hold_back_its_neighbo
     (told,) = {str(one.message) for one in caught if "tolerance" in str(one.message)}
     assert f"variant b: alpha_vs_axial_se is {few.alpha_vs_axial_se:.2g}, where" in told
 
+
 @pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
 def test_a_variant_without_a_grain_takes_no_steps_from_the_others(repeated):
     """Lines of b, for which all of a periodic sample is void, are not followed."""
