@@ -89,7 +89,9 @@ class Quadric(NamedTuple):
 
     def norm(self, points: FloatArray) -> FloatArray:
         """√(x·form x) of each point, shape (N,)."""
-        return np.asarray(np.sqrt(np.einsum("ij,ij->i", points @ self.form, points)))
+        square = np.einsum("ij,ij->i", points @ self.form, points)
+        # rounding makes it negative on the axis of an oblique cylinder
+        return np.asarray(np.sqrt(np.maximum(square, 0.0)))
 
 
 # the quadric of a region that is bounded by planes alone: no point violates it

@@ -63,6 +63,14 @@ def test_points_inside_are_those_of_the_definition(region, inside):
         assert not sphere(radius).contains(np.array([[0.0, 0.0, radius]])).any()
 
 
+def test_rounding_puts_no_point_on_the_axis_of_a_cylinder_outside():
+    for axis in np.random.default_rng(1).normal(size=(50, 3)):
+        region = cylinder(1.0, 4.0, axis)
+        places = np.linspace(-1.9, 1.9, 20)[:, None] * axis / np.linalg.norm(axis)
+        assert region.contains(places).all()
+        assert region.may_meet(places, np.full(20, 0.1)).all()
+
+
 @pytest.mark.parametrize("name", SHAPES)
 def test_spheres_meet_a_region_whose_nearest_place_they_hold(name):
     """Of many places of the surface the nearest one is almost the nearest of all."""
