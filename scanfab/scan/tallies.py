@@ -27,6 +27,7 @@ FEW_LINES = 0.5
 NARROW = 0.3
 # a gap without length never counts
 SMALLEST = 5e-324
+# vectors and periods of an open sample
 NO_CELL = np.zeros((0, 3)), np.zeros(0, bool)
 # edge rules that follow no segment: clip and ends
 CLIPPED, WEIGHED = Edge(None, None, 0.0), Edge(True, None, 0.0)

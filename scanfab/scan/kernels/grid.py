@@ -153,7 +153,7 @@ def strip_of(grid: Grid, row: int, rows: int, column: int, columns: int) -> Stri
 
 
 class CellGrains(NamedTuple):
-    """Grains of a periodic medium, each once."""
+    """Grains of a periodic medium, each once; or those of an open sample, without a cell."""
 
     position: FloatArray
     """Shape (N, 3)."""

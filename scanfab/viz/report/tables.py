@@ -116,7 +116,7 @@ def results_tables(summary: Sequence[TableRow], rows: Sequence[Row]) -> list[Par
         cells = [_cells(group[-1]) if group else {} for group in groups]
         turned = is_turned([row for row in rows if row["source"] == source])
         # axial values miss the fabric of turned axes: intensities lead, and no line is fitted
-        names = [*INTENSITIES * turned, *RESULTS]
+        names = [*INTENSITIES, *RESULTS] if turned else [*RESULTS]
         lines = {name: [one.get(RESULTS[name], "-") for one in cells] for name in names}
         if not turned:
             lines |= {
