@@ -223,7 +223,7 @@ class FollowedSeries(Series):
         series, path = frame.series, frame.snapshot.path
         contacts = _contacts(series, frame)
         beside = [] if series.grains.kind == "index" else series.beside(path)
-        files = [path, *frame.snapshot.parts, *beside, *filter(None, contacts)]
+        files = [path, *beside, *filter(None, contacts)]
         quiet = min(map(self._quiet, files))
         if not all(contacts) or not (has_later or quiet >= QUIET):
             return False

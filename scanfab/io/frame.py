@@ -83,11 +83,10 @@ class Frame:
             wanted = {*steps, next((step for step in family.files if step not in steps), None)}
             files = {step: file.absolute() for step, file in family.files.items() if step in wanted}
             families.append(replace(family, files=files))
-        parts = tuple(part.absolute() for part in snapshot.parts)
         return replace(
             self,
             series=replace(series, grains=families[0], contacts=tuple(families[1:]), known=known),
-            snapshot=replace(snapshot, path=snapshot.path.absolute(), parts=parts),
+            snapshot=replace(snapshot, path=snapshot.path.absolute()),
         )
 
     @property

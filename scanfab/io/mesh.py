@@ -85,26 +85,15 @@ def holds_mesh(form: str | None) -> bool:
     return form is not None and (form.lower() in MESHES or form in PIECES)
 
 
-def read_mesh(path: Path, parts: Sequence[Path] = ()) -> Mesh:
+def read_mesh(path: Path) -> Mesh:
     """
     Read a VTK file, or the pieces that it lists.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    parts : sequence of Path, optional
-        Further files of the same mesh; their points follow those of `path`.
 
     Raises
     ------
     ReadError
         If a file is damaged, incomplete, or does not hold a mesh.
     """
-    return _joined(path, [_read_one(file) for file in (path, *parts)])
-
-
-def _read_one(path: Path) -> Mesh:
     form, head = form_of(path), first_bytes(path)
     if form is None or not holds_mesh(form):
         found = form or "something else"
@@ -113,7 +102,7 @@ def _read_one(path: Path) -> Mesh:
         pieces = listed(path, "Piece", "Source")
         if any(form_of(piece) in PIECES for piece in pieces):
             raise ReadError(f"{path}: one of its pieces lists pieces itself")
-        return _joined(path, [_read_one(piece) for piece in pieces])
+        return _joined(path, [read_mesh(piece) for piece in pieces])
     if NO_POINTS.match(head):
         # VTK reports an empty file as an error
         return Mesh(np.zeros((0, 3)), {}, NO_LINES, {}, False, {})

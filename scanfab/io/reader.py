@@ -75,8 +75,6 @@ class Snapshot:
     """Offset behind its last byte, or the next number; None: the end of the file."""
     stepless: bool = False
     """Whether the file states that there is no step; then a number in its name is not a step."""
-    parts: tuple[Path, ...] = ()
-    """Other files with further grains of the frame."""
 
 
 class GrainTable(NamedTuple):

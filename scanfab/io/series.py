@@ -321,8 +321,8 @@ class Series:
         if self.grains.kind == "index" and self.grains.reader is not None:
             # a missing dump is reported when its frame is read
             with suppress(ReadError):
-                listed = [(dump.path, *dump.parts) for dump in self.grains.reader.snapshots(path)]
-                dumps = [file for file in dict.fromkeys(chain(*listed)) if file.is_file()]
+                listed = dict.fromkeys(dump.path for dump in self.grains.reader.snapshots(path))
+                dumps = [file for file in listed if file.is_file()]
         files = [*dumps, *(companion_file(path, kind) for kind in HEADS)]
         if (ask := getattr(self.grains.reader, "beside", None)) is not None:
             files += chain.from_iterable(map(ask, dumps or [path]))

@@ -100,9 +100,9 @@ class VtkReader(GrainsOnly):
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """The points and their arrays, with the companion box of LIGGGHTS or cell of YADE."""
         path = snapshot.path
-        if form_of(path) in BLOCKS and not snapshot.parts:
+        if form_of(path) in BLOCKS:
             return self._read_blocks(path, options)
-        mesh = read_mesh(path, snapshot.parts)
+        mesh = read_mesh(path)
         columns = {**mesh.point_arrays, "position": mesh.points}
         if (packing := packing_of(path, mesh)) is not None:
             return grain_table(path, columns, packing[0], options)._replace(contacts=packing[1])
@@ -192,36 +192,23 @@ class VtkReader(GrainsOnly):
         return table
 
     def _listed(self, index: Path) -> list[Snapshot]:
-        """The frames of a ``.pvd``, in its order; the parts of one time form one frame."""
-        kinds: dict[tuple[str, str, str], FileKind] = {}
-        frames: dict[str | None, dict[tuple[str, str], Path]] = {}
+        """The frames of a ``.pvd``, in its order: the files of grains among those it lists."""
+        kinds: dict[tuple[str, str], FileKind] = {}
+        frames: dict[str | None, Path] = {}
         for entry in elements(index).iter("DataSet"):
-            path = file_inside(index, entry.get("file", ""))
-            part = entry.get("group", ""), entry.get("part", "0")
+            path, word = file_inside(index, entry.get("file", "")), entry.get("timestep")
             # files whose names differ only in numbers are of one kind; boxes, contacts are left out
-            family = re.sub(r"\d+", "*", path.name), *part
+            family = re.sub(r"\d+", "*", path.name), entry.get("part", "0")
             if kinds.get(family, "other") == "other":
                 kinds[family] = self.kind(path)
-            if kinds[family] not in ("grains", "points"):
-                continue
-            other = frames.setdefault(entry.get("timestep"), {}).setdefault(part, path)
-            if other is not path:
-                both = f"{other.name} and {path.name}"
-                raise ReadError(f"{index}: {both} have the same timestep, part and group")
-        names = {kind: name for (name, _, _), kind in kinds.items()}
-        if {"grains", "points"} <= names.keys():
-            points = f"points without a radius ({names['points']}) beside {names['grains']}"
-            raise ReadError(f"{index}: lists {points}: take them out, or name the files")
+            if kinds[family] in ("grains", "points") and frames.setdefault(word, path) != path:
+                both = f"{frames[word].name} and {path.name}"
+                raise ReadError(f"{index}: lists {both} for one time: name the files of one series")
         found = []
-        for word, parts in frames.items():
+        for word, path in frames.items():
             time = None if word is None else numbers(f"{index}: timestep", word.encode(), 1)[0]
-            # the step is the last number that is the same in the names of all parts
-            listings = (re.findall(r"\d+", Path(bare_name(file)).stem) for file in parts.values())
-            columns = zip(*listings, strict=False)
-            steps = [int(column[0]) for column in columns if len(set(column)) == 1]
-            first, *others = parts.values()
-            step = steps[-1] if steps else None
-            found.append(Snapshot(first, step, time, parts=tuple(others)))
+            steps = re.findall(r"\d+", Path(bare_name(path)).stem)
+            found.append(Snapshot(path, int(steps[-1]) if steps else None, time))
         return found
 
 

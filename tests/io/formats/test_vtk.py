@@ -198,41 +198,12 @@ def test_a_collection_is_a_series_with_times(tmp_path):
     refuses(index, "cannot be read as a list of VTK files")
 
 
-@pytest.mark.parametrize("one", ['part="{}"', 'group="{}"', 'group="a{}" part="0"'])
-def test_the_parts_of_one_time_are_one_frame(tmp_path, one):
-    name = "f/out_{1}_{0}.vtp"
-    rows = {(5, 0): [0, 1], (5, 1): [2, 3], (6, 0): [3], (6, 1): [2, 1, 0]}
-    for (step, part), own in rows.items():
-        cloud(tmp_path / name.format(step, part), own)
-    more = [f'timestep="{step / 2}" {one.format(part)}' for step, part in rows]
-    entries = [(name.format(*key), own) for key, own in zip(rows, more, strict=True)]
-    path = listing(tmp_path / "run.pvd", "Collection", *entries)
-    series = scanfab.read_series(path)
-    packings = [frame.read() for frame in series]
-    assert [(one.step, one.time) for one in packings] == [(5, 2.5), (6, 3.0)]
-    for packing, ids in zip(packings, [[0, 1, 2, 3], [3, 2, 1, 0]], strict=True):
-        holds(packing, id=ids, position=POSITION[ids])
-    assert {file.name for file in series.files()} >= {name.split("/")[-1] for name, _ in entries}
-    alone = series[1].alone()
-    assert all(file.is_absolute() for file in (alone.snapshot.path, *alone.snapshot.parts))
-    np.testing.assert_array_equal(alone.read().id, packings[1].id)
-
-
-NO_PARTS = [
-    (("a", "b"), ('timestep="5"', 'timestep="5"'), r"a\.vtp and b\.vtp have the same timestep"),
-    (("a", "b"), ('group="g"', 'group="g"'), r"a\.vtp and b\.vtp have the same timestep"),
-    (("a", "b"), ('part="0"', 'part="1"'), r"ids|twice"),
-    (("a", "points"), ('part="0"', 'part="1"'), r"points without a radius \(points\.vtp"),
-]
-
-
-@pytest.mark.parametrize(("names", "more", "told"), NO_PARTS)
-def test_files_that_are_not_parts_of_one_frame_are_refused(tmp_path, names, more, told):
+def test_two_files_of_grains_for_one_time_are_an_error_that_names_them(tmp_path):
     for name in "ab":
         cloud(tmp_path / f"{name}.vtp", [0, 1])
-    pyvista.PolyData(POSITION).save(tmp_path / "points.vtp")
-    entries = zip((f"{name}.vtp" for name in names), more, strict=True)
-    refuses(listing(tmp_path / "run.pvd", "Collection", *entries), told, error=scanfab.ScanfabError)
+    entries = [(f"{name}.vtp", f'timestep="5" part="{k}"') for k, name in enumerate("ab")]
+    told = r"lists a\.vtp and b\.vtp for one time: name the files of one series"
+    refuses(listing(tmp_path / "run.pvd", "Collection", *entries), told)
 
 
 @pytest.mark.parametrize("more", ["", 'group="" part="0" timestep="7"'])
