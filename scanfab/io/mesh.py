@@ -315,13 +315,9 @@ def _arrays(attributes: Any, rows: int | None) -> Columns:
     """The named arrays of points, cells or the file; they must have ``rows`` rows unless None."""
     arrays: Columns = {}
     for place in range(attributes.GetNumberOfArrays()):
-        array = attributes.GetAbstractArray(place)
-        name = array.GetName()
-        if array.IsA("vtkStringArray"):
-            count = array.GetNumberOfValues()
-            values = np.array([array.GetValue(k) for k in range(count)], dtype=str)
-        else:
-            values = _numpy(array)
+        if (array := attributes.GetArray(place)) is None:
+            continue  # texts
+        name, values = array.GetName(), _numpy(array)
         if rows is not None and len(values) != rows:
             raise damaged(f"{name} has {len(values)} of {rows} rows")
         # the name is bytes if it is not valid UTF-8

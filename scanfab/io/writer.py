@@ -7,7 +7,7 @@ All writers take the arrays from here, so that readers find the same names in ev
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from itertools import chain
 from pathlib import Path
@@ -167,6 +167,19 @@ def flat(columns: Mapping[str, AnyArray]) -> Columns:
             names = [f"{name}_{axis}" for axis in axes]
         parts |= zip(names, np.atleast_2d(table.T), strict=True)
     return parts
+
+
+def split(
+    columns: Columns, holds: Callable[[str, AnyArray], bool]
+) -> tuple[Columns, tuple[str, ...]]:
+    """The columns that a format holds, and the names of the others in the companion file."""
+    held = {name: values for name, values in columns.items() if holds(name, values)}
+    return held, tuple(flat({name: columns[name] for name in columns if name not in held}))
+
+
+def are_numbers(_name: str, values: AnyArray) -> bool:
+    """Whether a column holds numbers or truth values, not texts."""
+    return values.dtype.kind != "U"
 
 
 def table_columns(packing: Packing) -> tuple[Columns, Columns, list[str]]:

@@ -285,7 +285,7 @@ def test_clumps_that_were_left_apart_stay_apart(tmp_path, name):
 def test_vtk_reads_what_is_written(tmp_path):
     mesh = pyvista.read(written(EVERYTHING, tmp_path, "vtp"))
     holds(mesh, points=EVERYTHING.position)
-    for name in ("radius", "velocity", "element"):
+    for name in ("radius", "velocity"):
         holds(EVERYTHING, **{name: mesh[name]})
     holds(EVERYTHING.contacts, pairs=mesh.lines.reshape(-1, 3)[:, 1:], force=mesh["force"])
     assert mesh.field_data["TimeValue"] == [EVERYTHING.time]

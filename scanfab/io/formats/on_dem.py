@@ -22,7 +22,7 @@ from scanfab.io.files import first_bytes
 from scanfab.io.formats.shared import GrainsOnly
 from scanfab.io.mesh import joined_arrays
 from scanfab.io.reader import Carries, GrainTable, ReadOptions, Snapshot
-from scanfab.io.writer import Left, as_arrays, stated_cell
+from scanfab.io.writer import Left, are_numbers, as_arrays, split, stated_cell
 from scanfab.packing.packing import Packing
 
 # groups of ON-DEM, and the attributes of its scene for the names in writer.Arrays
@@ -75,14 +75,13 @@ class OnDemReader(GrainsOnly):
         return grains if INTERACTIONS not in file.attributes else _joined(path, file, grains)
 
     def write(self, packing: Packing, path: Path) -> Left:
-        """Write one frame; the file holds all data of the packing."""
+        """Write one frame; the file holds all data of the packing but columns of texts."""
         import h5py
 
         arrays, count = as_arrays(packing), len(packing)
-        columns = {**arrays.grains, **arrays.own}
+        own, left = split(arrays.own, are_numbers)
+        columns = {**arrays.grains, **own}
         columns["body_id"] = columns.pop("id")
-        # VTK cannot read texts as point data
-        texts = {name: values for name, values in columns.items() if values.dtype.kind == "U"}
         # in memory first, because HDF5 ends the process if the disk is full
         with h5py.File(path, "w", driver="core", backing_store=False, track_order=True) as file:
             file.attrs.update(file_format="ON-DEM VTKHDF", file_format_version="0.1-draft")
@@ -99,9 +98,7 @@ class OnDemReader(GrainsOnly):
                 group[f"{cells}/Connectivity"] = np.arange(filled)
                 group[f"{cells}/Offsets"] = np.arange(filled + 1)
             points = group.create_group("PointData", track_order=True)
-            _write(points, {name: values for name, values in columns.items() if name not in texts})
-            if texts:
-                _write(file.create_group(BODIES), {"body_id": packing.id, **texts})
+            _write(points, columns)
             scene = file.create_group(SCENE)
             scene.attrs["scanfab"] = 1
             for name, value in arrays.frame.items():
@@ -122,7 +119,7 @@ class OnDemReader(GrainsOnly):
             file.flush()
             image = file.id.get_file_image()
         path.write_bytes(image)
-        return Left(no_step=False, notes=tuple(arrays.notes))
+        return Left(columns=left, no_step=False, notes=tuple(arrays.notes))
 
 
 def _spheres(path: Path, file: HdfFile) -> Columns:
@@ -197,11 +194,6 @@ def _force(
 
 
 def _write(group: Any, columns: Columns) -> None:
-    import h5py
-
     for name, values in columns.items():
-        plain = name.replace("/", STROKE)
-        if values.dtype.kind == "U":
-            group.create_dataset(plain, data=values.astype(object), dtype=h5py.string_dtype())
-        else:
-            group[plain] = values.astype(np.uint8) if values.dtype.kind == "b" else values
+        is_truth = values.dtype.kind == "b"
+        group[name.replace("/", STROKE)] = values.astype(np.uint8) if is_truth else values

@@ -24,7 +24,7 @@ from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
 from scanfab.io.formats.yade_save import cell_beside, cell_file, is_cell_file
 from scanfab.io.mesh import Mesh, elements, form_of, holds_mesh, listed, read_mesh
 from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.io.writer import Left, as_arrays, contacts_of, stated_cell
+from scanfab.io.writer import Left, are_numbers, as_arrays, contacts_of, split, stated_cell
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList
 from scanfab.packing.packing import Packing
@@ -247,13 +247,13 @@ class VtpWriter:
     extensions = (".vtp",)
 
     def write(self, packing: Packing, path: Path) -> Left:
-        """Write one frame; the file holds all data of the packing."""
+        """Write one frame; the file holds all data of the packing but columns of texts."""
         from vtkmodules.vtkCommonCore import vtkPoints
         from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
         from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
         arrays, contacts = as_arrays(packing), packing.contacts
-        frame = arrays.frame
+        frame, (own, left) = arrays.frame, split(arrays.own, are_numbers)
         fields = {FIELDS[name]: np.ravel(values)[None] for name, values in frame.items()}
         fields[KNOWN] = np.array([int(contacts is not None)])
         data, points, lines = vtkPolyData(), vtkPoints(), vtkCellArray()
@@ -263,7 +263,7 @@ class VtpWriter:
             lines.SetData(2, _array("", contacts.pairs.ravel()))
             data.SetLines(lines)
         for place, columns in (
-            (data.GetPointData(), arrays.grains | arrays.own),
+            (data.GetPointData(), arrays.grains | own),
             (data.GetCellData(), arrays.contacts),
             (data.GetFieldData(), fields),
         ):
@@ -281,23 +281,16 @@ class VtpWriter:
         text: Any = writer.GetOutputString()
         content = text if isinstance(text, bytes) else text.encode()
         path.write_bytes(f"<!-- {said} -->\n".encode() + content)
-        return Left(no_step=False, notes=tuple(arrays.notes))
+        return Left(columns=left, no_step=False, notes=tuple(arrays.notes))
 
 
 def _array(name: str, values: AnyArray) -> Any:
     """A VTK array; its name is escaped, as VTK's writer does not do it."""
     from vtkmodules.util.numpy_support import numpy_to_vtk
-    from vtkmodules.vtkCommonCore import vtkStringArray
 
-    if values.dtype.kind == "U":
-        array = vtkStringArray()
-        array.SetNumberOfComponents(int(np.prod(values.shape[1:])))
-        for word in values.ravel().tolist():
-            array.InsertNextValue(word)
-    else:
-        table = values.reshape(len(values), int(np.prod(values.shape[1:])))
-        table = table.astype(np.uint8) if values.dtype.kind == "b" else table
-        array = numpy_to_vtk(np.ascontiguousarray(table), deep=True)  # type: ignore[no-untyped-call]
+    table = values.reshape(len(values), int(np.prod(values.shape[1:])))
+    table = table.astype(np.uint8) if values.dtype.kind == "b" else table
+    array = numpy_to_vtk(np.ascontiguousarray(table), deep=True)  # type: ignore[no-untyped-call]
     array.SetName(escape(name))
     return array
 

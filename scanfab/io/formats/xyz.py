@@ -15,7 +15,7 @@ from scanfab.io.files import bare_name, first_bytes
 from scanfab.io.formats.shared import GrainsOnly, cell_of, marked_frames, numbers
 from scanfab.io.reader import Carries, Snapshot
 from scanfab.io.text import Layout, read_rows, spelt, text_of
-from scanfab.io.writer import Left, as_arrays, csv_bytes, flat
+from scanfab.io.writer import Left, as_arrays, csv_bytes, split
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
@@ -93,7 +93,7 @@ class XyzFormat(GrainsOnly):
     def write(self, packing: Packing, path: Path) -> Left:
         """Write one frame; texts with blanks go into a companion file."""
         arrays = as_arrays(packing)
-        held = {name: values for name, values in arrays.own.items() if _is_xyz(name, values)}
+        held, left = split(arrays.own, _is_xyz)
         properties: list[str] = []
         rows: Columns = {}
         for name, values in {"pos": packing.position, **arrays.grains, **held}.items():
@@ -115,8 +115,7 @@ class XyzFormat(GrainsOnly):
             line.insert(0, f'Lattice="{vectors}" Origin="{origin}" pbc="{along}"')
         head = f"{len(packing)}\n{' '.join(line)}\n"
         path.write_bytes(head.encode() + csv_bytes(rows, " ", with_names=False))
-        left = flat({name: values for name, values in arrays.own.items() if name not in held})
-        return Left(contacts=True, columns=tuple(left), notes=tuple(arrays.notes))
+        return Left(contacts=True, columns=left, notes=tuple(arrays.notes))
 
 
 def _head(path: Path, text: bytes) -> Head:
