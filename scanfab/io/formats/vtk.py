@@ -6,8 +6,10 @@ scanfab writes PolyData (``.vtp``). Data without a usual name (cell, images) get
 
 from __future__ import annotations
 
+import glob
 import re
 from contextlib import suppress
+from functools import lru_cache
 from html import escape
 from pathlib import Path
 from typing import Any, Literal
@@ -19,11 +21,18 @@ from scanfab.base.errors import ReadError, note
 from scanfab.base.typing import AnyArray, FloatArray
 from scanfab.io.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.contacts import join_ids, join_positions, proved_force
-from scanfab.io.files import bare_name, file_inside, first_bytes, plain
+from scanfab.io.files import Stamp, bare_name, file_inside, first_bytes, plain, stamp_of
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
-from scanfab.io.formats.yade_save import cell_beside, cell_file, is_cell_file
 from scanfab.io.mesh import Mesh, elements, form_of, holds_mesh, listed, read_mesh
-from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
+from scanfab.io.reader import (
+    Carries,
+    FileKind,
+    GrainTable,
+    JoinedContacts,
+    ReadOptions,
+    Snapshot,
+    reader_named,
+)
 from scanfab.io.writer import Left, are_numbers, as_arrays, contacts_of, split, stated_cell
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList
@@ -45,6 +54,17 @@ FIELDS["time"] = "TimeValue"
 BOXES = ("RectilinearGrid", "RECTILINEAR_GRID")
 # kinds of files that list the files of one frame: grains, contacts, boxes
 LISTS = {".vtm": ("DataSet", "file")} | dict.fromkeys((".pvtp", ".pvtu"), ("Piece", "Source"))
+# names of dumps and boxes of LIGGGHTS
+DUMP, BOX = re.compile(r"(.*?)(\d+)\.\w+"), "boundingBox_"
+BOX_ENDS = (".vtk", ".vtr", ".vtk.gz", ".vtr.gz")
+# names of files of spheres by YADE's VTKExporter and VTKRecorder, and of files of cells
+EXPORTED = re.compile(r"(.*)-spheres-(\d+)\.vtk")
+RECORDED = re.compile(r"(.*)spheres\.(\d+)\.vtu")
+CELL_FILE = re.compile(r".*-periCell-\d+\.vtk|.*pericell\.\d+\.vtu")
+# number of corners in a cell file, the corner at the origin, and those at the ends of the vectors
+CORNERS, ORIGIN, ENDS = 8, 4, (7, 5, 0)
+# tolerance as a fraction of the cell: YADE wraps spheres into it, but writes six digits
+ROUNDING = 1e-4
 BLOCKS = ("vtkMultiBlockDataSet", "vtkPartitionedDataSetCollection")
 
 
@@ -108,9 +128,7 @@ class VtkReader(GrainsOnly):
             return grain_table(path, columns, packing[0], options)._replace(contacts=packing[1])
         if len(mesh.points) == 0:
             columns["radius"] = np.zeros(0)
-        cell = _read_box(path)
-        if cell is None and options.cell is None:
-            cell = cell_beside(path, mesh.points)
+        cell = _cell_beside(path, mesh.points, options)
         grains = grain_table(path, columns, cell, options)
         if len(mesh.lines) == 0:
             return grains
@@ -166,15 +184,15 @@ class VtkReader(GrainsOnly):
         """Files of scanfab have a cell, LIGGGHTS writes a box file; VTK has no cell."""
         if says_all(path):
             return "cell"
-        return "nothing" if _read_box(path) is None else "box"
+        return "nothing" if cell_file(path) is None else "box"
 
     def beside(self, path: Path) -> list[Path]:
         """The files that a file lists, and the box of LIGGGHTS or the cell of YADE, if any."""
-        files = [_box_file(path), cell_file(path)]
+        files = [file] if (file := cell_file(path)) is not None else []
         if (tags := LISTS.get(path.suffix.lower())) is not None:
             with suppress(ReadError):
                 files += listed(path, *tags)
-        return [file for file in files if file is not None]
+        return files
 
     def _read_blocks(self, index: Path, options: ReadOptions) -> GrainTable:
         """The grains of a ``.vtm``: one of its files holds grains, and one may hold contacts."""
@@ -220,23 +238,91 @@ def _vectors(mesh: Mesh, name: str) -> FloatArray | None:
     return doubles(values)
 
 
-def _box_file(path: Path) -> Path | None:
-    match = re.fullmatch(r"(.*?)(\d+)\.\w+", bare_name(path))
-    if match is None:
-        return None
-    name = f"{match[1]}boundingBox_{match[2]}"
-    files = [path.with_name(name + end) for end in (".vtk", ".vtr", ".vtk.gz", ".vtr.gz")]
-    return next((file for file in files if file.is_file()), None)
+def is_cell_file(path: Path) -> bool:
+    """Whether a file has a name of YADE's cell files."""
+    return CELL_FILE.fullmatch(bare_name(path)) is not None
 
 
 @np.errstate(over="ignore")
-def _read_box(path: Path) -> Cell | None:
-    """The box of a VTK dump, from LIGGGHTS' box file, which does not say what is periodic."""
-    file = _box_file(path)
-    corners = np.zeros((0, 3)) if file is None else read_mesh(file).points
-    if len(corners) == 0:
+def _cell_beside(path: Path, position: FloatArray, options: ReadOptions) -> Cell | None:
+    """
+    The cell of a file of grains from its cell file; None if there is none.
+
+    LIGGGHTS' box does not say what is periodic. ReadError if grains are outside YADE's cell, which
+    is then the cell of another frame.
+    """
+    file = cell_file(path)
+    if file is not None and BOX in file.name:
+        corners = read_mesh(file).points
+        if len(corners) == 0:
+            return None
+        return cell_of(path, np.ptp(corners, axis=0), (False, False, False), corners.min(axis=0))
+    if file is None or options.cell is not None:
         return None
-    return cell_of(path, np.ptp(corners, axis=0), (False, False, False), corners.min(axis=0))
+    if is_cell_file(file):
+        corners = read_mesh(file).points
+        if len(corners) != CORNERS:
+            raise ReadError(f"{file}: expected {CORNERS} corners of a cell, found {len(corners)}")
+        edges = corners[list(ENDS)] - corners[ORIGIN]
+        cell = cell_of(file, edges, (True, True, True), corners[ORIGIN])
+    else:
+        cell = reader_named("yade").read_grains(Snapshot(file), ReadOptions()).cell
+    if cell is None:
+        return None
+    fractions = cell.fractional(position)
+    outside = np.any((fractions < -ROUNDING) | (fractions > 1.0 + ROUNDING), axis=1)
+    if outside.any():
+        problem = f"{np.count_nonzero(outside)} grains lie outside the cell of {file}"
+        advice = 'name the right one with `cell=(LX, LY, LZ)` or `cell="FILE.csv"`'
+        raise ReadError(f"{path}: {problem}: {advice}")
+    pattern = re.sub(r"\d+", "*", file.name)
+    note(f"the cell is read from {file.parent / pattern}, beside the grains")
+    return cell
+
+
+def cell_file(path: Path) -> Path | None:
+    """
+    The file with the cell of a file of grains; None if there is none, or if it is unsure.
+
+    LIGGGHTS writes a box for each dump. YADE's ``VTKRecorder`` numbers spheres and cells by the
+    step; ``VTKExporter`` numbers a cell by the count of *interactions* files written so far, so
+    that a cell file may be overwritten or have the number of another frame. These cells are used
+    only if there is exactly one for each file of spheres, in the same order.
+    """
+    folder, name, stamp = path.parent, bare_name(path), stamp_of(path.parent)
+    if exported := EXPORTED.fullmatch(name):
+        # VTKExporter numbers files by a count, not by the step
+        spheres = _numbered(folder, f"{exported[1]}-spheres-", stamp)
+        cells = _numbered(folder, f"{exported[1]}-periCell-", stamp)
+        # a cell exported after the interactions of its frame has a number that is higher by 1
+        pairs = dict(zip(sorted(spheres), sorted(cells), strict=False))
+        if len(spheres) != len(cells) or any(pairs[k] - k not in (0, 1) for k in pairs):
+            return None
+        return cells.get(pairs.get(int(exported[2]), -1))
+    if recorded := RECORDED.fullmatch(name):
+        start, step = recorded[1], int(recorded[2])
+        # otherwise a saved simulation of this step, with the step in its name
+        saved = [
+            file
+            for file in folder.glob(f"{glob.escape(start)}*{step}.xml*")
+            if reader_named("yade").snapshots(file)[0].step == step
+        ]
+        cells = _numbered(folder, f"{start}pericell.", stamp)
+        return cells.get(step, saved[0] if len(saved) == 1 else None)
+    dump = DUMP.fullmatch(name)
+    names = [f"{dump[1]}{BOX}{dump[2]}{end}" for end in BOX_ENDS] if dump else []
+    return next((file for file in map(path.with_name, names) if file.is_file()), None)
+
+
+# cached, so that a folder is listed once for all its files, until its content changes
+@lru_cache(maxsize=8)
+def _numbered(folder: Path, start: str, stamp: Stamp) -> dict[int, Path]:
+    """The VTK files whose names are ``start`` and a number, by this number."""
+    files = {}
+    for file in sorted(folder.glob(f"{glob.escape(start)}*")):
+        if match := re.fullmatch(r"(\d+)\.vt[ku]", bare_name(file).removeprefix(start)):
+            files[int(match[1])] = file
+    return files
 
 
 class VtpWriter:
