@@ -23,8 +23,7 @@ WRONG = {
         ("snap_t=30_2.txt", "1\n3.75", "x\n3.75", "30_2.txt: expected the number of particles"),
     ],
     "kratos": [
-        ("a.mdpa", "7  1 0.2\n", "", "no place or RADIUS for 1 nodes, such as 7"),
-        ("a.mdpa", "SphericParticle3D", "Cluster3D", "elements that are spheres"),
+        ("a.mdpa", "7  1 0.2\n", "8  1 0.2\n", "1 radii are of no node, such as of 8"),
         ("a.mdpa", "End Nodes", "", "incomplete"),
         ("a.mdpa", "End SubModelPart\n", "", "incomplete"),
         ("a.mdpa", "RADIUS", "MASS", "no grains: expected points with a radius"),
