@@ -60,7 +60,6 @@ WRONG = {
         ("plain.data", "data file", "Description", "expected diameters.*YADE's radii"),
         ("plain.data", " 1.0 2500 0", " 1.0 0 2500", "density, found '1 1 1 0 2500.*names them"),
         ("plain.data", " 1.0 2500", " 0 2500", "expected a positive diameter"),
-        ("plain.data", "-1 3 xlo", "90 94 xlo", "the centre in the box, found '1 1 1 2500"),
         ("plain.data", "types", "types\n3 ellipsoids", "expected diameters.*found ellipsoids"),
         ("plain.data", "Atoms\n", "Atoms # atomic\n", "found 'Atoms # atomic'"),
         ("plain.data", "Atoms\n", "Masses\n", "expected .* a section Atoms"),
