@@ -1,7 +1,5 @@
 """Binary files of arrays: Parquet, NPZ, ``.xyzd`` and HDF5. Reading them never runs code."""
 
-from __future__ import annotations
-
 import re
 from contextlib import suppress
 from pathlib import Path

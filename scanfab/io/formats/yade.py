@@ -1,7 +1,5 @@
 """YADE: text exports, ``SpherePack.save``, ``VTKExporter``, ``VTKRecorder`` and ``O.save``."""
 
-from __future__ import annotations
-
 import re
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
