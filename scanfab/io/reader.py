@@ -116,7 +116,6 @@ class Reader(Protocol):
     these attributes and methods:
 
     - ``generic = True``: any program may write the format; the reader is asked after the others.
-    - ``lists_contacts = True``: grain files of the format may list contacts.
     - ``is_table = True``: the files are tables that may hold anything; in a folder they count only
       if there are no dumps.
     - ``carries(path)``, one of :data:`Carries`: needed if not all grain files store their cell.

@@ -280,10 +280,8 @@ def _choose_contacts(
         for one in families
         if one.problem and len(one.files) == len(grains.files) and sorting.are_tied(grains, one)
     ]
-    has_own |= getattr(grains.reader, "lists_contacts", False)
     if options.contact_columns and not (damaged or has_own):
-        missing = "no contact file has these columns"
-        warn(f"`contact_columns` is given, but {missing}: contacts are found by geometry")
+        warn("`contact_columns` is given, but no contact file has these columns")
     return damaged, "beside"
 
 

@@ -62,7 +62,6 @@ class MercuryReader(shared.GrainsOnly):
     name = "mercurydpm"
     description = "MercuryDPM .data with contacts in .fstat, and .restart"
     extensions: tuple[str, ...] = (".data", ".fstat", ".restart")
-    lists_contacts = True
 
     def recognises(self, path: Path) -> bool:
         """A restart by its first word, contacts by three lines, grains by the line above them."""

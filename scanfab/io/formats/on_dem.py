@@ -43,7 +43,6 @@ class OnDemReader(GrainsOnly):
     name = "on-dem"
     description = "ON-DEM's VTKHDF (drafts 0.1 and 0.2): spheres and contacts with forces"
     extensions: tuple[str, ...] = (".vtkhdf",)
-    lists_contacts = True
 
     def recognises(self, path: Path) -> bool:
         """Recognised by the groups VTKHDF and ONDEM."""

@@ -199,7 +199,6 @@ class NpzFormat(GrainsOnly):
     name = "npz"
     description = "packings as arrays of NumPy, with contacts and cell"
     extensions: tuple[str, ...] = (".npz",)
-    lists_contacts = True
 
     def recognises(self, path: Path) -> bool:
         """Recognised by the array `MARK`."""

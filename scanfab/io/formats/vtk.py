@@ -74,7 +74,6 @@ class VtkReader(GrainsOnly):
     extensions: tuple[str, ...] = (".vtk", ".vtp", ".vtu", ".pvtp", ".pvtu", ".vtm", ".pvd")
     extensions += (".vtkhdf", ".xdmf", ".xmf")
     generic = True
-    lists_contacts = True
     # whether an id that no grain has means a wall, see join_ids
     walls: bool | Literal["unknown"] = "unknown"
     # names of the arrays with the force of a contact, its normal and its tangential part
@@ -122,8 +121,12 @@ class VtkReader(GrainsOnly):
             return self._read_blocks(path, options)
         mesh = read_mesh(path)
         columns = {**mesh.point_arrays, "position": mesh.points}
-        if (packing := packing_of(path, mesh)) is not None:
-            return grain_table(path, columns, packing[0], options)._replace(contacts=packing[1])
+        if KNOWN in (fields := mesh.field_arrays):
+            # scanfab wrote the file, with cell and contacts
+            stated = {name: fields[array] for name, array in FIELDS.items() if array in fields}
+            own = contacts_of(mesh.lines, mesh.line_arrays) if np.any(fields[KNOWN]) else None
+            grains = grain_table(path, columns, stated_cell(path, stated), options)
+            return grains._replace(contacts=own)
         if len(mesh.points) == 0:
             columns["radius"] = np.zeros(0)
         cell = _cell_beside(path, mesh.points, options)
@@ -382,13 +385,3 @@ def _array(name: str, values: AnyArray) -> Any:
 def says_all(path: Path) -> bool:
     """Whether scanfab wrote the file; then it states the cell and the step completely."""
     return KNOWN.encode() in first_bytes(path, HEAD)
-
-
-def packing_of(path: Path, mesh: Mesh) -> tuple[Cell | None, ContactList | None] | None:
-    """The cell and the contacts of a file that scanfab wrote; None for other files."""
-    fields = mesh.field_arrays
-    if KNOWN not in fields:
-        return None
-    cell = {name: fields[array] for name, array in FIELDS.items() if array in fields}
-    contacts = contacts_of(mesh.lines, mesh.line_arrays) if np.any(fields[KNOWN]) else None
-    return stated_cell(path, cell), contacts

@@ -138,10 +138,8 @@ def _head(path: Path, text: bytes) -> Head:
 def _moment(path: Path, text: bytes) -> tuple[int | None, float | None]:
     """The step and the time of a frame."""
     head = _head(path, text)
-    step, time = (
-        head.words.get("step", head.words.get("timestep", "")),
-        _numbers(path, head, "time", 1),
-    )
+    step = head.words.get("step", head.words.get("timestep", ""))
+    time = _numbers(path, head, "time", 1)
     return int(step) if re.fullmatch(r"[-+]?[0-9]{1,18}", step) else None, time[0] if time else None
 
 

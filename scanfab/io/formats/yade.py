@@ -216,7 +216,6 @@ class YadeReader(FormsReader):
     name = "yade"
     description = "YADE export.VTKExporter, VTKRecorder, export.text, export.textExt, O.save (XML)"
     extensions = (".vtk", ".vtu", ".vtp", ".txt", ".xml", ".yade")
-    lists_contacts = True
     forms = (TextExport(), SavedScene(), YadeVtk())
 
     def recognises(self, path: Path) -> bool:
