@@ -52,6 +52,7 @@ FIELDS["time"] = "TimeValue"
 BOXES = ("RectilinearGrid", "RECTILINEAR_GRID")
 # kinds of files that list the files of one frame: grains, contacts, boxes
 LISTS = {".vtm": ("DataSet", "file")} | dict.fromkeys((".pvtp", ".pvtu"), ("Piece", "Source"))
+BLOCKS = ("vtkMultiBlockDataSet", "vtkPartitionedDataSetCollection")
 # names of dumps and boxes of LIGGGHTS
 DUMP, BOX = re.compile(r"(.*?)(\d+)\.\w+"), "boundingBox_"
 BOX_ENDS = (".vtk", ".vtr", ".vtk.gz", ".vtr.gz")
@@ -63,7 +64,6 @@ CELL_FILE = re.compile(r".*-periCell-\d+\.vtk|.*pericell\.\d+\.vtu")
 CORNERS, ORIGIN, ENDS = 8, 4, (7, 5, 0)
 # tolerance as a fraction of the cell: YADE wraps spheres into it, but writes six digits
 ROUNDING = 1e-4
-BLOCKS = ("vtkMultiBlockDataSet", "vtkPartitionedDataSetCollection")
 
 
 class VtkReader(GrainsOnly):
