@@ -13,13 +13,11 @@ from scanfab.base.errors import SettingsError, note
 from scanfab.base.files import check_folder, refuse_inputs, whole_file
 from scanfab.base.option import refuse_unknown
 from scanfab.io.families import PathLike
-from scanfab.io.files import COMPRESSED_SUFFIXES, bare_name
 from scanfab.io.formats.own import HEADS, companion_kind, companion_there, companions_of
-from scanfab.io.options import READING_OPTIONS, parse_frames
-from scanfab.io.reader import installed_readers
+from scanfab.io.options import parse_frames
 from scanfab.io.series import Series
 from scanfab.io.sources import READING, read_series
-from scanfab.io.writer import Writer, installed_writers, writer_for, writer_named
+from scanfab.io.writer import Writer, writer_for, writer_named
 from scanfab.packing.packing import Packing
 
 STEP = "{step}"
@@ -66,7 +64,7 @@ def convert(
     ------
     SettingsError
         If there is no such format, ``out`` is one file for several frames, two frames have the same
-        step, or a companion file of another grain file would be overwritten.
+        step, or a file of the source or a companion file of another grain file would be replaced.
     ReadError, PackingError
         If a frame cannot be read. Each file is complete or untouched.
     OSError
@@ -97,7 +95,7 @@ def convert(
     elif reading:
         raise SettingsError(f"`{next(iter(reading))}` applies to files alone, not to packings")
     chosen = parse_frames("frames", frames)
-    inputs = _inputs_to_keep(source, chosen, writer) if isinstance(source, Series) else []
+    inputs = list(source.files()) if isinstance(source, Series) else []
     packings = _packings(source, chosen)
     if STEP not in pattern.name:
         # look for a second frame before the file is written
@@ -125,17 +123,6 @@ def convert(
     return list(written)
 
 
-def _inputs_to_keep(series: Series, chosen: slice, writer: Writer) -> list[Path]:
-    """The files that must not be replaced: all, unless the new files lose nothing of them."""
-    every, files = range(len(series)), series.grains.files.values()
-    usual = {option.name: option.default for option in READING_OPTIONS}
-    is_plain = all(not value or value == usual[name] for name, value in series.reading.items())
-    is_whole = series.is_whole and every[chosen] == every
-    if is_whole and is_plain and all(file.suffix in writer.extensions for file in files):
-        return []
-    return list(series.files())
-
-
 def _packings(source: Any, chosen: slice) -> Iterator[tuple[int, Packing]]:
     """The chosen packings with the numbers of their frames."""
     if isinstance(source, Series):
@@ -158,16 +145,10 @@ def save_packing(packing: Packing, path: Path, writer: Writer) -> None:
     Write one packing to a grain file and its companion files; each is complete or untouched.
     """
     companions = [file for kind in HEADS if (file := companion_there(path, kind))]
-    if companions:
-        # they may belong to another grain file of the same stem
-        offers = [*installed_writers().values(), *installed_readers().values()]
-        endings = sorted({ending for offer in offers for ending in offer.plugin.extensions})
-        stem, packed = Path(bare_name(path)).stem, ("", *COMPRESSED_SUFFIXES)
-        names = [f"{stem}{ending}{more}" for ending in endings for more in packed]
-        for other in (name for name in names if name != path.name):
-            if path.with_name(other).is_file():
-                theirs = " and ".join(file.name for file in companions)
-                raise SettingsError(f"{path}: {theirs} may belong to {other}: choose another name")
+    if companions and not path.exists():
+        theirs = " and ".join(file.name for file in companions)
+        problem = f"{theirs} belong to another file of this name"
+        raise SettingsError(f"{path}: {problem}: choose another name, or remove them")
     with ExitStack() as files:
         # the stack is unwound in reverse: the grain file appears last, after its companion files
         left = writer.write(packing, files.enter_context(whole_file(path)))
