@@ -260,7 +260,7 @@ def join_table(path: Path, grains: GrainTable, columns: Columns) -> JoinedContac
         The contact file, for messages.
     grains : GrainTable
         The grains of the same step. If they have no ids, contacts name their rows, counted from 0
-        or 1: the count for which pairs are neighbours.
+        if a 0 is listed, else from 1.
     columns : mapping
         Columns by quantity: ``id1 id2``; optional are ``kind``, ``ix iy iz`` (image of the second
         grain), ``fx2 fy2 fz2`` or ``fx1 fy1 fz1`` (force on the second or first grain), ``fx fy
@@ -279,7 +279,10 @@ def join_table(path: Path, grains: GrainTable, columns: Columns) -> JoinedContac
     walls = np.any(ids < 0, axis=1)
     columns = {name: values[~walls] for name, values in columns.items()}
     pairs = ids[~walls]
-    grains = _with_ids(grains, pairs)
+    if grains.id is None:
+        first = int(pairs.min(initial=1) > 0)
+        note(f"the grains have no ids: contacts name their rows, counted from {first}")
+        grains = grains._replace(id=np.arange(len(grains.radius)) + first)
     rows = rows_of_ids(grains, pairs)
     force = _force(path, grains, rows, columns) if (rows >= 0).all() else None
     force_n = columns.get("compression") if force is None else None
@@ -293,28 +296,10 @@ def join_table(path: Path, grains: GrainTable, columns: Columns) -> JoinedContac
     shift = _vectors(path, grains, columns, "ix iy iz")
     image = None if shift is None else whole_numbers(path, shift.ravel()).reshape(-1, 3)
     joined = join_ids(path, grains, pairs, force, walls=False, image=image, force_n=force_n)
-    # the same pair may be listed in both orders, which reverses its image
-    keys = np.sort(pairs, axis=1)
-    if image is not None:
-        keys = np.hstack([keys, np.where(pairs[:, :1] > pairs[:, 1:], -image, image)])
-    unique, counts = np.unique(keys, axis=0, return_counts=True)
-    if np.any(counts > 1):
-        first, second, *_ = unique[np.argmax(counts)]
-        problem = f"{path}: {np.count_nonzero(counts > 1)} of {len(unique)} pairs are listed more "
-        warn(f"{problem}than once, such as {first} and {second}: each pair counts once")
     # not contacts of two walls
     with_walls = ids[walls & np.any(ids >= 0, axis=1)]
     counted = join_ids(path, grains, with_walls, None, walls="negative")
     return joined._replace(wall_contacts=counted.wall_contacts)
-
-
-def _with_ids(grains: GrainTable, ids: IntArray) -> GrainTable:
-    """Grains with ids; if they have none, their rows, counted from 0 if a 0 is listed, else 1."""
-    if grains.id is not None:
-        return grains
-    first = int(ids.min(initial=1) > 0)
-    note(f"the grains have no ids: contacts name their rows, counted from {first}")
-    return grains._replace(id=np.arange(len(grains.radius)) + first)
 
 
 def _vectors(path: Path, grains: GrainTable, table: Columns, names: str) -> FloatArray | None:
