@@ -105,7 +105,7 @@ class Family:
 
 
 def sort_into_families(
-    files: Iterable[Path], options: ReadOptions, groups: Iterable[Numbered] | None = None
+    files: Collection[Path], options: ReadOptions, groups: Iterable[Numbered]
 ) -> list[Family]:
     """
     Sort files into families; the largest file of each family decides its reader and kind.
@@ -114,7 +114,6 @@ def sort_into_families(
     number in a name that is the step.
     """
     files = set(files)
-    groups = group_by_name(files) if groups is None else groups
     chosen = [([pair for pair in group if pair[1] in files], len(group) > 1) for group in groups]
     return [_family_of(members, files, options, several) for members, several in chosen if members]
 
@@ -238,19 +237,15 @@ def are_tied(grains: Family, contacts: Family) -> bool:
     return _kinship(grains, contacts)[0] > 0 or bool(shared)
 
 
-def without_tables(
-    families: Sequence[Family], named: Collection[Path] = (), grains: Family | None = None
-) -> list[Family]:
+def without_tables(families: Sequence[Family], named: Collection[Path]) -> list[Family]:
     """
     The families, in which tables that do not count as dumps get the kind ``other``.
 
     A table beside dumps in a program's own format may hold anything, for instance results. It
-    counts if the user has ``named`` it, or if it is ``STEM.contacts.csv`` of a grain file. If all
-    files are tables, a table without names of columns counts only if no table has names. ``grains``
-    is the family in whose folders the other families were found.
+    counts if the user has ``named`` it. If all files are tables, a table without names of columns
+    counts only if no table has names.
     """
-    chosen = [] if grains is None else [grains]
-    frames = [family for family in [*families, *chosen] if family.kind in ("grains", "index")]
+    frames = [family for family in families if family.kind in ("grains", "index")]
     dumps = [family for family in frames if not family.is_table]
     tables = [family for family in frames if family.is_table]
     with_names = [one for one in tables if one.reader and one.reader.recognises(one.largest)]
@@ -269,14 +264,18 @@ def contacts_beside(
     """
     The families in the folders of single grain files, and which of them are their contacts.
 
-    ``STEM.contacts.csv`` belongs to STEM. Any other contact file belongs to the grain files of its
-    number whose names share the most first words with its name; between equals the same ending
-    decides. Of several contact files, those that share the most words are read. A note names the
-    contact files that are read, or that may belong to the grains.
+    A contact file belongs to the grain files of its number whose names share the most first words
+    with its name; between equals the same ending decides. Of several contact files, those that
+    share the most words are read. A note names the contact files that are read, or that may belong
+    to the grains.
     """
     if grains.kind == "index":
         return [], []
-    families = without_tables(_families_beside(grains, groups, options), (), grains)
+    files = set(grains.files.values())
+    moments = {(file.parent, step) for step, file in grains.files.items()}
+    others = [group for group in groups if files.isdisjoint(file for _, file in group)]
+    same = [file for group in others for step, file in group if (file.parent, step) in moments]
+    *families, _ = without_tables([*sort_into_families(same, options, others), grains], ())
     frames = [family for family in families if family.kind in ("grains", grains.kind)]
     rivals = [family for family in frames if _words(family) != _words(grains)]
     candidates = [one for one in families if one.kind == "contacts" and one.clash is None]
@@ -296,19 +295,3 @@ def contacts_beside(
         doubt = f"neither step nor name shows that these contacts belong to {grains.pattern}"
         note(f"skipped {names}: {doubt}; if they do, name the files with `contacts`")
     return families, own
-
-
-def _families_beside(
-    grains: Family, groups: Iterable[Numbered], options: ReadOptions
-) -> list[Family]:
-    """Families of other files in the folders of grain files, with the same numbers or stems."""
-    files = set(grains.files.values())
-    others = [group for group in groups if files.isdisjoint(file for _, file in group)]
-    around = {*files, *(file for group in others for _, file in group)}
-    moments = {(file.parent, step) for step, file in grains.files.items()}
-    families = []
-    for group in others:
-        same = [(step, file) for step, file in group if (file.parent, step) in moments]
-        if same:
-            families.append(_family_of(same, around, options, len(group) > 1))
-    return families

@@ -288,7 +288,7 @@ def _choose_contacts(
 def _named_contacts(contacts: PathLike, options: ReadOptions) -> list[Family]:
     """The families of contact files that a file, folder or glob names."""
     files = [file for path in sorting.expanded(contacts) for file in sorting.files_of(Path(path))]
-    families = sorting.sort_into_families(files, options)
+    families = sorting.sort_into_families(files, options, sorting.group_by_name(files))
     contact_families = [family for family in families if family.kind == "contacts"]
     if not contact_families:
         problem = next((family.problem for family in families if family.problem), None)
