@@ -35,8 +35,8 @@ FILES = {
 @pytest.fixture(autouse=True)
 def few_damages(monkeypatch):
     """Each reader gets files of any bytes elsewhere, too."""
-    monkeypatch.setattr("scanfab.testing.readers.CUTS", 12)
-    monkeypatch.setattr("scanfab.testing.readers.DAMAGES", 20)
+    monkeypatch.setattr("scanfab.testing.CUTS", 12)
+    monkeypatch.setattr("scanfab.testing.DAMAGES", 20)
 
 
 @pytest.mark.parametrize("name", installed_writers())

@@ -1,6 +1,0 @@
-"""Checks that packages can run on their own readers and writers of packings."""
-
-from scanfab.testing.readers import check_reader
-from scanfab.testing.writers import check_writer, differences, made_up_packings
-
-__all__ = ["check_reader", "check_writer", "differences", "made_up_packings"]
