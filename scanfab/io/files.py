@@ -94,13 +94,16 @@ def _remove(folder: str, process: int) -> None:
 def pieces(path: Path, size: int = PART) -> Iterator[bytes]:
     """The decompressed content of a file, ``size`` bytes at a time; raises only ReadError."""
     module = _decompressor(path)
-    zstd_error, unpacked = getattr(module, "ZstdError", OSError), 0
+    zstd_error, unpacked, times = getattr(module, "ZstdError", OSError), 0, _times.get()
     try:
         with open(path, "rb") as packed, packed if module is None else module.open(packed) as file:
             while piece := file.read(size):
                 unpacked += len(piece)
                 # checked while reading, so that a decompression bomb is found early
-                check_times(path, packed.tell(), unpacked)
+                if unpacked > max(ANYWAY, times * packed.tell()):
+                    problem = f"decompress to more than {times:g} times their size"
+                    advice = "if it is a dump, allow more with `max_unpacked`"
+                    raise ReadError(f"{path}: {packed.tell():,} bytes of it {problem}: {advice}")
                 yield piece
     except (OSError, EOFError, RuntimeError, zlib.error, lzma.LZMAError, zstd_error) as error:
         verb = "read" if module is None else "decompressed"
@@ -110,14 +113,6 @@ def pieces(path: Path, size: int = PART) -> Iterator[bytes]:
 def unpacking_up_to(times: float | None) -> AbstractContextManager[float]:
     """Inside the block, files may decompress to this many times their size; None: no change."""
     return within(_times, times or _times.get())
-
-
-def check_times(path: Path, packed: int, unpacked: float) -> None:
-    """ReadError if a file decompresses to far more bytes than its size allows."""
-    times = _times.get()
-    if unpacked > max(ANYWAY, times * packed):
-        problem = f"{packed:,} bytes of it decompress to more than {times:g} times their size"
-        raise ReadError(f"{path}: {problem}: if it is a dump, allow more with `max_unpacked`")
 
 
 def file_inside(index: Path, name: str) -> Path:

@@ -14,7 +14,7 @@ from typing import Any
 from scanfab.base.errors import Note, PackingError, ReadError, collected, tell, warn
 from scanfab.base.option import refuse_unknown, unusable
 from scanfab.base.spelling import counted
-from scanfab.io.families import Family, PathLike, expanded, files_in
+from scanfab.io.families import Family, PathLike, expanded, files_of
 from scanfab.io.files import Stamp, growing, stamp_of
 from scanfab.io.frame import Frame
 from scanfab.io.options import take_reading
@@ -185,11 +185,10 @@ class FollowedSeries(Series):
         if not source.exists():
             problem = f"has vanished while it was followed, after {len(self._taken)} frames of it"
             raise ReadError(f"{source}: {problem}: bring it back and go on with `resume`")
-        names = _files(source)
+        names = files_of(source)
         if (contacts := self.reading.get("contacts", "auto")) not in ("auto", "file", "geometric"):
             with suppress(ReadError):  # there may be none yet
-                paths = [Path(path) for path in expanded(contacts)]
-                names += [file for path in paths if path.exists() for file in _files(path)]
+                names += [file for path in expanded(contacts) for file in files_of(Path(path))]
         quiet = [self._quiet(path) for path in names]
         looked = [(path, self._seen.get(path)) for path in names]
         if looked == self._looked:
@@ -253,10 +252,6 @@ class FollowedSeries(Series):
         if path not in self._seen or self._seen[path][0] != stamp:
             self._seen[path] = stamp, time.monotonic()
         return time.monotonic() - self._seen[path][1]
-
-
-def _files(path: Path) -> list[Path]:
-    return files_in(path) if path.is_dir() else [path]
 
 
 def _state(series: Series, frame: Frame) -> State:
