@@ -1,7 +1,5 @@
 """What several tests look at: one table of a real test with its ParaView files, made once."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

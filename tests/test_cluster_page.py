@@ -1,7 +1,5 @@
 """The scripts of docs/howto/many-folders.md work as they stand."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

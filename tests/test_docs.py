@@ -1,7 +1,5 @@
 """The documentation is complete and true: names, generated pages, examples, links."""
 
-from __future__ import annotations
-
 import ast
 import builtins
 import doctest

@@ -4,8 +4,6 @@ The decks of sample_data/paper, run small by the programs themselves, and read b
 Contacts, rattlers and contact fabric are those that the programs count, on every frame.
 """
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """What docs/validation.md takes from the stored tables is true of tables whose slope is known."""
 
-from __future__ import annotations
-
 import csv
 
 from tests.campaigns import paper

@@ -1,7 +1,5 @@
 """What public objects say of themselves: a few lines, no array, numbers of few digits."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from dataclasses import fields

@@ -1,7 +1,5 @@
 """The sample data against the programs' own numbers: contacts, rattlers, fabric and strain."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

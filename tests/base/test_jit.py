@@ -1,7 +1,5 @@
 """Where compiled kernels are kept, what users are told, and runs that can keep nothing."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """What other packages offer: found, broken, or twice."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import pytest

@@ -1,7 +1,5 @@
 """The sweep of one direction against its floor and Embree, and what a scan's options cost."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import tempfile

@@ -5,8 +5,6 @@ Random centres in a small periodic cell, pushed apart where grains overlap until
 left; a larger packing is made of copies of the cell, of which a sphere is kept, as in the paper.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

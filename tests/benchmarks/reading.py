@@ -1,7 +1,5 @@
 """scanfab.read on large text files against general parsers, which are told where the rows are."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 import time

@@ -7,8 +7,6 @@ Each section is a function of a module's SECTIONS, which takes how many runs of 
 there are and returns a table.
 """
 
-from __future__ import annotations
-
 import argparse
 import datetime
 import platform

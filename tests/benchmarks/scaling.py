@@ -1,7 +1,5 @@
 """Time to a tolerance, contacts by geometry, and growth with the number of grains."""
 
-from __future__ import annotations
-
 import json
 import resource
 import subprocess

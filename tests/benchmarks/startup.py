@@ -1,7 +1,5 @@
 """What a command costs before it computes: compiled code absent, and in the cache."""
 
-from __future__ import annotations
-
 import gzip
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Interleaved runs of several ways to do a thing, and tables of their times."""
 
-from __future__ import annotations
-
 import gc
 import random
 import time

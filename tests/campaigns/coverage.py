@@ -20,8 +20,6 @@ for seven degrees of freedom, as a jackknife over eight parts has.
 The exit code is 0 if each coverage of void anisotropy lies within 68 ± 5 %.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import warnings

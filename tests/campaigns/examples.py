@@ -12,8 +12,6 @@ call, if it is not this checkout's. A row for each command: seconds, exit code, 
 error.
 """
 
-from __future__ import annotations
-
 import argparse
 import subprocess
 import time

@@ -9,8 +9,6 @@ folder, each with what happened beside it. One process fuzzes until it breaks, o
 another then goes on with the corpus that it leaves.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import os

@@ -14,8 +14,6 @@ other, and replaced. *scheduler*: the same, but the scheduler is killed, and the
 --resume with another one. The exit code is 0 if every run gave the right bytes.
 """
 
-from __future__ import annotations
-
 import argparse
 import subprocess
 import sys

@@ -9,8 +9,6 @@ copies can work at once. Results are lines of JSON in --out; mutants that are th
 again. About 45 s a mutant on one core; a mutant that runs into its time limit is not killed yet.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import json

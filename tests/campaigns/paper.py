@@ -13,8 +13,6 @@ Half an hour to an hour for each run of 13,723 grains on two cores. A table that
 computed again; an unfinished one goes on. docs/make/paper.py makes the page of them.
 """
 
-from __future__ import annotations
-
 import argparse
 import shutil
 import subprocess

@@ -8,8 +8,6 @@ version that is installed beside this interpreter. Scans of fixed lines agree to
 three of their standard errors. Each difference is printed; exit code 1 if there is one.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import math

@@ -1,7 +1,5 @@
 """Options of commands, made of their declarations."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Small dump files as the programs write them, for tests of readers and series."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 from pathlib import Path

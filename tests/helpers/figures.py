@@ -1,7 +1,5 @@
 """Figures drawn for tests, and what is read off them."""
 
-from __future__ import annotations
-
 from scanfab.viz.figures.figure import make_figures, save_figures
 
 BYTES = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}

@@ -1,7 +1,5 @@
 """Damaged files for the readers, and all that the package does with a file."""
 
-from __future__ import annotations
-
 import re
 import warnings
 from collections.abc import Callable, Iterator

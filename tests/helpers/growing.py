@@ -1,7 +1,5 @@
 """Folders that are being written, frame by frame, each file in two halves."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable, Iterable

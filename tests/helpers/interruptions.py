@@ -1,7 +1,5 @@
 """Runs of the command line that are interrupted at random moments, and resumed until they end."""
 
-from __future__ import annotations
-
 import signal
 import sys
 import threading

@@ -1,7 +1,5 @@
 """What fabrics are computed from, made up by a test: contacts, forces, a void fabric."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any

@@ -1,7 +1,5 @@
 """A slow, obvious twin of all that is counted by bodies: which lie side by side in space."""
 
-from __future__ import annotations
-
 from itertools import combinations_with_replacement, product
 
 import numpy as np

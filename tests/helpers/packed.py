@@ -1,7 +1,5 @@
 """Samples and rows of grains for tests."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from scanfab import Sample, find_contacts

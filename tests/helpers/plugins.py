@@ -1,7 +1,5 @@
 """Plugins that a package would offer, made up by a test."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any

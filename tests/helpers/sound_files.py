@@ -1,7 +1,5 @@
 """Small sound files of every format, to be damaged; and grains to read contacts with."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache

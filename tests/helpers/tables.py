@@ -1,7 +1,5 @@
 """Rows of fabric tables with known curves, for tests of what reads tables."""
 
-from __future__ import annotations
-
 from typing import Any
 
 STRAIN = (0.0, 0.01, 0.02, 0.03, 0.04)

@@ -1,7 +1,5 @@
 """The answers that stand beside the dumps of sample_data, and what a packing says to compare."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

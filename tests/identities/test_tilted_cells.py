@@ -1,7 +1,5 @@
 """Contacts do not depend on how a periodic packing is described: by which vectors, from where."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

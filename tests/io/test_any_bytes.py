@@ -1,7 +1,5 @@
 """Whatever bytes a file holds: an answer or an error of the package, and nothing printed."""
 
-from __future__ import annotations
-
 from random import Random
 
 import pytest

@@ -1,7 +1,5 @@
 """From named columns to grains, the cell and clumps; from ids or places to contacts and walls."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

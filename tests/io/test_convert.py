@@ -1,7 +1,5 @@
 """convert and companion files: nothing is lost through any format, nothing is half written."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

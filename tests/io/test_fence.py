@@ -1,7 +1,5 @@
 """The worker process: whatever a library does to it, we go on."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

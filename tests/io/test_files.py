@@ -1,7 +1,5 @@
 """Files that are compressed, are no dumps, or hold far more than files so small can."""
 
-from __future__ import annotations
-
 import base64
 import bz2
 import gzip

@@ -1,7 +1,5 @@
 """Names into families, which files are the grains, and which contact files are theirs."""
 
-from __future__ import annotations
-
 import warnings
 from itertools import product
 

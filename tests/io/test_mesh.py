@@ -1,7 +1,5 @@
 """VTK files and surfaces: all that is written is read, and what is damaged is refused."""
 
-from __future__ import annotations
-
 import base64
 import itertools
 

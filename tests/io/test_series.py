@@ -1,7 +1,5 @@
 """Series of frames: sources, contacts of a step, frames by number and slice, very many of them."""
 
-from __future__ import annotations
-
 import json
 import os
 import pickle

@@ -1,7 +1,5 @@
 """One table of text: the same numbers however it is written, or the line that is wrong."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The triads of scan lines, and lines cut exactly: against the naive twin and closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A package of someone else's, installed: its formats work like built-in ones."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

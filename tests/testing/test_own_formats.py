@@ -1,7 +1,5 @@
 """Our own readers and writers pass the kit that others are given."""
 
-from __future__ import annotations
-
 import pytest
 
 from scanfab.io.reader import reader_named

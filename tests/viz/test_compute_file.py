@@ -1,7 +1,5 @@
 """Tables in files from Python: the files of the command line, and each goes on with the other's."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import warnings

@@ -1,7 +1,5 @@
 """Data files of LIGGGHTS and LAMMPS: three grains in a row, in any order of the columns."""
 
-from __future__ import annotations
-
 HEAD = """{title}
 
 3 atoms

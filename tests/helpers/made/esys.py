@@ -1,7 +1,5 @@
 """Snapshots of ESyS-Particle, as its source writes them: no line end closes a header."""
 
-from __future__ import annotations
-
 from tests.helpers.dumps import write
 
 HEADER = """V 3

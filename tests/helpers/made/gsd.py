@@ -1,7 +1,5 @@
 """Files of HOOMD, by its own library."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

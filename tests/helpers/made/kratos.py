@@ -1,7 +1,5 @@
 """Input of Kratos' DEM application."""
 
-from __future__ import annotations
-
 MDPA = """Begin ModelPartData
  //  VARIABLE_NAME value
 End ModelPartData

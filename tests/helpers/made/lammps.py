@@ -1,7 +1,5 @@
 """LAMMPS' dump yaml and dump netcdf, as its source writes them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Files of LF_DEM: three spheres in a sheared cell, at two strains; and a bent chain of three."""
 
-from __future__ import annotations
-
 import numpy as np
 
 HEAD = "# LF_DEM version v2\n# np 3\n# VF 0.4\n# Lx 10\n# Ly 8\n# Lz 6\n"

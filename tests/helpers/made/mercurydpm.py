@@ -1,7 +1,5 @@
 """Files of MercuryDPM: three grains, of which two touch through a face."""
 
-from __future__ import annotations
-
 # rows 0 and 1 touch, and rows 0 and 2 through the face of a cell of 1 x 2 x 3
 CENTRES = ((0.1, 1, 1), (0.29, 1, 1), (0.91, 1, 1))
 RADIUS = 0.1

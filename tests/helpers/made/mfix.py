@@ -1,7 +1,5 @@
 """MFiX' particle_input.dat, version 2."""
 
-from __future__ import annotations
-
 HEADER = """Version 2.0
 =====================
 Instructions: Data starts at line 35

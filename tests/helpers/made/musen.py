@@ -1,7 +1,5 @@
 """MUSEN's export as text, at two times."""
 
-from __future__ import annotations
-
 STATE = "2 {time} 12 {x} 0.5 0.5 15 9 9 9 16 9 9 9 18 0 20 9 9 9 31 1 0 0 0 36 9 9 9 9 9 9 9 9 9"
 
 

@@ -1,7 +1,5 @@
 """ON-DEM's VTKHDF, as the exporters of its two drafts write it."""
 
-from __future__ import annotations
-
 import h5py
 import numpy as np
 

@@ -1,7 +1,5 @@
 """Contacts of three programs: columns by their values, and forces in equilibrium."""
 
-from __future__ import annotations
-
 import gzip
 
 import numpy as np

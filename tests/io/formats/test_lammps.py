@@ -1,7 +1,5 @@
 """LAMMPS' dumps: its own fabric of a tilted cell, NetCDF, binary dumps; and data files."""
 
-from __future__ import annotations
-
 import struct
 
 import numpy as np

@@ -1,7 +1,5 @@
 """LIGGGHTS' dumps against their truth, its contact columns, and the syntax of text dumps."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

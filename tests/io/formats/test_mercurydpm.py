@@ -1,7 +1,5 @@
 """MercuryDPM and LF_DEM: pairs, periodic boundaries, the sheared cell."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

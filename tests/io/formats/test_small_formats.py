@@ -1,7 +1,5 @@
 """The small formats: what they read, what they refuse; ON-DEM's VTKHDF with its signs."""
 
-from __future__ import annotations
-
 import h5py
 import numpy as np
 import pytest

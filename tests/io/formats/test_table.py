@@ -1,7 +1,5 @@
 """Tables of any program: what columns are, by names, by the user or by a rule that is told."""
 
-from __future__ import annotations
-
 import io
 import re
 import zipfile

@@ -1,7 +1,5 @@
 """VTK files of any origin, and lists of them."""
 
-from __future__ import annotations
-
 import meshio
 import numpy as np
 import pytest

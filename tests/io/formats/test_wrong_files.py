@@ -1,7 +1,5 @@
 """What is wrong with a file is told; odd files, some found by fuzzing, are read or refused."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

@@ -1,7 +1,5 @@
 """YADE's files against its own truth: text, VTKExporter, VTKRecorder, O.save, and its cells."""
 
-from __future__ import annotations
-
 import itertools
 import shutil
 import warnings

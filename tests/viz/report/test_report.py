@@ -1,7 +1,5 @@
 """The report: what it says with and without manifest and source, and which tables it takes."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
