@@ -1,14 +1,13 @@
-"""A real browser for tests: Chromium by its driver, asked over HTTP with nothing but urllib."""
-
-from __future__ import annotations
+"""A real browser for tests: Chromium, which Selenium steers by its driver."""
 
 import json
-import re
 import shutil
-import subprocess
-import tempfile
-import urllib.request
 from typing import Any
+
+from selenium import webdriver
+from selenium.webdriver.common.action_chains import ActionChains, ScrollOrigin
+from selenium.webdriver.common.actions.action_builder import ActionBuilder
+from selenium.webdriver.common.actions.pointer_actions import PointerActions
 
 FLAGS = (
     "headless=new", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run", "disable-sync",
@@ -25,95 +24,43 @@ def missing() -> str:
     return f"install {' and '.join(lacking)}" if lacking else ""
 
 
-class Browser:
+class Browser(webdriver.Chrome):
     """One window, or the screen of a phone; use it in a with block."""
 
     def __init__(self, phone: bool = False) -> None:
-        self._emulated = {"mobileEmulation": PHONE} if phone else {}
-
-    def __enter__(self) -> Browser:
-        self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
-        self._driver = subprocess.Popen(["chromedriver", "--port=0"], stdout=subprocess.PIPE)
-        # once it listens it says where
-        said = (re.search(rb"successfully on port (\d+)", line) for line in self._driver.stdout)
-        self._url = f"http://127.0.0.1:{int(next(filter(None, said))[1])}"
-        flags = [f"--{flag}" for flag in (*FLAGS, f"user-data-dir={self._profile.name}")]
-        binary = shutil.which("chromium") or shutil.which("chromium-browser")
-        wanted = {
-            "goog:chromeOptions": {"binary": binary, "args": flags, **self._emulated},
-            "goog:loggingPrefs": {"browser": "ALL", "performance": "ALL"},
-        }
-        answer = self._ask("POST", "/session", {"capabilities": {"alwaysMatch": wanted}})
-        self._url += f"/session/{answer['sessionId']}"
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        try:
-            self._ask("DELETE", "")
-        finally:
-            self._driver.terminate()
-            self._driver.communicate(timeout=60)
-            self._profile.cleanup()
-
-    def _ask(self, method: str, path: str, body: dict[str, Any] | None = None) -> Any:
-        data = None if body is None else json.dumps(body).encode()
-        request = urllib.request.Request(self._url + path, data=data, method=method)
-        request.add_header("Content-Type", "application/json")
-        with urllib.request.urlopen(request, timeout=60) as answer:
-            return json.load(answer)["value"]
-
-    def open(self, url: str) -> None:
-        """Load a page."""
-        self._ask("POST", "/url", {"url": url})
+        options = webdriver.ChromeOptions()
+        options.binary_location = shutil.which("chromium") or shutil.which("chromium-browser")
+        for flag in FLAGS:
+            options.add_argument(f"--{flag}")
+        if phone:
+            options.add_experimental_option("mobileEmulation", PHONE)
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+        super().__init__(options, webdriver.ChromeService(shutil.which("chromedriver")))
 
     def run(self, script: str) -> Any:
-        """What a script returns."""
-        return self._ask("POST", "/execute/sync", {"script": script, "args": []})
-
-    def log(self, kind: str) -> list[dict[str, Any]]:
-        """New lines of the log of the ``browser`` (its console) or its ``performance``."""
-        found: list[dict[str, Any]] = self._ask("POST", "/se/log", {"type": kind})
-        return found
+        """What a script returns, or what its promise holds in the end."""
+        return self.execute_script(script)
 
     def requests(self) -> list[str]:
         """The addresses that the page has asked for since the last call."""
-        messages = [json.loads(entry["message"])["message"] for entry in self.log("performance")]
+        messages = [json.loads(one["message"])["message"] for one in self.get_log("performance")]
         sent = [x for x in messages if x["method"] == "Network.requestWillBeSent"]
         return [message["params"]["request"]["url"] for message in sent]
 
-    def touch(self, *fingers: tuple[int, int, int, int]) -> None:
-        """Fingers press at places of the window, move by so much, and let go."""
-        touch = {"type": "pointer", "parameters": {"pointerType": "touch"}}
-        moves = [_moves(*one) for one in fingers]
-        self._act(
-            *({**touch, "id": f"finger {k}", "actions": move} for k, move in enumerate(moves))
-        )
-        self._ask("DELETE", "/actions")
-
-    def drag(self, x: int, y: int, dx: int, dy: int) -> None:
-        """Press at a place of the window, move, and let go."""
-        mouse = {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}}
-        self._act({**mouse, "actions": _moves(x, y, dx, dy)})
+    def drag(self, *moves: tuple[int, int, int, int], kind: str = "mouse") -> None:
+        """Press at each place of the window, by fingers if the kind is touch, move, and let go."""
+        actions = ActionBuilder(self)
+        for number, (x, y, dx, dy) in enumerate(moves):
+            pointer = PointerActions(actions.add_pointer_input(kind, f"{kind} {number}"))
+            pointer.move_to_location(x, y).pointer_down()
+            pointer.move_to_location(x + dx, y + dy).pointer_up()
+        actions.perform()
 
     def wheel(self, x: int, y: int, down: int) -> None:
         """Turn the wheel at a place of the window."""
-        turn = {"type": "scroll", "x": x, "y": y, "deltaX": 0, "deltaY": down, "duration": 0}
-        self._act({"type": "wheel", "id": "w", "actions": [turn]})
+        place = ScrollOrigin.from_viewport(x, y)
+        ActionChains(self, duration=0).scroll_from_origin(place, 0, down).perform()
 
     def press(self, key: str) -> None:
         """Press a key of the keyboard."""
-        presses = [{"type": kind, "value": key} for kind in ("keyDown", "keyUp")]
-        self._act({"type": "key", "id": "k", "actions": presses})
-
-    def _act(self, *actions: dict[str, Any]) -> None:
-        self._ask("POST", "/actions", {"actions": list(actions)})
-
-
-def _moves(x: int, y: int, dx: int, dy: int) -> list[dict[str, Any]]:
-    """What a mouse or a finger does to drag something."""
-    return [
-        {"type": "pointerMove", "duration": 0, "x": x, "y": y},
-        {"type": "pointerDown", "button": 0},
-        {"type": "pointerMove", "duration": 200, "x": x + dx, "y": y + dy},
-        {"type": "pointerUp", "button": 0},
-    ]
+        ActionChains(self).send_keys(key).perform()

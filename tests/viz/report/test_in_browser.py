@@ -4,6 +4,8 @@ from contextlib import chdir
 
 import pytest
 
+pytest.importorskip("selenium")
+
 import scanfab
 from tests.conftest import ROOT
 from tests.viz.report.browser import Browser, missing
@@ -50,9 +52,9 @@ def report(computed, tmp_path_factory):
 
 @pytest.fixture
 def page(browser, report):
-    browser.log("performance")
-    browser.log("browser")
-    browser.open(report.as_uri())
+    browser.get_log("performance")
+    browser.get_log("browser")
+    browser.get(report.as_uri())
     browser.run(SEEN)
     return browser
 
@@ -60,7 +62,7 @@ def page(browser, report):
 def test_nothing_is_fetched_and_every_figure_is_shown(page, report):
     asked = [url for url in page.requests() if not url.startswith("data:")]
     assert asked == [report.as_uri()]
-    assert page.log("browser") == []
+    assert page.get_log("browser") == []
     widths = page.run("return [...document.images].map((image) => image.naturalWidth)")
     assert len(widths) == 5
     assert min(widths) > 300
@@ -78,13 +80,13 @@ def test_the_view_has_colours_and_turns_when_dragged(page):
     x, y = page.run(MIDDLE)
     before = page.run(SEEN)
     assert sum(count > 50 for count in page.run(COLOURS).values()) > 20
-    page.drag(x, y, 120, 40)
+    page.drag((x, y, 120, 40))
     assert page.run(SEEN) != before
     # back to where it was
-    page.drag(x + 120, y + 40, -120, -40)
+    page.drag((x + 120, y + 40, -120, -40))
     assert page.run(SEEN) == before
     # but for advice on how this test reads pixels
-    assert [one for one in page.log("browser") if "getImageData" not in one["message"]] == []
+    assert [one for one in page.get_log("browser") if "getImageData" not in one["message"]] == []
 
 
 def test_the_view_is_cut_open_and_zoomed(page):
@@ -105,7 +107,7 @@ def test_the_wheel_scrolls_the_page_until_the_view_is_clicked(page):
     wait_for(page, f"scrollY > {top}")
     assert page.run(SEEN) == before
     x, y = page.run(MIDDLE)
-    page.drag(x, y, 0, 0)
+    page.drag((x, y, 0, 0))
     top = page.run("return scrollY")
     page.wheel(x, y, -120)
     assert page.run(SEEN) != before
@@ -139,7 +141,7 @@ def test_the_contents_lead_to_the_sections_and_all_fits_the_window(page):
 @pytest.fixture(scope="module")
 def phone(report):
     with Browser(phone=True) as one:
-        one.open(report.as_uri())
+        one.get(report.as_uri())
         yield one
 
 
@@ -157,14 +159,14 @@ def test_a_phone_shows_results_without_scrolling_sideways_and_letters_in_their_s
 def test_one_finger_scrolls_and_two_turn_and_pinch(phone):
     x, y = phone.run(MIDDLE)
     before, top = phone.run(SEEN), phone.run("return scrollY")
-    phone.touch((x - 60, y + 60, 0, -120))
+    phone.drag((x - 60, y + 60, 0, -120), kind="touch")
     wait_for(phone, f"scrollY > {top}")
     assert phone.run(SEEN) == before
     x, y = phone.run(MIDDLE)
     top = phone.run("return scrollY")
-    phone.touch((x - 60, y - 40, 40, 30), (x + 40, y + 30, 40, 30))
+    phone.drag((x - 60, y - 40, 40, 30), (x + 40, y + 30, 40, 30), kind="touch")
     assert phone.run("return scrollY") == top
     turned = phone.run(SEEN)
     assert turned != before
-    phone.touch((x - 30, y - 20, -40, -30), (x + 30, y + 20, 40, 30))
+    phone.drag((x - 30, y - 20, -40, -30), (x + 30, y + 20, 40, 30), kind="touch")
     assert phone.run(SEEN) not in (before, turned)
