@@ -9,34 +9,11 @@ import numpy as np
 from scanfab.base.convex import Convex
 
 
-class Gaps(NamedTuple):
-    """The void segments on all lines of one grid, in the whole sample and in the window."""
-
-    whole: list[float]
-    whole_lines: int
-    window: list[float]
-    window_lines: int
-    window_line_length: float
-
-
 class Segment(NamedTuple):
     """One void segment: its length, and the place of its middle."""
 
     length: float
     middle: np.ndarray
-
-
-class Tally(NamedTuple):
-    """What a scan adds up, in the order of the kernel's tally."""
-
-    whole_length: float
-    whole_kept: int
-    whole_lines: int
-    window_length: float
-    window_kept: int
-    window_lines: int
-    window_void: float
-    window_line_length: float
 
 
 def chords(position, radius, point, direction):
@@ -139,17 +116,24 @@ def within(window, feet, direction):
     return low[()], high[()]
 
 
-def scan(position, radius, triad, offset, spacing, clip):
-    """All gaps on the square grid of lines along the third row of a triad (rows u, v, n)."""
+def tallies(position, radius, triad, offset, spacing, clip, cutoffs):
+    """What a scan adds up at each cut-off, by name; the triad is that of :func:`grid_lines`."""
     lines = [*grid_lines(position, radius, triad, offset, spacing, clip)]
     clipped = [(solids, low, high) for _, solids, low, high in lines if low < high]
-    return Gaps(
-        [length for _, solids, *_ in lines for length in lengths(gaps_between(solids))],
-        sum(bool(solids) for _, solids, *_ in lines),
-        [length for line in clipped for length in lengths(gaps_within(*line))],
-        len(clipped),
-        sum(high - low for _, low, high in clipped),
-    )
+    gaps = {
+        "whole": [one for _, solids, *_ in lines for one in lengths(gaps_between(solids))],
+        "window": [one for line in clipped for one in lengths(gaps_within(*line))],
+    }
+    found = {
+        "whole_lines": sum(bool(solids) for _, solids, *_ in lines),
+        "window_lines": len(clipped),
+        "window_void": sum(gaps["window"]),
+        "window_line_length": sum(high - low for _, low, high in clipped),
+    }
+    for least in cutoffs:
+        kept = {name: [one for one in every if one >= least] for name, every in gaps.items()}
+        sums = {f"{name}_length": sum(every) for name, every in kept.items()}
+        yield found | sums | {f"{name}_segments": len(every) for name, every in kept.items()}
 
 
 def edge_sums(solids, enters, leaves, cutoff, rule):
@@ -233,25 +217,16 @@ def block(place, blocks):
     return number + before * min(int(share * blocks.shells), blocks.shells - 1)
 
 
-def octant(place, center):
-    """The octant of a place about a centre, from 0, x counting fastest."""
-    return sum(2**i for i in range(3) if place[i] >= center[i])
-
-
-def gap_sums(segments, cutoff, center):
-    """Number, length and squared length of the kept segments, by octant: shape (8, 3)."""
-    sums = np.zeros((8, 3))
-    for length, middle in segments:
-        if length >= cutoff and length > 0:
-            sums[octant(middle, center)] += 1, length, length**2
+def gap_sums(segments, blocks, cutoffs):
+    """Number, length and square of segments by block and cut-off, shape (B, C, 3)."""
+    sums = np.zeros((len(blocks), len(cutoffs), 3))
+    for length, middle, *weight in segments:
+        number = block(middle, blocks)
+        if number >= 0:
+            weights = weight[0] if weight else 1.0
+            kept = length >= np.array(cutoffs)
+            sums[number, kept] += weights * np.array([1.0, length, length**2])
     return sums
-
-
-def tally(gaps, cutoff):
-    """Sums and numbers of the gaps that are not shorter than the cut-off."""
-    whole, window = ([x for x in every if x >= cutoff] for every in (gaps.whole, gaps.window))
-    sums = sum(whole), len(whole), gaps.whole_lines, sum(window), len(window), gaps.window_lines
-    return Tally(*sums, sum(gaps.window), gaps.window_line_length)
 
 
 def shifts_within(reach, branch, vectors, periodic):

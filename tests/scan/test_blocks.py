@@ -36,18 +36,6 @@ def some_blocks(random, repeats=(False, False, False)):
     return grid, slices, shells, slices.finer()
 
 
-def kept_in(segments, blocks):
-    """Number, length and square of segments by block and cut-off, shape (B, C, 3)."""
-    sums = np.zeros((len(blocks), len(LEAST), 3))
-    for length, middle, *weight in segments:
-        block = naive.block(middle, blocks)
-        for place, least in enumerate(LEAST):
-            if block >= 0 and length >= least:
-                number = weight[0] if weight else 1.0
-                sums[block, place] += number, number * length, number * length**2
-    return sums
-
-
 def fast_sums(solids, blocks, triad, offset, spacing, variants="abcd"):
     """Sums of the variants, shape (V, B, C, 3), by the largest cut-off reached and above."""
     bins = Bins(partition_of(blocks, blocks), LEAST, np.zeros((1, 2, 2, len(blocks) * 2, 3)))
@@ -116,7 +104,7 @@ def check_window_and_whole(random):
             chosen = spheres.position[solid], spheres.radius[solid]
             found = naive.void_segments(*chosen, triad, offset, spacing, window)
             for kind, segments in enumerate(found):
-                slow = kept_in(segments, blocks)
+                slow = naive.gap_sums(segments, blocks, LEAST)
                 np.testing.assert_allclose(fast[2 * kind + which], slow, rtol=1e-9, atol=1e-9)
 
 
@@ -142,7 +130,9 @@ def check_periodic_whole(random, periods):
     shells = Blocks(corner, cell.vectors, (1, 1, 1), cell.periodic, radius, 3)
     for blocks in (grid, shells):
         fast = fast_sums(solids, blocks, triad, offset, spacing, "a")[0]
-        np.testing.assert_allclose(fast, kept_in(segments, blocks), rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(
+            fast, naive.gap_sums(segments, blocks, LEAST), rtol=1e-9, atol=1e-9
+        )
 
 
 @pytest.mark.parametrize("periods", [(1, 1, 1), (1, 0, 1), (0, 0, 1)])
@@ -166,7 +156,9 @@ def check_start(random):
             segments += [(high - low, foot + end * triad[2], 0.5) for end in ends]
     for blocks in some_blocks(random):
         fast = fast_sums(solids, blocks, triad, offset, spacing, "c")[0]
-        np.testing.assert_allclose(fast, kept_in(segments, blocks), rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(
+            fast, naive.gap_sums(segments, blocks, LEAST), rtol=1e-9, atol=1e-9
+        )
 
 
 @pytest.mark.parametrize("seed", range(3))

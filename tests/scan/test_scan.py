@@ -35,15 +35,14 @@ def test_scan_equals_the_slow_twin_for_all_variants(solids):
     for number, (triad, offset) in enumerate(zip(triads, offsets, strict=True)):
         keep = ~solids.removed
         tallies = [
-            naive.tally(naive.scan(position, radius, triad, offset, 0.6, 3.0), 0.3)
-            for position, radius in [
-                (solids.position, solids.radius),
-                (solids.position[keep], solids.radius[keep]),
-            ]
+            *naive.tallies(solids.position, solids.radius, triad, offset, 0.6, 3.0, [0.3]),
+            *naive.tallies(
+                solids.position[keep], solids.radius[keep], triad, offset, 0.6, 3.0, [0.3]
+            ),
         ]
-        for name, of in (("segments", "kept"), ("lines", "lines"), ("length", "length")):
+        for name in ("segments", "lines", "length"):
             ways = ("whole", "window")
-            expected = [getattr(tally, f"{way}_{of}") for way in ways for tally in tallies]
+            expected = [tally[f"{way}_{name}"] for way in ways for tally in tallies]
             assert getattr(sums, name)[0, :, number] == pytest.approx(expected, rel=1e-9)
 
 

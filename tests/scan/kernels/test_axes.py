@@ -97,13 +97,10 @@ def assert_fast_equals_naive(spheres, removed, triad, offset, spacing, cutoffs, 
     """Numbers identical, lengths to rounding, of all four variants, row by row and over lists."""
     position, radius = np.array(spheres[0], dtype=float), np.array(spheres[1], dtype=float)
     solids = Solids(position, radius, removed, region(window))
-    line = triad, offset, spacing, window
-    subsets = (
-        naive.scan(position, radius, *line),
-        naive.scan(position[~removed], radius[~removed], *line),
-    )
-    for cutoff in cutoffs:
-        slow = [naive.tally(gaps, max(cutoff, shortest_gap(solids))) for gaps in subsets]
+    line = triad, offset, spacing, window, np.maximum(cutoffs, shortest_gap(solids))
+    every = naive.tallies(position, radius, *line)
+    left = naive.tallies(position[~removed], radius[~removed], *line)
+    for cutoff, *slow in zip(cutoffs, every, left, strict=True):
         # an open whole is also scanned by the kernel of a window
         for way, variants in itertools.product(WAYS, ("abcd", "ab")):
             with by_lists(way):
@@ -112,10 +109,10 @@ def assert_fast_equals_naive(spheres, removed, triad, offset, spacing, cutoffs, 
             for variant, tally in zip(variants, (*slow, *slow), strict=False):
                 kind = "whole" if variant in "ab" else "window"
                 found = {name: getattr(sums, name)[0, "abcd".index(variant), 0] for name in SUMS}
-                assert found["segments"] == getattr(tally, f"{kind}_kept")
+                assert found["segments"] == tally[f"{kind}_segments"]
                 for name in ("lines", "length", "void", "line_length"):
                     # of an open whole there is no more
-                    expected = getattr(tally, f"{kind}_{name}", 0)
+                    expected = tally.get(f"{kind}_{name}", 0)
                     assert found[name] == pytest.approx(expected, rel=1e-9, abs=1e-9), name
 
 

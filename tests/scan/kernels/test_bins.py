@@ -35,9 +35,9 @@ def slow_sums(line, centers):
     for which, solid in enumerate([np.ones(len(radius), bool), ~removed]):
         grid = position[solid], radius[solid], triad, offset, spacing, window
         for kind, segments in enumerate(naive.void_segments(*grid)):
-            reached = [naive.gap_sums(segments, cutoff, centers[kind]) for cutoff in cutoffs]
-            for k, least in enumerate(reached):
-                sums[kind, which, :, k] = least - (reached[k + 1] if k + 1 < len(reached) else 0)
+            reached = naive.gap_sums(segments, Blocks.about(centers[kind], REACH), cutoffs)
+            sums[kind, which] = reached
+            sums[kind, which, :, :-1] -= reached[:, 1:]
     return sums
 
 
