@@ -328,7 +328,7 @@ def periodic_gaps(*words):
     return [one.length for one in periodic_segments(*words)]
 
 
-def periodic_segments(position, radius, vectors, periods, foot, direction, measured, longest=150.0):
+def periodic_segments(position, radius, vectors, periods, foot, direction, measured):
     """
     Gaps of one line through a periodic medium, from a list of images as far as the longest gap.
 
@@ -336,7 +336,7 @@ def periodic_segments(position, radius, vectors, periods, foot, direction, measu
     """
     if len(radius) == 0:
         return []
-    low, high = (-3.0, max(measured, 1.0) + longest) if measured else (-60.0, 60.0)
+    low, high = (-3.0, max(measured, 1.0) + 150.0) if measured else (-60.0, 60.0)
     solids = periodic_solids(position, radius, vectors, periods, foot, direction, low, high)
     return [
         Segment(after[0] - before[1], foot + 0.5 * (before[1] + after[0]) * direction)

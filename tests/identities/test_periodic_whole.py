@@ -5,8 +5,7 @@ import pytest
 
 from scanfab import Cell, Packing, ScanfabWarning, Solids, compute, direction_rule, scan_lines
 from scanfab.scan.kernels.grid import CellGrains
-from tests.helpers import naive
-from tests.helpers.lattices import rotation, unit_vectors
+from tests.helpers.lattices import rotation
 from tests.helpers.scanning import ratio
 
 LOOK = {"variants": "ab", "tolerance": 1.0, "contact_tolerance": 1e-4, "seed": 3}
@@ -156,19 +155,3 @@ def test_lines_in_channels_are_counted_in_a_warning():
             packing, variants="a", directions="equal-angle-full:45", spacing=0.1, cutoff=0.0,
             tolerance=10.0,
         )  # fmt: skip
-
-
-def test_gaps_that_start_anywhere_are_the_gaps_of_the_medium():
-    """Random lines followed through explicit images: the same mean length and anisotropy."""
-    position, radius, vectors = loose(5, 110)
-    packing = Packing(position, radius, cell=Cell(vectors))
-    row = compute(packing, variants="a", tolerance=1e-3)[0]
-    random = np.random.default_rng(2)
-    gaps = []
-    for _ in range(600):
-        normal, foot = unit_vectors(random), random.random(3) @ vectors
-        found = naive.periodic_gaps(position, radius, vectors, (1, 1, 1), foot, normal, 6.0, 20.0)
-        gaps += [gap for gap in found if gap >= row.cutoff]
-    error = np.std(gaps) / np.sqrt(len(gaps))
-    assert np.mean(gaps) == pytest.approx(row.mean_length, abs=5 * error)
-    assert error < 0.03 * row.mean_length

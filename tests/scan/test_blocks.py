@@ -182,14 +182,3 @@ def test_all_blocks_together_are_the_scan_of_the_same_lines(edge, variants):
             np.testing.assert_allclose(number, sums.kept(variant)[1], rtol=1e-12)
             np.testing.assert_allclose(length, sums.kept(variant)[0], rtol=1e-9)
     assert np.all(found.scan.chords > 0)
-
-
-def test_lines_of_a_map_are_kept_in_any_number_of_threads():
-    random = np.random.default_rng(7)
-    solids = solids_of(poisson_spheres(random, 0.15, 3.0), 2.0)
-    blocks = some_blocks(random)[0]
-    words = {"spacing": 0.2, "cutoffs": [0.1], "blocks": (blocks, blocks), "variants": "c"}
-    one, three = (scan_gaps(solids, RULE, workers=n, **words) for n in (1, 3))
-    assert np.array_equal(one.number, three.number)
-    assert np.array_equal(one.square, three.square)
-    assert np.array_equal(one.scan.chords, three.scan.chords)

@@ -9,7 +9,7 @@ from scanfab.base.arrays import concatenated
 from scanfab.scan.lines import line_triads, turned_triads
 from scanfab.scan.solids import MAX_LINES
 from tests.helpers import naive
-from tests.helpers.lattices import Spheres, poisson_spheres, separate_spheres
+from tests.helpers.lattices import poisson_spheres
 from tests.helpers.scanning import fabric, solids_of
 
 RULE = direction_rule("lebedev:5")
@@ -96,15 +96,6 @@ def test_variants_that_nobody_asks_for_are_zero(solids):
         assert sums.length[:, which] == pytest.approx(every.length[:, which], rel=1e-12)
 
 
-def test_void_and_line_length_give_the_solid_fraction_of_separate_spheres():
-    spheres = separate_spheres(np.random.default_rng(0), 30, 5.0)
-    sums = scan_lines(solids_of(spheres, 5.0), RULE, spacing=0.1, cutoff=1.0)
-    fraction = 1 - sums.void[:, 2].sum() / sums.line_length[:, 2].sum()
-    assert fraction == pytest.approx(np.sum(spheres.radius**3) / 125, rel=1e-3)
-    assert np.all(sums.length[:, 2] < sums.void[:, 2])
-    assert not sums.void[:, :2].any()
-
-
 def test_spacing_that_asks_for_too_many_lines_is_an_error(solids):
     spacing = 2 * 3.0 / MAX_LINES**0.5
     with pytest.raises(SettingsError, match=r"^spacing: .* choose a wider spacing"):
@@ -128,15 +119,3 @@ def test_reported_error_is_the_scatter_over_seeds():
     axial = [result.tensor.axial((0, 0, 1)) for result in results]
     errors = [result.axial_error((0, 0, 1)) for result in results]
     assert np.std(axial, ddof=1) == pytest.approx(np.mean(errors), rel=0.3)
-
-
-def test_alpha_vanishes_within_its_error_where_theory_says_so():
-    """Separate spheres in a sphere window without a cut-off: isotropic for any arrangement."""
-    rows = Spheres(np.array([[x, 0.0, z] for x in (-1.5, 0, 1.5) for z in range(-3, 4)]), 0)
-    spheres = Spheres(rows.position, np.full(21, 0.5))
-    for seed in range(20):
-        result = fabric(solids_of(spheres, 4.0), seed=seed, spacing=0.3, cutoff=0.0)
-        for axis in np.eye(3):
-            assert abs(result.tensor.axial(axis)) < 4 * result.axial_error(axis)
-    cut = fabric(solids_of(spheres, 4.0), spacing=0.3, cutoff=0.6)
-    assert abs(cut.tensor.axial((0, 1, 0))) > 4 * cut.axial_error((0, 1, 0))
