@@ -3,35 +3,15 @@
 import numpy as np
 import pytest
 
-from tests.helpers.lattices import Spheres, poisson_spheres, separate_spheres
+from scanfab import Packing, ScanfabWarning, compute
+from tests.helpers.lattices import Spheres, poisson_spheres, separate_spheres, shaken_cubic
 from tests.helpers.scanning import Z, fabric, isotropic, mean_lengths, ratio, scan_along, solids_of
 
 AXES = np.array([[0, 0, 1], [1, 0, 0], [0.6, 0, 0.8], [-0.48, 0.6, 0.64]])
-NOTHING = Spheres(np.zeros((0, 3)), np.zeros(0))
 
 
 def touching_pair(distance=2.0, radius=1.0):
     return Spheres(np.array([[0.0, 0, 0], [0, 0, distance]]), np.full(2, radius))
-
-
-@pytest.mark.parametrize("cutoff", [0.0, 0.7, 1.6, 2.0])
-def test_empty_window(cutoff):
-    """ℓ = (4/3)(R³ - h³)/(R² - h²), h = c/2; nothing is kept at the diameter."""
-    sums = scan_along(solids_of(NOTHING, 1.0), AXES, 0.02, cutoff, replicates=32)
-    h = cutoff / 2
-    if h < 1:
-        assert mean_lengths(sums, "c").agrees(4 / 3 * (1 - h**3) / (1 - h**2))
-    else:
-        assert sums.kept("c")[1].sum() == 0
-        assert sums.void[:, 2].sum() > 0
-
-
-def test_one_sphere_in_a_concentric_window():
-    """ℓ = (4/3)(R³ - r³)/(R² + r²) in every direction."""
-    solids = solids_of(Spheres(np.zeros((1, 3)), np.array([0.6])), 1.0)
-    expected = 4 / 3 * (1 - 0.6**3) / (1 + 0.6**2)
-    assert mean_lengths(scan_along(solids, AXES, 0.02, replicates=32), "c").agrees(expected)
-    assert isotropic(fabric(solids, spacing=0.05, cutoff=0.0))
 
 
 @pytest.mark.parametrize("thinner", [1e-15, 1e-12])
@@ -49,8 +29,9 @@ def test_between_surfaces_that_coincide_there_is_no_segment(thinner):
         separate_spheres(np.random.default_rng(0), 60, 6.0),
         separate_spheres(np.random.default_rng(1), 5, 6.0, radii=(0.3, 2.5)),
         Spheres(np.array([[0.0, 0, z] for z in range(-4, 5)]), np.full(9, 0.5)),
+        Spheres(np.zeros((1, 3)), np.array([3.6])),
     ],
-    ids=["sixty", "five", "a row along z"],
+    ids=["sixty", "five", "a row along z", "one in the middle"],
 )
 def test_spheres_without_overlap_in_a_window(spheres):
     """ℓ(n) = (V_window - ΣV)/(πR² + Σπr²) in every direction, G = I/3 for any arrangement."""
@@ -138,3 +119,31 @@ def test_poisson_spheres_in_a_clipped_window(cutoff):
     estimate = ratio(np.array(length), np.array(segments))
     assert estimate.error < 1.5e-3 * estimate.value
     assert estimate.agrees(cutoff + a1 / (a0 + beta * a1), within=2e-3)
+
+
+def test_grains_cut_by_the_window_are_solid_inside_it():
+    """Half a sphere in the window: void and lines give its volume."""
+    grain = Spheres(np.array([[0.0, 0, 2.0]]), np.array([1.0]))
+    sums = scan_along(solids_of(grain, 2.0), [[1, 0, 0], [0, 0.6, 0.8]], 0.02, replicates=32)
+    fraction = 1 - sums.void[:, 2] / sums.line_length[:, 2]
+    # two spherical caps over the circle in which the surfaces meet, at z = 7/4
+    caps = np.pi * (0.25**2 * (3 * 2 - 0.25) + 0.75**2 * (3 * 1 - 0.75)) / 3
+    assert fraction.mean(axis=0) == pytest.approx(caps / (4 / 3 * np.pi * 8), rel=1e-3)
+
+
+def test_cutoff_larger_than_the_window_gives_no_fabric_and_says_so():
+    packing = Packing(*shaken_cubic(np.random.default_rng(0), 5))
+    with pytest.warns(ScanfabWarning, match=r"variant c: no void segment reaches the cut-off 10\b"):
+        row = compute(packing, variants="c", cutoff=10.0, spacing=0.3, directions="lebedev:5")[0]
+    assert row.segments == 0
+    assert row.lines > 0
+    void = ("mean_length", "gvs_xx", "gvs_yz", "alpha_vs", "alpha_vs_axial", "alpha_vs_axial_se")
+    assert [getattr(row, name) for name in void] == [None] * len(void)
+    assert 0.3 < row.solid_fraction < 0.7
+    assert row.alpha_c is not None
+    # an auto scan does not go on for ever
+    with pytest.warns(ScanfabWarning) as caught:
+        rows = compute(packing, cutoff=10.0, tolerance=0.01)
+    assert [row.segments for row in rows] == [0] * 4
+    told = [w for w in caught if "no void segment reaches the cut-off 10" in str(w.message)]
+    assert [str(w.message).split(":")[0] for w in told] == ["frame 0, variants a, b, c, d"]

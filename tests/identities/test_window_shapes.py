@@ -18,6 +18,7 @@ TURN = rotation(RANDOM)
 AXES = np.array([[0, 0, 1], [1, 0, 0], [0.6, 0, 0.8], [-0.48, 0.6, 0.64]])
 OBLIQUE = np.array([1.0, 2.0, -2.0]) / 3.0
 SHAPES = {
+    "sphere": sphere(1.0),
     "box": box([1.6, 2.0, 2.4]),
     "turned box": box([1.6, 2.0, 2.4], TURN),
     "cylinder along x": cylinder(0.9, 2.2, [1, 0, 0]),

@@ -70,14 +70,6 @@ def test_contacts_of_a_file_within_a_body_do_not_exist():
     assert packing.contacts.force_n.tolist() == [7]
 
 
-def test_a_body_through_a_face_has_its_place_next_to_its_first_sphere():
-    cell = Cell([10.0, 10.0, 10.0])
-    packing = Packing([[9.5, 5, 5], [0.5, 5, 5], [5, 5, 5]], [1, 2, 1], bodies=[1, 1, 2], cell=cell)
-    assert packing.bodies.place[:2, 0] == pytest.approx([9.5 + 8 / 9] * 2)
-    assert packing.bodies.turns.tolist() == [[0, 0, 0], [1, 0, 0], [0, 0, 0]]
-    assert len(find_contacts(packing).contacts) == 0
-
-
 def small_clumps(random, size):
     """Spheres a few of which, close together, are one body each, shaken all over a cube."""
     position, radius, number = [], [], []

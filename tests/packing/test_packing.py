@@ -7,6 +7,8 @@ from scanfab.base.errors import PackingError, ScanfabWarning
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList, WallForces
 from scanfab.packing.packing import Packing
+from scanfab.packing.search import find_contacts
+from tests.helpers.lattices import shaken_cubic
 
 PAIR = np.array([[0.0, 0, 0], [1.9, 0, 0]])
 PUSH = np.array([2.0, 0.5, -1.0])
@@ -153,6 +155,31 @@ def test_other_contacts_keep_everything_else():
     assert other.wall_forces is not None
     assert (other.step, other.time, len(other.contacts)) == (4, 0.5, 1)
     assert packing.contacts is None
+
+
+@pytest.fixture(scope="module")
+def sheared():
+    """125 unequal grains in a cell that is tilted by more than its length."""
+    spheres = shaken_cubic(np.random.default_rng(2), 5)
+    return spheres, np.array([[5.0, 0, 0], [6.5, 5, 0], [-2.0, 7.1, 5]])
+
+
+def test_a_list_without_images_has_those_that_geometry_finds(sheared):
+    spheres, vectors = sheared
+    found = find_contacts(Packing(*spheres, cell=Cell(vectors)))
+    listed = Packing(*spheres, cell=Cell(vectors), contacts=found.contacts.pairs)
+    np.testing.assert_array_equal(listed.contacts.image, found.contacts.image)
+
+
+def test_images_are_told_from_positions_as_they_are_given(sheared):
+    """The third grain is given two cells away from the first, which it touches."""
+    _, vectors = sheared
+    cell = Cell(vectors)
+    position = np.array([[1, 1, 1], [1, 1, 2.9], [2.9, 1, 1]])
+    away = np.array([[0, 0, 0], [0, 0, 0], [0, -1, 2]])
+    listed = ContactList([[0, 1], [0, 2]], image=[[0, 0, 0], [0, 1, -2]])
+    packing = Packing(position + away @ vectors, 1.0, cell=cell, contacts=listed)
+    np.testing.assert_allclose(packing.contacts.normal, [[0, 0, 1], [1, 0, 0]], atol=1e-12)
 
 
 # forces

@@ -223,14 +223,3 @@ def test_pairs_of_an_rv_have_their_middles_in_it(sample):
     inside = window.contains(sample.packing.position, sample.packing)
     assert found.shadow == pytest.approx(np.pi * np.sum(sample.packing.radius[inside] ** 2))
     assert found.volume == pytest.approx(4 / 3 * np.pi * 8)
-
-
-def test_all_contacts_along_one_axis():
-    """A chain through the cell: n⊗n."""
-    for axis in np.eye(3):
-        position = 2.0 + np.outer(np.arange(5) - 1.5, axis)
-        packing = find_contacts(Packing(position, 0.5, cell=Cell(4.0 + axis)), TOLERANCE)
-        tensor = contact_fabric(packing.contacts.normal)
-        assert len(packing.contacts) == 5
-        assert tensor.matrix == pytest.approx(np.diag(axis), abs=1e-12)
-        assert tensor.axial(axis) == pytest.approx(1.0)
