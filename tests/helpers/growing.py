@@ -5,8 +5,6 @@ import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-__all__ = ["in_halves", "meanwhile", "sample_frames", "until"]
-
 SAMPLE = Path(__file__).parents[2] / "sample_data"
 
 

@@ -35,9 +35,7 @@ def unit_vectors(random, *shape):
 
 def ball_points(random, count, reach):
     """Points uniform in a ball about the origin."""
-    direction = random.normal(size=(count, 3))
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    return direction * reach * np.cbrt(random.random((count, 1)))
+    return unit_vectors(random, count) * reach * np.cbrt(random.random((count, 1)))
 
 
 def simple_cubic(count, edge=1.0):

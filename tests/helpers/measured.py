@@ -10,8 +10,6 @@ from scanfab.base.space import SPACE
 from scanfab.fabric.contact import contact_fabric
 from tests.helpers.lattices import unit_vectors
 
-__all__ = ["drawn", "measured_of"]
-
 
 def measured_of(normals: np.ndarray, axis: Any = (0.0, 0.0, 1.0), **more: Any) -> Any:
     """As ``Measured``, of contacts with these normals; no void fabric unless ``void`` is one."""

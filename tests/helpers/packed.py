@@ -15,8 +15,3 @@ def along_x(x):
     """Positions along x."""
     x = np.asarray(x, dtype=float)
     return np.column_stack([x, 0 * x, 0 * x])
-
-
-def cubic_grid(count):
-    """Positions of count³ grains at whole numbers."""
-    return np.stack(np.meshgrid(*3 * [np.arange(float(count))]), axis=-1).reshape(-1, 3)

@@ -13,8 +13,9 @@ from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import Window
 from scanfab.pipeline.state import _rays, contact_forces, sample_state
 from tests.helpers import naive
+from tests.helpers.lattices import simple_cubic
 from tests.helpers.naive_bodies import NaiveBodies
-from tests.helpers.packed import along_x, cubic_grid, sample_of
+from tests.helpers.packed import along_x, sample_of
 
 A, B, C, D = (VARIANTS[name] for name in "abcd")
 
@@ -128,7 +129,7 @@ def test_places_do_not_suffer_from_the_unit():
 def test_a_clump_of_many_spheres_that_flew_away_is_one_grain_that_did():
     clump = np.array([30.0, 2.0, 2.0]) + 0.1 * np.random.default_rng(0).random((40, 3))
     number = np.concatenate([np.full(216, -1), np.full(40, 7)])
-    sample = grains(np.vstack([cubic_grid(6), clump]), number, 0.5)
+    sample = grains(np.vstack([simple_cubic(6).position, clump]), number, 0.5)
     assert np.flatnonzero(~sample.gathered).tolist() == list(range(216, 256))
 
 

@@ -89,8 +89,9 @@ def assert_equals_naive(medium, normal, offset, spacing, cutoff):
             fast.append(tallies_of(medium, normal, offset, spacing, cutoff))
     for which, kept in enumerate([np.ones(len(medium.radius), bool), ~medium.removed]):
         grains = medium.position[kept], medium.radius[kept], medium.vectors, medium.periodic
-        gaps = [naive.periodic_gaps(*grains, foot, normal, measured) for foot in feet]
-        long_enough = [gap for line in gaps for gap in line if gap >= max(cutoff, 1e-300)]
+        gaps = [naive.periodic_segments(*grains, foot, normal, measured) for foot in feet]
+        lengths = [one.length for line in gaps for one in line]
+        long_enough = [length for length in lengths if length >= max(cutoff, 1e-300)]
         for tally in fast:
             length = pytest.approx(sum(long_enough), rel=1e-9, abs=1e-9)
             assert tally[which, sweep.KEPT] == len(long_enough)
