@@ -1,5 +1,7 @@
 """Options, columns and notes, each declared once."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import pytest

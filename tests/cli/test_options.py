@@ -1,5 +1,7 @@
 """Options of commands, made of their declarations."""
 
+from __future__ import annotations
+
 import re
 from dataclasses import dataclass
 
