@@ -47,8 +47,6 @@ class ContactList(NamedTuple):
     --------
     >>> from scanfab import ContactList, Packing
     >>> listed = ContactList([[0, 1]], force=[[2.0, 0.0, 0.0]])
-    >>> listed
-    ContactList: 1 contact from file, with forces
     >>> Packing([[0, 0, 0], [2, 0, 0]], 1.0, contacts=listed).contacts.force
     array([[2., 0., 0.]])
     """
@@ -58,12 +56,6 @@ class ContactList(NamedTuple):
     force: npt.ArrayLike | None = None
     source: ContactSource = "file"
     force_n: npt.ArrayLike | None = None
-
-    def __repr__(self) -> str:
-        has = "" if self.image is None else ", with images"
-        forces = _spelt_forces(self.force, self.force_n)
-        number = counted(len(np.asarray(self.pairs)), "contact")
-        return f"ContactList: {number} from {self.source}{has}{forces and ', '}{forces}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +118,9 @@ class Contacts:
         str
         """
         whence = "from file" if self.source == "file" else "by geometry"
-        forces = _spelt_forces(self.force, self.force_n)
-        return f"{counted(len(self), 'contact')} {whence}{forces and ' '}{forces}"
+        forces = "" if self.force_n is None else " with normal forces"
+        forces = forces if self.force is None else " with forces"
+        return f"{counted(len(self), 'contact')} {whence}{forces}"
 
     def neighbours(self, bodies: Bodies | None, without: BoolArray | None = None) -> RowArray:
         """
@@ -154,12 +147,6 @@ class Contacts:
             return pairs
         heads = bodies.head[pairs]
         return heads[_first_of_each(heads, bodies.image(pairs, self.image[rows]))]
-
-
-def _spelt_forces(force: object, force_n: object) -> str:
-    if force is not None:
-        return "with forces"
-    return "" if force_n is None else "with normal forces"
 
 
 def branches(

@@ -115,7 +115,11 @@ class Packing:
         if bodies is not None:
             named = cast("bodies", bodies, np.int64, (count,))
             self.bodies = bodies_of(named, self.position, self.radius, cell, self.space)
-        self.wall_contacts: IntArray = _wall_contacts(wall_contacts, count)
+        self.wall_contacts: IntArray = np.broadcast_to(np.int64(0), count)
+        if wall_contacts is not None:
+            self.wall_contacts = cast("wall_contacts", wall_contacts, np.int64, (count,))
+            if np.any(self.wall_contacts < 0):
+                raise PackingError("wall_contacts: expected 0 or more for each grain")
         self.wall_forces: WallForces | None = None
         if wall_forces is not None:
             self.wall_forces = _wall_forces(wall_forces, self.position, cell)
@@ -184,16 +188,6 @@ def _centres(position: npt.ArrayLike, dim: int | None) -> tuple[FloatArray, int]
             flat: FloatArray = cast("position", position, np.float64, (None, 2))
             return np.column_stack([flat, np.zeros(len(flat))]), dim or 2
     return cast("position", position, np.float64, (None, 3)), dim or 3
-
-
-def _wall_contacts(values: npt.ArrayLike | None, count: int) -> IntArray:
-    """Numbers of contacts with walls; 0 for all grains if none are given."""
-    if values is None:
-        return np.broadcast_to(np.int64(0), count)
-    numbers = cast("wall_contacts", values, np.int64, (count,))
-    if np.any(numbers < 0):
-        raise PackingError("wall_contacts: expected 0 or more for each grain")
-    return numbers
 
 
 def _wall_forces(listed: WallForces, position: FloatArray, cell: Cell | None) -> WallForces:
