@@ -3,10 +3,8 @@
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -26,8 +24,8 @@ def script(words: str) -> str:
 
 
 @pytest.fixture
-def start(tmp_path):
-    """Starts a command in a folder, with the program on its path and more variables."""
+def call(tmp_path):
+    """Runs a command to its end in a folder, with the program on its path and more variables."""
     program = tmp_path / "bin" / "scanfab"
     program.parent.mkdir()
     program.write_text(f"#!{sys.executable}\nfrom scanfab.cli.main import main\nmain()\n")
@@ -35,43 +33,15 @@ def start(tmp_path):
     path = f"{program.parent}:{os.environ['PATH']}"
     environment = {**os.environ, "PATH": path, "PYTHONPATH": str(Path(__file__).parents[1])}
 
-    def start(*command: str, **more: str) -> subprocess.Popen[str]:
-        return subprocess.Popen(
-            command, cwd=tmp_path, env={**environment, **more}, start_new_session=True,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-        )  # fmt: skip
-
-    return start
-
-
-@pytest.fixture
-def call(start):
-    """Runs a command to its end."""
-
     def call(*command: str, **more: str) -> str:
-        with start(*command, **more) as process:
-            said = process.communicate()[0]
-        assert process.returncode == 0, said
-        return said
+        done = subprocess.run(
+            command, cwd=tmp_path, env={**environment, **more}, text=True, check=False,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stdout
+        return done.stdout
 
     return call
-
-
-@pytest.fixture
-def interrupt(start, tmp_path):
-    """Starts a command, and sends it and all its children a signal when a file is there."""
-
-    def interrupt(sent: signal.Signals, pattern: str, *command: str, **more: str) -> None:
-        with start(*command, **more) as process:
-            end = time.monotonic() + 60
-            while not any(tmp_path.glob(pattern)):
-                assert time.monotonic() < end
-                time.sleep(0.005)
-            os.killpg(process.pid, sent)
-            process.communicate(timeout=60)
-        assert process.returncode != 0
-
-    return interrupt
 
 
 @pytest.fixture
@@ -95,13 +65,9 @@ def folders(tmp_path):
     return tmp_path / "tests"
 
 
-def test_the_array_of_slurm(call, interrupt, whole, folders):
-    """A task computes the folder of its index, and is submitted again after it was killed."""
+def test_the_array_of_slurm(call, whole, folders):
+    """A task computes the folder of its index."""
     command = "bash", "-c", script("folders=(tests").replace("--boundary type=2 ", "")
-    interrupt(
-        signal.SIGKILL, "tests/*.part", *command,
-        SLURM_CPUS_PER_TASK="1", SLURM_ARRAY_TASK_ID="0",
-    )  # fmt: skip
     for task in range(2):
         call(*command, SLURM_CPUS_PER_TASK="1", SLURM_ARRAY_TASK_ID=str(task))
     call("bash", "-c", script("scanfab merge tests/"))
@@ -110,10 +76,9 @@ def test_the_array_of_slurm(call, interrupt, whole, folders):
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
-def test_the_makefile(call, interrupt, whole, folders, tmp_path):
-    """Interrupted, run to its end; and again when there is another dump."""
+def test_the_makefile(call, whole, folders, tmp_path):
+    """Run to its end; and again when there is another dump."""
     (tmp_path / "Makefile").write_text(script("FOLDERS"), encoding="utf-8")
-    interrupt(signal.SIGINT, "tests/*.part", "make", "-j", "2")
     call("make", "-j", "2")
     assert (tmp_path / "fabric.csv").read_bytes() == whole("tests/dense/", "tests/loose/")
     assert "up to date" in call("make")
