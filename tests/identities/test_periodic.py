@@ -55,15 +55,6 @@ def test_periodic_rv_equals_the_rv_of_the_repeated_packing(spheres, periodic):
     assert_same_tables(here, there)
 
 
-def test_grains_outside_the_cell_reach_into_the_rv(spheres):
-    """Without the images the scan would differ: the comparison above is not empty."""
-    center = np.array([2.01, 2.01, 2.01])
-    here = table(spheres, center)
-    alone = compute(Packing(*spheres), rv_center=tuple(center), **LOOK)
-    assert here["segments"][0] != alone["segments"][0]
-    assert here["solid_fraction"][0] > alone["solid_fraction"][0]
-
-
 def test_rattler_that_reaches_in_through_a_face_is_void_in_d():
     """The only solid of the RV is the image of a grain without contacts."""
     rattler = Spheres(np.array([[5.9, 2.5, 3.5]]), np.array([0.9]))

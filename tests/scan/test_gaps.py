@@ -28,15 +28,6 @@ def gaps_of(solids, **options):
     return scan_gaps(solids, RULE, **{**words, **options})
 
 
-def test_octants_left_out_add_up_to_seven_times_all(solids):
-    gaps = gaps_of(solids)
-    for moment in (1, 2):
-        every = gaps.kept("c", 1, moment)
-        without = [gaps.kept("c", 1, moment, without=block) for block in range(8)]
-        for k in range(2):
-            np.testing.assert_allclose(sum(one[k] for one in without), 7 * every[k], rtol=1e-10)
-
-
 def test_octant_left_out_is_that_of_the_slow_twin(solids):
     """The second moment too: Σ l² and Σ l of the segments with their middle elsewhere."""
     triads, offsets = turned_triads(RULE, line_triads(RULE.axes), 0, 0)
