@@ -124,8 +124,6 @@ class ScannedFrames:
     rows : sequence of mapping, optional
         The rows of this source in the table; by default the first and the last frame of the
         settings are scanned.
-    note : str, optional
-        A sentence for captions on how this scan differs from that of the table.
 
     Raises
     ------
@@ -141,9 +139,9 @@ class ScannedFrames:
     """
 
     def __init__(
-        self, source: Packing | Series, settings: Settings, rows: Rows | None = None, note: str = ""
+        self, source: Packing | Series, settings: Settings, rows: Rows | None = None
     ) -> None:
-        self.source, self.settings, self.note = source, settings, note
+        self.source, self.settings = source, settings
         self.variant = "c" if "c" in settings.variants else settings.variants[0]
         in_window = VARIANTS[self.variant].in_window
         self.rv = settings.rvs[-1] if len(settings.rvs) > 1 and in_window else None

@@ -67,7 +67,7 @@ class Projection(DirectionalFigure):
     def caption(self) -> str:
         """With the size of lobes that chance alone makes."""
         noise = map(noise_note, self.frames, self.deviations)
-        return " ".join(filter(None, [super().caption, *noise, self.data.note]))
+        return " ".join(filter(None, [super().caption, *noise]))
 
     def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> None:
         """Draw disks with one colour bar beside them; curves for discs."""

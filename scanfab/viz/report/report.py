@@ -13,24 +13,20 @@ from typing import Any, NamedTuple
 from scanfab.base.errors import ScanfabError, SettingsError
 from scanfab.base.files import whole_file
 from scanfab.io.families import PathLike
-from scanfab.io.series import Series
 from scanfab.pipeline.options import Told, as_options, listening
 from scanfab.pipeline.record import read_manifest, reopen, repeat_command, restored_settings
-from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import Length
 from scanfab.table.compare import compare_tables
 from scanfab.table.curves import spelt_strain, strain_column
 from scanfab.table.formats import read_rows
 from scanfab.table.row import numbers_of
 from scanfab.table.selection import MAP, check_labels, choose_rows
-from scanfab.viz.figures.figure import make_figures
+from scanfab.viz.figures.figure import Figure, make_figures
 from scanfab.viz.report import tables as words
-from scanfab.viz.report.page import Picture, check_page_file, picture_of, render_page, view_data
+from scanfab.viz.report.page import check_page_file, picture_of, render_page, view_data
 from scanfab.viz.scanned_frames import ScannedFrames
 from scanfab.viz.scene import Look, look_at
 
-# A scan of so many segments takes about half a minute. Pictures that need more are made rougher.
-MOST_SEGMENTS = 3e8
 # columns without which nothing can be said of a map
 OF_MAPS = ("frame", "variant", "alpha_vs_axial")
 
@@ -266,11 +262,15 @@ def show_frames(one: Input, manifest: Mapping[str, Any]) -> dict[str, Any]:
     look = look_at(series, replace(settings, variants="c"), number)
     of_frame = [row for row in rows if row["frame"] == look.number]
     strain = spelt_strain(of_frame[0], strain_column(rows)) if of_frame else ""
+    figures: list[Figure] = []
+    if filled and not one.is_map:
+        figures = make_figures(ScannedFrames(series, settings, rows), "frames")
     return {
         "view": view_data(look.scene, look.axis),
         "view_title": ", ".join(filter(None, [source, f"frame {look.number}", strain])),
         "facts": _facts(look),
-        "pictures": _pictures(rows, series, settings) if filled and not one.is_map else [],
+        # pixels, as the coloured disks are pixels anyway
+        "pictures": [picture_of(figure, "png") for figure in figures if not figure.slow],
     }
 
 
@@ -299,23 +299,3 @@ def _facts(look: Look) -> list[tuple[str, str]]:
 
 def _numbers(vector: Any) -> str:
     return ", ".join(f"{part:.4g}" for part in vector)
-
-
-def _pictures(rows: list[dict[str, Any]], series: Series, settings: Settings) -> list[Picture]:
-    """Figures of the first and the last frame, from one scan."""
-    # the least tolerance of a row, which may follow from the sample's error
-    errors = numbers_of(rows, "alpha_vs_axial_sample_se")
-    tolerance = asked = settings.aim(min(errors, default=None))
-    if settings.spacing is None or settings.directions is None:
-        # rougher, so that the scan is short enough to wait for
-        most = max(numbers_of(rows, "segments"), default=0.0)
-        tolerance *= max(1.0, most / MOST_SEGMENTS) ** 0.5
-    rougher = (
-        f"Scanned to a standard error of {tolerance:.2g} instead of the table's {asked:.2g}, which "
-        f"would take too long for a picture."
-    )
-    told = rougher if tolerance > asked else ""
-    frames = ScannedFrames(series, replace(settings, tolerance=tolerance), rows, told)
-    # drawn as pixels, as the coloured disks are pixels anyway
-    figures = [figure for figure in make_figures(frames, "frames") if not figure.slow]
-    return [picture_of(figure, "png") for figure in figures]

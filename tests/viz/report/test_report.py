@@ -249,13 +249,6 @@ def test_an_rv_is_a_part_of_the_sample_without_grains_that_flew_away(tmp_path, p
     assert float(radius) == pytest.approx(0.6 * 6 / 2, rel=0.1)
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_a_scan_that_takes_too_long_for_a_picture_is_rougher_and_labelled(copied, monkeypatch):
-    monkeypatch.setattr("scanfab.viz.report.report.MOST_SEGMENTS", 1e4)
-    rougher = r"Scanned to a standard error of 0\.\d+ instead of the table's 0\.0005"
-    assert re.search(rougher, words_of(page_of([copied])))
-
-
 def test_lobes_that_are_noise_are_called_so(page):
     of_voids = r"Frame \d: (lobes of void lengths .*?); lobes of contact"
     first, last = re.findall(of_voids, words_of(page))
