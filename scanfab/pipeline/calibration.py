@@ -199,10 +199,7 @@ class _OneFrame:
         except NoChosenFrameError:
             raise SettingsError(f"frame: there is no frame {frame}: {frames.extent()}") from None
         # the first frame of the series that has grains makes the plan
-        first = frames.reference()
-        if first is None:
-            raise PackingError("no frame has grains, so there is nothing to calibrate")
-        number, _, self.first = first
+        number, _, self.first = frames.reference()
         sample = self.first if number == self.number else frames.sample(self.number, wanted)
         if sample is None or not sample.grains.any():
             raise PackingError(f"frame {self.number} has no grains: choose another frame")

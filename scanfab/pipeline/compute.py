@@ -235,12 +235,9 @@ def compute_frames(
         raise unusable("executor", "a concurrent.futures.Executor", executor)
     frames = Frames(source, settings)
     with collected() as told:
-        found = frames.reference()
-    if found is None:
-        next(frames.due())  # raises another error if there is no frame at all
-        raise PackingError(f"{frames.name or 'the source'}: no frame has any grains")
-    plan, first = make_plan(settings, found[2]), found[2]
-    reference = found[0], float(first.packing.radius[first.grains].min())
+        number, _, first = frames.reference()
+    plan = make_plan(settings, first)
+    reference = number, float(first.packing.radius[first.grains].min())
     tell(plan.notes)
     notes = notes or SeriesNotes(frames.settings)
     own = ThreadPoolExecutor(settings.workers)

@@ -171,11 +171,11 @@ class Frames:
                 return number, frame
         raise self.no_such_frames()
 
-    def reference(self) -> tuple[int, Unread, Sample] | None:
+    def reference(self) -> tuple[int, Unread, Sample]:
         """
         The frame that lengths come from: the one that the user names, else the first with grains.
 
-        It need not be chosen. None if no frame has any grains.
+        It need not be chosen.
 
         Raises
         ------
@@ -183,6 +183,8 @@ class Frames:
             If the frame that the user names does not exist or has no grains.
         SettingsError
             If no frame has boundary particles, or all particles are boundary.
+        PackingError
+            If no frame has any grains.
         ReadError
             If the frame that the user names cannot be read.
         """
@@ -211,7 +213,8 @@ class Frames:
             named = " or ".join(rule.text for rule in self.settings.boundary)
             what = f"{named} selects all particles of every frame"
             raise SettingsError(f"boundary: {what}: no grain is left")
-        return None
+        next(self.due())  # raises another error if there is no frame at all
+        raise PackingError(f"{self.name or 'the source'}: no frame has any grains")
 
     def sample(self, number: int, frame: Unread) -> Sample | None:
         """The sample of a frame; None if the frame is damaged and damaged frames are skipped."""

@@ -109,8 +109,8 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[Row]:
     # the RV is reported whatever the variants
     frames, any_chosen = Frames(series, replace(settings, variants="c")), False
     window: Window | None = None
-    if settings.reference is not None and (reference := frames.reference()) is not None:
-        window = _rv(frames, reference[2])
+    if settings.reference is not None:
+        window = _rv(frames, frames.reference()[2])
     for number, frame in enumerate(series.whole):
         is_chosen = number in frames.chosen
         any_chosen |= is_chosen

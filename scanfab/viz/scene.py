@@ -78,8 +78,6 @@ class Scene:
     """A few scan lines, in the dump's coordinates."""
     cutoff: float = 0.0
     """Shorter void segments are dropped, dump's unit."""
-    cell: Cell | None = None
-    """The cell of a periodic frame."""
     space: Space = SPACE
     """The plane of the grains if they are discs."""
 
@@ -104,10 +102,9 @@ class Look:
     sample: Sample
     strain: str
     """Its strain since the reference frame, in words; empty if it is not known."""
-    first: Sample | None
+    first: Sample
     """The reference frame, which fixes all lengths of the series."""
-    plan: Plan | None
-    """None if no frame has grains."""
+    plan: Plan
     axis: Vector
     """Loading axis, a unit vector."""
 
@@ -128,28 +125,31 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     Raises
     ------
     ScanfabError
-        If there is no such frame, it cannot be read, or the settings do not fit the series.
+        If there is no such frame, it cannot be read, no frame has grains, or the settings do not
+        fit the series.
     """
     # damaged frames are skipped; only a damaged frame that is asked for is an error
     frames = Frames(series, replace(settings, on_error="skip"))
     frame = series[number]
     sample = sample_of(frame, settings)
     tell(doubts_of_frame(frame, sample, settings))
-    found = frames.reference()
-    if found is None:
-        return Look(scene_of(sample), frame.number, sample, "", None, None, settings.axis)
-    plan = make_plan(settings, found[2])
+    _, _, first = frames.reference()
+    plan = make_plan(settings, first)
     tell(plan.notes)
     strains = plan.strains.at(frame.number, sample)
     strain = spelt_strain(strains, frame_strain_column(strains))
     if sample.grains.any():
         plan = plan.in_frame(sample)
-    scene = about_window(replace(scene_of(sample, *plan.windows), cutoff=plan.cutoff))
-    return Look(scene, frame.number, sample, strain, found[2], plan, plan.settings.axis)
+    scene = scene_of(sample, *plan.windows, cutoff=plan.cutoff)
+    return Look(scene, frame.number, sample, strain, first, plan, plan.settings.axis)
 
 
-def scene_of(sample: Sample, *windows: Window) -> Scene:
-    """The grains of a frame and its RVs, in ascending order, about one centre."""
+def scene_of(sample: Sample, *windows: Window, cutoff: float = 0.0) -> Scene:
+    """
+    The grains of a frame and its RVs, in ascending order, about one centre.
+
+    Grains of a periodic frame lie at their images next to the centre of the RVs.
+    """
     packing, window = sample.packing, windows[-1] if windows else None
     center = np.zeros(3) if window is None else window.center
     if window is None and len(packing):
@@ -157,13 +157,11 @@ def scene_of(sample: Sample, *windows: Window) -> Scene:
         center = packing.position[chosen].mean(axis=0)
         if packing.space.across is not None:
             center[packing.space.across] = packing.place_across
-    return Scene(
-        grains_of(sample, window),
-        center,
-        tuple(one.shape for one in windows),
-        cell=packing.cell if packing.is_periodic else None,
-        space=packing.space,
-    )
+    grains = grains_of(sample, window)
+    if window is not None and packing.cell is not None:
+        grains = _about(window, grains, packing.cell)
+    shapes = tuple(one.shape for one in windows)
+    return Scene(grains, center, shapes, cutoff=cutoff, space=packing.space)
 
 
 def grains_of(sample: Sample, window: Window | None) -> Grains:
@@ -189,34 +187,30 @@ def inside(points: FloatArray, sample: Sample, window: Window | None) -> BoolArr
     return window.contains(points, sample.packing)
 
 
-def about_window(scene: Scene) -> Scene:
+def _about(window: Window, grains: Grains, cell: Cell) -> Grains:
     """
     Move every grain of a periodic frame to its image next to the RV's centre.
 
     Otherwise faces of the cell would cut the RV, and clumps, into pieces. Further images that reach
     into the RV are added.
     """
-    cell, grains = scene.cell, scene.grains
-    if cell is None or scene.window is None:
-        return scene
-    branch = grains.position - scene.center
-    nearest = branch + cell.nearest_image(grains.places - scene.center) @ cell.vectors
-    images, row = cell.images_near_origin(branch, grains.radius + scene.window.reach)
+    branch = grains.position - window.center
+    nearest = branch + cell.nearest_image(grains.places - window.center) @ cell.vectors
+    images, row = cell.images_near_origin(branch, grains.radius + window.radius)
     other = np.linalg.norm(images - nearest[row], axis=1) > 1e-6 * grains.radius[row]
     rows = np.concatenate([np.arange(len(nearest)), row[other]])
     taken = {name: values[rows] for name, values in vars(grains).items() if values is not None}
-    taken["position"] = np.concatenate([nearest, images[other]]) + scene.center
+    taken["position"] = np.concatenate([nearest, images[other]]) + window.center
     moved = replace(grains, **taken)
-    moved.in_window[:] = scene.window.contains(moved.places - scene.center)
-    return replace(scene, grains=moved)
+    moved.in_window[:] = window.shape.contains(moved.places - window.center)
+    return moved
 
 
 def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
     """
     Parallel scan lines, inclined to the axis, in a plane through the centre that holds the axis.
 
-    In the dump's coordinates; clipped to the RV, if there is one. The scene of a periodic sample
-    must hold the images that reach into the RV, as :func:`about_window` adds them.
+    In the dump's coordinates; clipped to the RV, if there is one.
     """
     grains, solid = scene.grains, ~scene.grains.boundary
     up = np.asarray(axis, dtype=np.float64)

@@ -85,7 +85,7 @@ LINES = [
     ("compute notes", 1, "no reader knows this format"),
     ("compute cube --spacing 50 -o out.csv", 1, "spacing: expected a length from"),
     ("calibrate one", 1, "variant c has no void fabric at any cut-off"),
-    ("calibrate none", 1, "no frame has grains, so there is nothing to calibrate"),
+    ("calibrate none", 1, "no frame has any grains"),
     ("view cube --screenshot x.png --frame 9", 1, "there is no frame 9"),
     # what is of space, of discs
     ("compute {DISCS} --axis 0,1,1", 2, "--axis: the axis (0, 0.7071, 0.7071) leads out of"),

@@ -138,8 +138,12 @@ def test_the_title_names_the_frame_and_its_strain(view, monkeypatch, scenes, wor
     assert [one[2] for one in scenes] == [f"{words[0]}, {title.format(shear=shear)}"]
 
 
-def test_a_frame_without_grains_is_shown_as_such(tmp_path, view, scenes):
-    view(write(tmp_path / "dump_1.txt", dump_text([])), "--cut")
+def test_a_frame_without_grains_is_shown_as_such(tmp_path, view, scenes, ask):
+    empty = write(tmp_path / "dump_0.txt", dump_text([]))
+    told = ask("view", empty, "--screenshot", tmp_path / "x.png", code=1).err
+    assert "no frame has any grains" in told
+    write(tmp_path / "dump_1.txt", dump_text(cubic_rows(), step=1))
+    view(tmp_path, "--cut")
     assert scenes[0][2].endswith("frame 0, no grains")
 
 

@@ -12,7 +12,6 @@ from scanfab.viz.report.page import MOST_GRAINS, view_data
 from scanfab.viz.scene import (
     Grains,
     Scene,
-    about_window,
     grains_of,
     look_at,
     scene_of,
@@ -81,7 +80,7 @@ def test_a_section_cuts_periodic_images_too():
     """A crystal looks the same about each of its grains, also one at the corner of the cell."""
     sample = sample_of(scanfab.Packing(*simple_cubic(4), cell=scanfab.Cell([4.0, 4.0, 4.0])))
     middle, corner = (
-        section_lines(about_window(scene_of(sample, Window(np.array(one), sphere(1.6)))), (0, 0, 1))
+        section_lines(scene_of(sample, Window(np.array(one), sphere(1.6))), (0, 0, 1))
         for one in ([2.5, 2.5, 2.5], [0.5, 3.5, 0.5])
     )
     np.testing.assert_allclose(np.sort(corner.length), np.sort(middle.length), atol=1e-9)
@@ -106,7 +105,7 @@ def test_grains_of_clumps_have_their_numbers_and_places_and_are_seen_whole():
     np.testing.assert_allclose(grains.places[:, 0], [10.2, 0.2, 4.6, 4.6, 2.6])
     # next to a window
     window = Window(np.array([4.7, 5.0, 5.0]), sphere(2.0))
-    grains = about_window(scene_of(sample, window)).grains
+    grains = scene_of(sample, window).grains
     assert len(np.unique(grains.position, axis=0)) == len(grains.position)
     first = grains.position[grains.body == 3]
     assert np.ptp(first[:, 0]) == pytest.approx(1.2)

@@ -277,8 +277,6 @@ def show_frames(one: Input, manifest: Mapping[str, Any]) -> dict[str, Any]:
 def _facts(look: Look) -> list[tuple[str, str]]:
     """The sample in numbers."""
     first, plan = look.first, look.plan
-    if first is None or plan is None:
-        return []
     radii, boundary = first.packing.radius[first.grains], first.number(first.boundary)
     smallest, mean = float(radii.min()), float(radii.mean())
     axis = [name for name, part in zip("xyz", look.axis, strict=True) if part == 1.0]
