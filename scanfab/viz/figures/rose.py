@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -44,8 +43,7 @@ AROUND = np.linspace(0, 360, 181)
 BARS = {"voids": "of the scan", "contacts": "of a count of contacts"}
 
 
-@dataclass(frozen=True, eq=False)
-class Ring:
+class Ring(NamedTuple):
     """Values around one polar angle, relative to the mean over all directions."""
 
     theta: FloatArray
@@ -53,27 +51,23 @@ class Ring:
     value: FloatArray
     error: FloatArray
     """Standard error."""
-    curve: Callable[[FloatArray], FloatArray] | None = None
-    """A smooth curve beside the values, as a function of the azimuth in degrees."""
+    curve: FloatArray | None = None
+    """A smooth curve beside the values, at the azimuths ``AROUND``."""
 
     @property
     def reach(self) -> float:
         """Largest distance of values with errors, and of the curve, from 1; at least 0.02."""
         far = np.abs(self.value - 1.0) + np.nan_to_num(self.error)
-        curve = np.ones(1) if self.curve is None else self.curve(AROUND)
+        curve = np.ones(1) if self.curve is None else self.curve
         return max(0.02, float(np.nanmax(far, initial=0.0)), float(np.abs(curve - 1.0).max()))
 
     def draw(self, axes: Axes, look: Mapping[str, Any]) -> None:
-        """Draw values with bars on polar Axes, along the smooth curve or along a closed line."""
-        theta, value, error, line = self.theta, self.value, self.error, "none"
+        """Draw values with bars on polar Axes, and the smooth curve, or else a line through all."""
+        style = {**look, "elinewidth": 0.5, "capsize": 0}
         if self.curve is not None:
-            axes.plot(np.radians(AROUND), self.curve(AROUND), color=look["color"], ls=look["ls"])
-        else:
-            # the first point follows the last one, so that the line is closed
-            theta, value, error = (np.append(a, a[:1]) for a in (theta, value, error))
-            line = look["ls"]
-        style = {**look, "ls": line, "elinewidth": 0.5, "capsize": 0}
-        axes.errorbar(np.radians(theta), value, error, **style)
+            axes.plot(np.radians(AROUND), self.curve, color=look["color"], ls=look["ls"])
+            style["ls"] = "none"
+        axes.errorbar(np.radians(self.theta), self.value, self.error, **style)
 
 
 class Rose(DirectionalFigure):
@@ -158,12 +152,15 @@ class Rose(DirectionalFigure):
     def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> float:
         """Draw rings about 1 at the polar angles; gives back the reach of the scale from 1."""
         looks = self.looks
-        rings_of = void_rings if kind == "voids" else contact_rings
-        every = [rings_of(one, list(looks)) for one in frames]
+        if kind == "voids":
+            every = [[void_ring(one, phi) for phi in looks] for one in frames]
+        else:
+            # without contacts there is no ring
+            each = [one.normals for one in frames]
+            every = [[contact_ring(n, phi, self.space) for phi in looks if len(n)] for n in each]
         reach = max((ring.reach for rings in every for ring in rings), default=0.02)
         middle, circles = _scale(reach)
         for axes, rings in zip(column, every, strict=True):
-            # without contacts there is no ring
             for ring, look in zip(rings, looks.values(), strict=False):
                 ring.draw(axes, look)
             axes.plot(np.radians(AROUND), np.ones_like(AROUND), color="0.4", lw=0.6)
@@ -207,44 +204,39 @@ def _scale(reach: float) -> tuple[float, list[float]]:
     return middle, [one for one in (1.0 - step, 1.0, 1.0 + step) if one > middle]
 
 
-def void_rings(frame: ScannedFrame, angles: Sequence[float]) -> list[Ring]:
-    """Mean void lengths of a frame, at some polar angles in degrees."""
+def void_ring(frame: ScannedFrame, phi: float) -> Ring:
+    """Mean void lengths of a frame around a polar angle in degrees; the first one is repeated."""
     # loaded here, as other figures do without compiled kernels
     from scanfab.scan.directions import DirectionRule
     from scanfab.scan.gaps import scan_gaps
 
-    measured, variant, plan = frame.measurement, frame.variant, frame.measurement.plan
+    measured, plan = frame.measurement, frame.measurement.plan
+    around = np.arange(0.0, 361.0, THETA_STEP)
     # at the equator θ and θ + 180° are one line
-    thetas = [np.arange(0.0, 180.0 if phi == 90 else 360.0, THETA_STEP) for phi in angles]
-    axes = np.concatenate([_vectors(*one, plan.space) for one in zip(thetas, angles, strict=True)])
-    weights = np.full(len(axes), 1 / len(axes))
+    theta = around[around < (180.0 if phi == 90 else 360.0)]
+    axes, weights = _vectors(theta, phi, plan.space), np.full(len(theta), 1 / len(theta))
+    every, counts = measured.kept(frame.variant)
     # the spacing that gives the wanted number of segments
-    segments = measured.sums.kept(variant)[1].mean()
+    wider = plan.space.apart(measured.sums.kept(frame.variant)[1].mean() * REPLICATES / SEGMENTS)
     rose = scan_gaps(
         measured.solids,
         DirectionRule("rose", axes, weights, None, turned=False, space=plan.space),
-        spacing=float(plan.spacing * plan.space.apart(segments * REPLICATES / SEGMENTS)),
+        spacing=float(plan.spacing * wider),
         cutoffs=[plan.cutoff],
         blocks=measured.blocks,
-        variants=variant,
+        variants=frame.variant,
         replicates=range(REPLICATES),
         seed=plan.settings.seed,
         workers=plan.workers,
         most_steps=plan.max_chords,
     )
-    lengths, numbers = rose.kept(variant, 0, plan.settings.moment)
-    every, counts = measured.kept(variant)
+    lengths, numbers = rose.kept(frame.variant, 0, plan.settings.moment)
     mean = every.sum() / counts.sum()
     with np.errstate(invalid="ignore", divide="ignore"):
-        values = lengths.sum(axis=0) / numbers.sum(axis=0) / mean
-        errors = np.nanstd(lengths / numbers, axis=0, ddof=1) / mean / np.sqrt(REPLICATES)
-    found, ends = [], np.cumsum([len(theta) for theta in thetas])[:-1]
-    each = zip(angles, thetas, np.split(values, ends), np.split(errors, ends), strict=True)
-    for phi, theta, value, error in each:
-        turns = 2 if phi == 90 else 1
-        around = np.concatenate([theta + 180.0 * turn for turn in range(turns)])
-        found.append(Ring(around, np.tile(value, turns), np.tile(error, turns)))
-    return found
+        value = lengths.sum(axis=0) / numbers.sum(axis=0) / mean
+        error = np.nanstd(lengths / numbers, axis=0, ddof=1) / mean / np.sqrt(REPLICATES)
+    place = np.arange(len(around)) % len(theta)
+    return Ring(around, value[place], error[place])
 
 
 def _vectors(theta: FloatArray, phi: float, space: Space) -> FloatArray:
@@ -253,12 +245,6 @@ def _vectors(theta: FloatArray, phi: float, space: Space) -> FloatArray:
     flat, basis = np.sin(polar), np.eye(3)[sorted(space.along)]
     parts = [flat * np.cos(azimuth), flat * np.sin(azimuth), np.full(len(theta), np.cos(polar))]
     return np.column_stack(parts[: len(basis)]) @ basis
-
-
-def contact_rings(frame: ScannedFrame, angles: Sequence[float]) -> list[Ring]:
-    """The :func:`contact_ring` at some polar angles; none if there are no contacts."""
-    normals = frame.normals
-    return [contact_ring(normals, phi, frame.space) for phi in angles if len(normals)]
 
 
 def contact_ring(normals: FloatArray, phi: float, space: Space = SPACE) -> Ring:
@@ -282,12 +268,8 @@ def contact_ring(normals: FloatArray, phi: float, space: Space = SPACE) -> Ring:
     expected = 2 * len(normals) * share * CONTACT_STEP / 360.0
     tensor = contact_fabric(normals, space)
     assert tensor is not None
+    directions = _vectors(AROUND, phi, space)
     deviator = fabric_deviator(tensor.matrix, space)
-
-    def density(theta: FloatArray) -> FloatArray:
-        directions = _vectors(theta, phi, space)
-        values: FloatArray = 1 + np.einsum("ni,ij,nj->n", directions, deviator, directions)
-        return values
-
+    density = 1 + np.einsum("ni,ij,nj->n", directions, deviator, directions)
     middle = 0.5 * (edges[1:] + edges[:-1])
     return Ring(middle, count / expected, np.sqrt(count) / expected, density)

@@ -209,7 +209,7 @@ def test_rings_and_density_of_isotropic_normals_are_one():
         ring = contact_ring(normals, phi)
         assert np.all(np.abs(ring.value - 1) < 5 * ring.error)
         assert ring.value.mean() == pytest.approx(1, abs=0.02)
-        assert ring.curve(ring.theta) == pytest.approx(1, abs=0.02)
+        assert ring.curve == pytest.approx(1, abs=0.02)
     assert projection.smoothed_density(normals, DENSITY) == pytest.approx(1, abs=0.02)
 
 
