@@ -95,6 +95,8 @@ class ScannedFrame:
         sample = result.sample
         self.smallest = float(sample.packing.radius[sample.grains].min())
         """The radius of the smallest grain, dump's unit."""
+        self.cutoff = self.measurement.plan.cutoff / self.smallest
+        """The cut-off, in units of that radius."""
 
     @property
     def spheres(self) -> tuple[FloatArray, FloatArray, Convex | None]:

@@ -15,7 +15,7 @@ from scanfab.table.curves import ABSCISSAS, abscissa, have_errors, is_turned
 from scanfab.table.row import numbers_of
 from scanfab.table.table import Table
 from scanfab.viz.figures.curves import ROW, Curves, Drawn, Group, Quantity, group_of, groups_of
-from scanfab.viz.figures.figure import Figure, one_of
+from scanfab.viz.figures.figure import Figure, shown_of
 from scanfab.viz.figures.style import CONTACT, LABELS, NAMES, VOID, WIDTH, widen
 
 ANGLE = Quantity("coaxiality_deg", "coaxiality, degrees")
@@ -65,7 +65,7 @@ class Evolution(Curves):
 
     def __init__(self, data: Table, of: str | None = None) -> None:
         self.turned = is_turned(data)
-        self.of = one_of(of, ("voids", "contacts"))
+        self.of = shown_of(of, ("voids", "contacts"))
         self.has_angle = self.turned and not self.share and of is None
         chosen = [self._quantity(name) for name in self.of]
         super().__init__(data, [*chosen, *[ANGLE] * self.has_angle])

@@ -13,6 +13,7 @@ import numpy as np
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.files import whole_file
+from scanfab.base.option import one_of
 from scanfab.table.plots import figures_of
 from scanfab.table.table import Table
 from scanfab.viz.figures import style
@@ -159,6 +160,11 @@ class FrameFigure(Figure):
         """With the variant and the source, if ``drawn`` is set."""
         return f"{self.drawn}, {self.data.name}{self.more}." if self.drawn else super().caption
 
+    @cached_property
+    def frames(self) -> list[ScannedFrame]:
+        """The frames that are drawn."""
+        return self.chosen(self.data.frames)
+
     def chosen(self, frames: list[ScannedFrame]) -> list[ScannedFrame]:
         """All of the frames, or the one that the option ``frame`` names."""
         found = [one for one in frames if self.frame in (None, one.number)]
@@ -184,12 +190,7 @@ class DirectionalFigure(FrameFigure):
 
     def __init__(self, data: Any, frame: int | None = None, of: str | None = None) -> None:
         super().__init__(data, frame)
-        self.of = one_of(of, tuple(style.DIRECTIONAL))
-
-    @cached_property
-    def frames(self) -> list[ScannedFrame]:
-        """The frames that are drawn."""
-        return self.chosen(self.data.frames)
+        self.of = shown_of(of, tuple(style.DIRECTIONAL))
 
     def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> Any:
         """Draw voids or contacts of frames on panels with one scale; gives back the scale."""
@@ -218,11 +219,9 @@ class DirectionalFigure(FrameFigure):
         return scales
 
 
-def one_of(which: str | None, known: tuple[str, ...]) -> tuple[str, ...]:
+def shown_of(of: str | None, known: tuple[str, ...]) -> tuple[str, ...]:
     """The panels to draw: all, or the one that the option ``of`` chooses."""
-    if which not in (None, *known):
-        raise SettingsError(f"of: expected {' or '.join(known)}, found {which!r}")
-    return known if which is None else (which,)
+    return known if of is None else (one_of(*known)("of", of),)
 
 
 def find_figure(text: str, *kinds: str) -> tuple[type[Figure], dict[str, Any]]:

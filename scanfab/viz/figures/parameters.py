@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase
 
-from scanfab.base.errors import SettingsError
+from scanfab.base.option import one_of
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.distribution import direction_points
 from scanfab.table.curves import short_names
@@ -77,21 +77,20 @@ class Histogram(OnePanel):
     @cached_property
     def lengths(self) -> list[FloatArray]:
         """Lengths of void segments of each frame, in units of its smallest radius."""
-        return [_lengths_of(one) for one in self.chosen(self.data.frames)]
+        return [_lengths_of(one) for one in self.frames]
 
     def draw(self, ax: Axes) -> None:
         """Draw the density of the lengths; lengths below the cut-off are on grey."""
         longest = max(float(np.quantile(length, 0.999)) for length in self.lengths)
-        edges, frames = np.linspace(0, longest, 41), self.chosen(self.data.frames)
-        for frame, length, look in zip(frames, self.lengths, style.FRAME_LOOKS, strict=False):
+        edges, each = np.linspace(0, longest, 41), zip(self.frames, self.lengths, strict=True)
+        for (frame, length), look in zip(each, style.FRAME_LOOKS, strict=False):
             density, _ = np.histogram(length, edges, density=True)
-            # in a later frame the smallest grain may be another one; the last cut-off is drawn
-            cutoff = frame.measurement.plan.cutoff / frame.smallest
-            label = f"{frame.title}:\n{100 * np.mean(length < cutoff):.0f} % dropped"
+            label = f"{frame.title}:\n{100 * np.mean(length < frame.cutoff):.0f} % dropped"
             line: dict[str, Any] = {"color": look["color"], "ls": look["ls"], "lw": 1.1}
             ax.stairs(density, edges, baseline=None, label=label, **line)
-        ax.axvspan(0, cutoff, color="0.92", zorder=0)
-        ax.axvline(cutoff, color="k", lw=0.9, ls=":", label="cut-off")
+        # in a later frame the smallest grain may be another one; the last cut-off is drawn
+        ax.axvspan(0, frame.cutoff, color="0.92", zorder=0)
+        ax.axvline(frame.cutoff, color="k", lw=0.9, ls=":", label="cut-off")
         ax.set(yscale="log", xlim=(0, longest), ylabel="probability density")
         ax.set(xlabel=r"void segment length / $r_{min}$")
         ax.legend()
@@ -109,21 +108,6 @@ def _lengths_of(frame: ScannedFrame) -> FloatArray:
     found = sample_segments(position, radius, triads, LINES, window, frame.space)
     lengths: FloatArray = found.length[found.void] / frame.smallest
     return lengths
-
-
-class CutoffCurve(NamedTuple):
-    """Void anisotropy of one frame over the cut-off."""
-
-    title: str
-    chosen: float
-    """The cut-off of the table, in units of the smallest radius."""
-    rows: list[dict[str, Any]]
-    """
-    A row for each cut-off, with the columns of the table.
-
-    ``value`` is the cut-off in units of the smallest radius, ``predicted`` the alpha_vs_axial that
-    near contacts predict.
-    """
 
 
 class Cutoffs(OnePanel):
@@ -152,19 +136,25 @@ class Cutoffs(OnePanel):
     more = ", with total standard errors"
 
     @cached_property
-    def curves(self) -> list[CutoffCurve]:
-        """What is drawn of each frame."""
-        return [_curve_of(one) for one in self.chosen(self.data.frames)]
+    def curves(self) -> list[list[dict[str, Any]]]:
+        """
+        The rows of each frame, one for each cut-off, with the columns of the table.
+
+        ``value`` is the cut-off in units of the smallest radius, ``predicted`` the alpha_vs_axial
+        that near contacts predict.
+        """
+        return [_curve_of(one) for one in self.frames]
 
     def draw(self, ax: Axes) -> None:
         """Draw a curve for each frame, and the cut-off of the table."""
-        for one, look in zip(self.curves, style.FRAME_LOOKS, strict=False):
-            draw_alpha(ax, one.rows, look, one.title)
-            x, predicted = (column_of(one.rows, name) for name in ("value", "predicted"))
+        each = zip(self.frames, self.curves, strict=True)
+        for (frame, rows), look in zip(each, style.FRAME_LOOKS, strict=False):
+            draw_alpha(ax, rows, look, frame.title)
+            x, predicted = (column_of(rows, name) for name in ("value", "predicted"))
             ax.plot(x, 1e3 * predicted, color=look["color"], lw=1.2, ls="-.")
-        if any(numbers_of(one.rows, "predicted") for one in self.curves):
+        if any(numbers_of(rows, "predicted") for rows in self.curves):
             ax.plot([], [], color="0.3", lw=1.2, ls="-.", label="predicted from near contacts")
-        ax.axvline(self.curves[-1].chosen, color="k", lw=0.9, ls=":", label="cut-off of the table")
+        ax.axvline(frame.cutoff, color="k", lw=0.9, ls=":", label="cut-off of the table")
         ax.axhline(0, color="0.6", lw=0.6, zorder=0)
         ax.set(xlabel=r"cut-off / $r_{min}$", ylabel=style.LABELS[ALPHA])
         style.widen(ax, 1.0)
@@ -178,21 +168,19 @@ def draw_alpha(ax: Axes, rows: Sequence[Any], look: dict[str, Any], label: str) 
     ax.errorbar(x, 1e3 * alpha, 1e3 * np.nan_to_num(scan), label=label, elinewidth=0.9, **look)
 
 
-def _curve_of(frame: ScannedFrame) -> CutoffCurve:
+def _curve_of(frame: ScannedFrame) -> list[dict[str, Any]]:
     """The lines of the table at other cut-offs, and at its own."""
     # loaded here, as other figures do without compiled kernels
     from scanfab.packing.sample import VARIANTS
     from scanfab.pipeline.frame import VariantColumns
 
-    smallest, chosen = frame.smallest, frame.measurement.plan.cutoff
-    lengths = sorted({*(cutoff * smallest for cutoff in CUTOFFS), chosen})
+    lengths = sorted({*(one * frame.smallest for one in CUTOFFS), frame.measurement.plan.cutoff})
     measured, variant = frame.measurement.at_cutoffs(lengths), VARIANTS[frame.variant]
     each = [VariantColumns(measured, variant, place) for place in range(len(lengths))]
-    rows = [
-        {**one.columns(), "value": length / smallest, "predicted": one.predicted_alpha}
+    return [
+        {**one.columns(), "value": length / frame.smallest, "predicted": one.predicted_alpha}
         for one, length in zip(each, lengths, strict=True)
     ]
-    return CutoffCurve(frame.title, chosen / smallest, rows)
 
 
 class Ladders(Figure):
@@ -220,9 +208,7 @@ class Ladders(Figure):
 
     def __init__(self, data: Sequence[Any], ladder: str = "spacing") -> None:
         super().__init__(data)
-        if ladder not in PANELS:
-            raise SettingsError(f"ladder: expected {', '.join(PANELS)}, found {ladder!r}")
-        self.ladder = ladder
+        self.ladder = one_of(*PANELS)("ladder", ladder)
 
     def draw(self, ax: Axes) -> None:
         """Draw the chosen ladder."""

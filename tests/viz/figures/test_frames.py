@@ -274,9 +274,9 @@ def test_lengths_have_the_mean_of_the_table(figures, computed):
         assert mean == pytest.approx(row["mean_length"] / row["cutoff"], rel=0.03)
 
 
-def assert_bands_are_wider_than_bars(curve):
-    total = total_errors(curve.rows, "alpha_vs_axial")
-    assert np.all(total > column_of(curve.rows, "alpha_vs_axial_se"))
+def assert_bands_are_wider_than_bars(rows):
+    total = total_errors(rows, "alpha_vs_axial")
+    assert np.all(total > column_of(rows, "alpha_vs_axial_se"))
 
 
 def test_cut_offs_have_the_values_and_errors_of_the_table(figures, computed):
@@ -285,10 +285,9 @@ def test_cut_offs_have_the_values_and_errors_of_the_table(figures, computed):
     ax = figure.on(Figure().subplots())
     for curve, line, frame in zip(figure.curves, points_of(ax), (0, 6), strict=True):
         row = row_of(computed, frame)
-        (place,) = np.flatnonzero(column_of(curve.rows, "value") == 1.0)
-        assert curve.chosen == pytest.approx(1.0)
+        (place,) = np.flatnonzero(column_of(curve, "value") == 1.0)
         for name in ("alpha_vs_axial", "alpha_vs_axial_se", "alpha_vs_axial_sample_se"):
-            assert curve.rows[place][name] == pytest.approx(row[name], rel=1e-9)
+            assert curve[place][name] == pytest.approx(row[name], rel=1e-9)
         assert line.get_ydata()[place] == pytest.approx(1e3 * row["alpha_vs_axial"])
         assert_bands_are_wider_than_bars(curve)
     assert "bands: standard error of scan and sample" in ax.get_legend().get_title().get_text()
@@ -301,7 +300,7 @@ def test_figures_have_the_moment_of_the_table(series):
     rows = [dict(scanfab.compute(series, **words, frames=str(one))[0]) for one in (0, 6)]
     curves = figure_of(ScannedFrames(series, Settings(**words), rows), "cutoffs").curves
     for curve, row in zip(curves, rows, strict=True):
-        (found,) = (one for one in curve.rows if one["value"] == 1.0)
+        (found,) = (one for one in curve if one["value"] == 1.0)
         near = 4 * np.hypot(found["alpha_vs_axial_se"], row["alpha_vs_axial_se"])
         assert abs(found["alpha_vs_axial"] - row["alpha_vs_axial"]) < near
 
@@ -311,7 +310,8 @@ def test_a_rough_scan_has_its_bands_and_its_own_cut_off_and_tells_nothing(series
     settings = Settings(boundary="mask=3", tolerance=1e-3, cutoff="0.8rmin")
     with warnings.catch_warnings():
         warnings.simplefilter("error", scanfab.ScanfabWarning)
-        curves = figure_of(ScannedFrames(series, settings, computed.rows), "cutoffs").curves
-    for curve in curves:
+        figure = figure_of(ScannedFrames(series, settings, computed.rows), "cutoffs")
+        curves = figure.curves
+    for frame, curve in zip(figure.frames, curves, strict=True):
         assert_bands_are_wider_than_bars(curve)
-        assert curve.chosen in column_of(curve.rows, "value")
+        assert frame.cutoff in column_of(curve, "value")
