@@ -88,18 +88,14 @@ class Evolution(Curves):
 
     @property
     def caption(self) -> str:
-        """With the x axis, and with the quantities that have errors."""
+        """With the x axis; the legend explains errors."""
         what = f"{' and '.join(one.removesuffix('s') for one in self.of)} anisotropy"
         drawn = f"{what.capitalize()} along the loading axis"
         if self.turned:
             angle = ", and the angle between their major axes" if self.has_angle else ""
             drawn = f"Intensity of {what}{angle}"
         divided = ", each curve divided by its own largest absolute value" if self.share else ""
-        named = zip(self.of, self.quantities, strict=False)
-        banded = [name for name, one in named if have_errors(self.curves, one.column)]
-        errors = f"with total standard errors of {' and '.join(banded)}"
-        errors = errors if banded else "without total errors"
-        return f"{drawn}, over {ABSCISSAS[abscissa(self.data)][1]}{divided}; {errors}."
+        return f"{drawn}, over {ABSCISSAS[abscissa(self.data)][1]}{divided}."
 
     @property
     def note(self) -> str:
@@ -188,13 +184,9 @@ class Correlation(Figure):
 
     @property
     def caption(self) -> str:
-        """Says which lines are drawn."""
+        """The legend says which lines are drawn."""
         what = "intensity" if self.turned else "anisotropy along the loading axis"
-        drawn = [] if self.turned else [one for group in self.groups for one in group.drawn]
-        fitted = any(self.fits[one.place][0].slope is not None for one in drawn)
-        lines = ["fitted lines"] * fitted + ["the paper's slope"] * bool(self._reach(drawn) > 0)
-        which = f"with {' and '.join(lines)}" if lines else "without a line"
-        return f"Void against contact {what}, {which}."
+        return f"Void against contact {what}."
 
     def draw(self, ax: Axes) -> None:
         """With the legend in the panel."""

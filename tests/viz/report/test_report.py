@@ -223,7 +223,7 @@ def test_a_sheared_cell_is_told_by_its_shear(table, undrawn):
     captions = re.findall(r"<figcaption>(.*?)</figcaption>", page)
     assert [one.partition(",")[0] for one in captions] == [
         *["Intensity of void and contact anisotropy"] * 2,
-        "Void against contact intensity",
+        "Void against contact intensity.",
     ]
     assert "the loading axis is not the axis of the contact fabric" in part_of(page, "notes")
     assert "frame variant axial strain shear strain" in part_of(page, "frames")
