@@ -81,7 +81,7 @@ def _symbols(text: str) -> Any:
 
 def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     """
-    A scene for the page's viewer, in whole numbers of a thousandth of half its size.
+    A scene for the page's viewer, in thousandths of half its size; those of grains are whole.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
         "spheres": spheres.tolist(),
         "shades": SHADES if shades else [1.0],
         "axes": _axes(up, turn),
-        "rv": None if scene.window is None else round(scene.window.reach * scale),
+        "rv": None if scene.window is None else scene.window.reach * scale,
         "window": None if scene.window is None else _window_data(scene.window, turn, scale),
         "cutoff": scene.cutoff * scale,
         "size": size,
@@ -124,26 +124,21 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
 
 def _window_data(window: Convex, turn: FloatArray, scale: float) -> dict[str, Any]:
     """Planes [x, y, z, distance], quadric (xx yy zz xy xz yz) and level, as the viewer has them."""
-    form, level = turn @ window.quadric.form @ turn.T, window.quadric.level
+    form = turn @ window.quadric.form @ turn.T
     planes = np.column_stack([window.planes[:, :3] @ turn.T, window.planes[:, 3] * scale])
-    parts = form[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     return {
-        "planes": [_rounded(plane) for plane in planes],
-        "form": [round(part, 9) + 0.0 for part in parts.tolist()],
-        "level": round(level * scale**2, 3),
+        "planes": planes.tolist(),
+        "form": form[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist(),
+        "level": window.quadric.level * scale**2,
     }
 
 
 def _axes(up: FloatArray, turn: FloatArray) -> list[list[Any]]:
     """Names and unit vectors of x, y, z and the loading axis, as the viewer sees them."""
     axes = [
-        [f"{name} (loading)" if one @ up > 1.0 - 1e-9 else name, *_rounded(turn @ one)]
+        [f"{name} (loading)" if one @ up > 1.0 - 1e-9 else name, *(turn @ one).tolist()]
         for name, one in zip("xyz", np.eye(3), strict=True)
     ]
     if up.max() < 1.0 - 1e-9:
-        axes.append(["loading", *_rounded(turn @ up)])
+        axes.append(["loading", *(turn @ up).tolist()])
     return axes
-
-
-def _rounded(vector: FloatArray) -> list[float]:
-    return [round(part, 4) + 0.0 for part in vector.tolist()]
