@@ -157,8 +157,7 @@ def report(
     for section in sections:
         pictures += section["shown"]["pictures"] if section["shown"] else []
     every = [row for one in inputs for row in one.rows]
-    asked = [one.manifest["settings"] for one in inputs if one.manifest is not None]
-    doubts = [*told.warnings, *of_sources.warnings, *map(as_options, words.caveats_of(rows, asked))]
+    doubts = [*told.warnings, *of_sources.warnings, *map(as_options, words.caveats_of(rows))]
     names = [Path(one).name or one for one in dict.fromkeys(str(row["source"]) for row in every)]
     about = ", ".join(names) if len(names) < 4 else f"{len(names)} samples"
     page = render_page(

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from scanfab.base.errors import SettingsError
 from scanfab.base.option import flag_of
 from scanfab.base.spelling import counted
 from scanfab.pipeline.options import MEANINGS
 from scanfab.pipeline.record import HIDDEN, given_settings
-from scanfab.scan.directions import direction_rule
 from scanfab.table.curves import STRAINS, is_turned, strain_column
 from scanfab.table.row import Row as TableRow
 from scanfab.table.row import groups_of, number_of, numbers_of, total_error, variant_of, with_error
@@ -26,13 +23,10 @@ MOST_INPUTS, MOST_BLOCKS = 20, 200
 VOID, CONTACT = "alpha_vs_axial", "alpha_c_axial"
 # The report warns of an error above this share of the largest void anisotropy.
 NOTABLE = 0.1
-# The report warns of scan directions with a larger bias than this.
-SOME_BIAS = 1e-5
 
-# Columns of the table that are shown as they are, with the titles that readers see.
+# Titles that readers see of columns that are shown as they are.
 TITLES = {
-    **{name: name for name in ("frame", "block", "x", "y", "z", "r_inner", "r_outer", "grains")},
-    **{name: name for name in ("rattlers", "contacts", "coordination")},
+    **{name: name for name in ("grains", "rattlers", "contacts", "coordination")},
     "solid_fraction": "solid fraction",
     "mean_length": "mean void length",
     "segments": "void segments",
@@ -40,30 +34,19 @@ TITLES = {
     "alpha_c": "contact intensity",
 }
 INTENSITIES = ("void intensity", "contact intensity", "angle between their axes")
-# Names of the lines of the results with their titles in the table of frames.
+# Names of the lines of the results, with their titles in the table of frames.
 RESULTS = {
     **{name: name for name in ("frame", "axial strain", "shear strain")},
-    "α_vs along the loading axis": "α_vs ±",
+    "α_vs along the loading axis": "α_vs",
     "its error: scan": "scan",
     "its error: sample": "sample",
-    "α_c along the loading axis": "α_c ±",
+    "α_c along the loading axis": "α_c",
     **{name: name for name in INTENSITIES},
 }
 OF_INTENSITIES = (
     "Intensities are largest minus smallest principal value, whichever way the axes point: never "
     "negative, so noise raises them. The table has no errors of them."
 )
-# Titles of the columns of frames, and of blocks; a column that is empty in all rows is left out.
-FRAME_COLUMNS = (
-    "frame", "variant", "axial strain", "shear strain", "α_vs", "± total", "scan", "sample", "α_c",
-    "± of α_c", "grains", "rattlers", "contacts", "coordination", "solid fraction",
-    "mean void length", "void segments", "void intensity", "contact intensity",
-    "angle between their axes",
-)  # fmt: skip
-BLOCK_COLUMNS = (
-    "block", "variant", "x", "y", "z", "r_inner", "r_outer", "grains", "α_vs", "± total", "α_c",
-    "± of α_c", "solid fraction", "coordination", "at a surface",
-)  # fmt: skip
 
 
 class Part(NamedTuple):
@@ -121,8 +104,8 @@ def results_tables(summary: Sequence[TableRow], rows: Sequence[Row]) -> list[Par
         if not turned:
             lines |= {
                 "slope of α_vs on α_c": [with_error(one.slope, one.slope_se, ".5f") for one in own],
-                "R² of that line": [_spell(one.r2) for one in own],
-                "largest α_vs": [_spell(one.peak) for one in own],
+                "R² of that line": [_spell(one, "r2") for one in own],
+                "largest α_vs": [_spell(one, "peak") for one in own],
                 "frames in the line": [str(one.frames) for one in own],
             }
         shown = [[name, *cells] for name, cells in lines.items() if {*cells} != {"-"}]
@@ -130,43 +113,39 @@ def results_tables(summary: Sequence[TableRow], rows: Sequence[Row]) -> list[Par
     return parts
 
 
-def _spell(value: Any, spelling: str = ".4g", unit: str = "") -> str:
-    if value is None:
+def _spell(row: Row, name: str, spelling: str = ".4g", unit: str = "") -> str:
+    """A number of a row; counts stay whole numbers."""
+    value = row.get(name)
+    if number_of(row, name) is None:
         return "-"
-    return f"{value:{spelling}}{unit}" if isinstance(value, float) else str(value)
+    return f"{value:{spelling}}{unit}" if isinstance(value, float) else f"{value}{unit}"
 
 
 def _cells(row: Row) -> dict[str, str]:
-    """The cells of a frame or block, by the titles of their columns."""
-    # spell the value of the table, so that counts stay whole numbers
-    numbers = {title: row[name] for name, title in TITLES.items() if numbers_of([row], name)}
-    each = ((number_of(row, name), total_error(row, name)) for name in (VOID, CONTACT))
-    void, contact = (with_error(value, error, ".5f") for value, error in each)
+    """The cells of a frame or block by title, in the order of the columns."""
     strains = {words: number_of(row, name) for name, (words, _) in STRAINS.items()}
-    errors = {
-        "± total": total_error(row, VOID),
-        "scan": number_of(row, f"{VOID}_se"),
-        "sample": number_of(row, f"{VOID}_sample_se"),
-        "± of α_c": number_of(row, f"{CONTACT}_sample_se"),
-    }
+    void, contact = (
+        with_error(number_of(row, name), total_error(row, name), ".5f") for name in (VOID, CONTACT)
+    )
     return {
-        **{title: _spell(value) for title, value in numbers.items()},
-        **{title: _spell(error, "#.2g") for title, error in errors.items()},
-        **{words: f"{100 * one:.3g} %" for words, one in strains.items() if one is not None},
+        **{name: _spell(row, name) for name in ("frame", "block")},
         "variant": variant_of(row),
-        "α_vs ±": void,
-        "α_vs": void.partition(" ±")[0],
-        "α_c ±": contact,
-        "α_c": contact.partition(" ±")[0],
-        "angle between their axes": _spell(number_of(row, "coaxiality_deg"), ".0f", "°"),
+        **{words: "-" if one is None else f"{100 * one:.3g} %" for words, one in strains.items()},
+        **{name: _spell(row, name) for name in ("x", "y", "z", "r_inner", "r_outer")},
+        "α_vs": void,
+        "scan": _spell(row, f"{VOID}_se", "#.2g"),
+        "sample": _spell(row, f"{VOID}_sample_se", "#.2g"),
+        "α_c": contact,
+        **{title: _spell(row, name) for name, title in TITLES.items()},
+        "angle between their axes": _spell(row, "coaxiality_deg", ".0f", "°"),
         "at a surface": "yes" if row.get("at_surface") else "-",
     }
 
 
-def _part(columns: Iterable[str], lines: Sequence[Mapping[str, str]], note: str) -> Part:
+def _part(lines: Sequence[Mapping[str, str]], note: str) -> Part:
     """A table of cells by column, without the columns that are empty in all lines."""
-    filled = [name for name in columns if any(line.get(name, "-") != "-" for line in lines)]
-    return Part(filled, [[line.get(name, "-") for name in filled] for line in lines], note)
+    filled = [name for name in lines[0] if any(line[name] != "-" for line in lines)]
+    return Part(filled, [[line[name] for name in filled] for line in lines], note)
 
 
 def frame_table(rows: Sequence[Row]) -> Part:
@@ -177,7 +156,7 @@ def frame_table(rows: Sequence[Row]) -> Part:
     chosen = [row for row in rows if _of_frame(row) in shown]
     lines = [{**_cells(row), "source": str(row["source"]) if several else "-"} for row in chosen]
     note = "" if len(shown) == len(numbers) else f"{len(shown)} of {len(numbers)} frames are shown."
-    return _part([*FRAME_COLUMNS, "source"], lines, note)
+    return _part(lines, note)
 
 
 def block_table(rows: Sequence[Row]) -> Part:
@@ -186,7 +165,7 @@ def block_table(rows: Sequence[Row]) -> Part:
     note = f"Blocks in frame {last[0]['frame']} of {last[0]['source'] or 'the sample'}."
     if len(last) > MOST_BLOCKS:
         note += f" The first {MOST_BLOCKS} of {len(last)} are shown."
-    return _part(BLOCK_COLUMNS, [_cells(row) for row in last[:MOST_BLOCKS]], note)
+    return _part([_cells(row) for row in last[:MOST_BLOCKS]], note)
 
 
 def _of_frame(row: Row) -> tuple[Any, Any]:
@@ -217,28 +196,9 @@ def settings_table(asked: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     return found
 
 
-def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, Any]]) -> list[str]:
-    """
-    Warnings about tables, each in one or two sentences.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        The rows of the fabric tables.
-    asked : iterable of mapping
-        The settings in their manifests.
-    """
+def caveats_of(rows: Sequence[Row]) -> list[str]:
+    """Warnings about the rows of fabric tables, each in one or two sentences."""
     found = []
-    for one in asked:
-        with suppress(SettingsError):
-            name = str(one.get("directions") or "")
-            bias = direction_rule(name).bias if name else 0.0
-            if bias >= SOME_BIAS:
-                found.append(
-                    f"The scan directions ({name}) are not spread evenly: a sample without any "
-                    f"anisotropy would get α = {bias:.2g}. Changes of α between frames mean more "
-                    f"than its value."
-                )
     filled = [row for row in rows if row[VOID] is not None]
     if len(filled) < len(rows):
         found.append(
