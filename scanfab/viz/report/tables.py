@@ -13,7 +13,6 @@ from scanfab.pipeline.record import HIDDEN, given_settings
 from scanfab.table.curves import STRAINS, is_turned, strain_column
 from scanfab.table.row import Row as TableRow
 from scanfab.table.row import groups_of, number_of, numbers_of, total_error, variant_of, with_error
-from scanfab.table.selection import MAP
 
 Row = Mapping[str, Any]
 
@@ -36,7 +35,7 @@ TITLES = {
 INTENSITIES = ("void intensity", "contact intensity", "angle between their axes")
 # Names of the lines of the results, with their titles in the table of frames.
 RESULTS = {
-    **{name: name for name in ("frame", "axial strain", "shear strain")},
+    **{name: name for name in ("frame", "axial strain", "shear strain", "grains")},
     "α_vs along the loading axis": "α_vs",
     "its error: scan": "scan",
     "its error: sample": "sample",
@@ -65,28 +64,12 @@ def overview(table: Path, rows: Sequence[Row]) -> str:
     sources = list(dict.fromkeys(str(row["source"]) for row in rows))
     frames = len(set(map(_of_frame, rows)))
     variants = ", ".join(sorted({str(row["variant"]) for row in rows}))
-    column = strain_column(rows)
     parts = [f"{counted(frames, 'frame')} of {', '.join(sources)}", f"variants {variants}"]
-    if numbers_of(rows, "grains"):
-        where = " a block" if MAP in rows[0] else ""
-        # variants count all grains, grains in the RV, or grains without rattlers
-        grains = {
-            variant: _span([row for row in rows if variant_of(row) == variant], "grains", ".0f")
-            for variant in sorted(set(map(variant_of, rows)))
-        }
-        each = ", ".join(f"{number} in {variant}" for variant, number in grains.items())
-        same = len(set(grains.values())) == 1
-        parts.append(f"{next(iter(grains.values()))} grains{where}" if same else f"grains: {each}")
-    if column is not None:
-        parts.append(f"{STRAINS[column][0]} {_span(rows, column, '.3g', 100)} %")
+    if column := strain_column(rows):
+        strains = numbers_of(rows, column)
+        ends = dict.fromkeys(f"{100 * one:.3g}" for one in (min(strains), max(strains)))
+        parts.append(f"{STRAINS[column][0]} {' to '.join(ends)} %")
     return "; ".join(parts) + "."
-
-
-def _span(rows: Sequence[Row], column: str, spelling: str, factor: float = 1.0) -> str:
-    """Spell the smallest and the largest number of a column; one of them if both look alike."""
-    values = sorted(numbers_of(rows, column))
-    ends = [f"{factor * value:{spelling}}" for value in (*values[:1], *values[-1:])]
-    return " to ".join(dict.fromkeys(ends)) or "-"
 
 
 def results_tables(summary: Sequence[TableRow], rows: Sequence[Row]) -> list[Part]:
