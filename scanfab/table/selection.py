@@ -70,7 +70,7 @@ def choose_rows(
     check_labels(labels, len(named))
     for number, (name, rows) in enumerate(named):
         check_rows(rows, name)
-        if cutoff is not None:
+        if cutoff is not None and rows:
             named[number] = name, _of_cutoff(name, rows, cutoff)
     if labels:
         for (_, rows), label in zip(named, labels, strict=True):

@@ -17,10 +17,9 @@ from scanfab.pipeline.options import Told, as_options, listening
 from scanfab.pipeline.record import read_manifest, reopen, repeat_command, restored_settings
 from scanfab.pipeline.values import Length
 from scanfab.table.compare import compare_tables
-from scanfab.table.curves import spelt_strain, strain_column
 from scanfab.table.formats import read_rows
 from scanfab.table.row import numbers_of
-from scanfab.table.selection import MAP, check_labels, choose_rows
+from scanfab.table.selection import MAP, choose_rows
 from scanfab.viz.figures.figure import Figure, make_figures
 from scanfab.viz.report import tables as words
 from scanfab.viz.report.page import check_page_file, picture_of, render_page, view_data
@@ -186,21 +185,18 @@ def read_inputs(
     ScanfabError
         If one cannot be read or is neither a fabric table nor a map, or if no table has a row.
     """
-    check_labels(labels, len(tables))
-    read, of_frames = [], []
+    read = []
     for path in tables:
         # tables may lack the columns of source and strain
         rows = [{"source": path.stem, "strain": None, **row} for row in read_rows(path)]
         is_map = bool(rows) and MAP in rows[0]
         read.append(Input(path, rows, read_manifest(path), cutoff, is_map))
-        if not is_map:
-            of_frames.append((path, rows))
-        elif lacking := [name for name in OF_MAPS if name not in rows[0]]:
+        if is_map and (lacking := [name for name in OF_MAPS if name not in rows[0]]):
             raise SettingsError(f"{path}: the map lacks the columns {', '.join(lacking)}")
-    # a map is shown under the name of its file
-    own = [label for label, one in zip(labels or (), read, strict=False) if not one.is_map]
-    chosen = iter(choose_rows(of_frames, cutoff, own))
-    inputs = [one if one.is_map else one._replace(rows=next(chosen)) for one in read]
+    # a map is shown whole, under the name of its file
+    of_frames = [(one.path, [] if one.is_map else one.rows) for one in read]
+    chosen = zip(read, choose_rows(of_frames, cutoff, labels), strict=True)
+    inputs = [one if one.is_map else one._replace(rows=rows) for one, rows in chosen]
     if not any(one.rows for one in inputs):
         names = ", ".join(map(str, tables))
         raise SettingsError(f"{names}: there is nothing to report: no row in the table")
@@ -259,14 +255,12 @@ def show_frames(one: Input, manifest: Mapping[str, Any]) -> dict[str, Any]:
     filled = [row for row in rows if row["alpha_vs_axial"] is not None]
     number = int(max(numbers_of(filled or rows, "frame"), default=0))
     look = look_at(series, replace(settings, variants="c"), number)
-    of_frame = [row for row in rows if row["frame"] == look.number]
-    strain = spelt_strain(of_frame[0], strain_column(rows)) if of_frame else ""
     figures: list[Figure] = []
     if filled and not one.is_map:
         figures = make_figures(ScannedFrames(series, settings, rows), "frames")
     return {
         "view": view_data(look.scene, look.axis),
-        "view_title": ", ".join(filter(None, [source, f"frame {look.number}", strain])),
+        "view_title": ", ".join(filter(None, [source, f"frame {look.number}", look.strain])),
         "facts": _facts(look),
         # pixels, as the coloured disks are pixels anyway
         "pictures": [picture_of(figure, "png") for figure in figures if not figure.slow],
