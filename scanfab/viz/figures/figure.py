@@ -192,31 +192,31 @@ class DirectionalFigure(FrameFigure):
         super().__init__(data, frame)
         self.of = shown_of(of, tuple(style.DIRECTIONAL))
 
-    def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> Any:
-        """Draw voids or contacts of frames on panels with one scale; gives back the scale."""
+    def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> None:
+        """Draw voids or contacts of frames on panels with one scale."""
         raise NotImplementedError
 
-    def add_legend(self, place: Any, scales: dict[str, Any]) -> None:
-        """Add the legend that all panels share; ``scales`` has the scale of each column."""
+    def add_legend(self, place: Any, panels: Any) -> None:
+        """Add the legend that all panels share, shape (frames, columns)."""
 
     def draw(self, ax: Axes) -> None:
         """Draw the last frame, or the one that the option ``frame`` names."""
-        self.add_legend(ax, self._draw_grid(np.array([[ax]]), "center"))
+        self._draw_grid(ax, np.array([[ax]]), "center")
 
     def panels(self, part: FigureBase) -> list[Axes]:
         """A row for each frame, a column each for voids and contacts."""
         polar = {"projection": self.projection}
         panels = part.subplots(len(self.frames), len(self.of), squeeze=False, subplot_kw=polar)
-        self.add_legend(part, self._draw_grid(panels, "left"))
+        self._draw_grid(part, panels, "left")
         return list(panels.ravel())
 
-    def _draw_grid(self, panels: Any, loc: Any) -> dict[str, Any]:
-        frames, scales = self.frames[-len(panels) :], {}
+    def _draw_grid(self, place: Any, panels: Any, loc: Any) -> None:
+        frames = self.frames[-len(panels) :]
         for kind, column in zip(self.of, panels.T, strict=False):
-            scales[kind] = self.draw_column(list(column), frames, kind)
+            self.draw_column(list(column), frames, kind)
             for axes, one in zip(column, frames, strict=True):
                 axes.set_title(f"{style.DIRECTIONAL[kind]}\n{one.title}", loc=loc)
-        return scales
+        self.add_legend(place, panels)
 
 
 def shown_of(of: str | None, known: tuple[str, ...]) -> tuple[str, ...]:

@@ -149,8 +149,8 @@ class Rose(DirectionalFigure):
         entries = -(-len(self.looks) // MOST_COLUMNS)
         return WIDTH, 3.0 * len(self.frames) + 0.7 + 0.2 * entries
 
-    def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> float:
-        """Draw rings about 1 at the polar angles; gives back the reach of the scale from 1."""
+    def draw_column(self, column: list[Axes], frames: list[ScannedFrame], kind: str) -> None:
+        """Draw rings about 1 at the polar angles."""
         looks = self.looks
         if kind == "voids":
             every = [[void_ring(one, phi) for phi in looks] for one in frames]
@@ -159,7 +159,8 @@ class Rose(DirectionalFigure):
             each = [one.normals for one in frames]
             every = [[contact_ring(n, phi, self.space) for phi in looks if len(n)] for n in each]
         reach = max((ring.reach for rings in every for ring in rings), default=0.02)
-        middle, circles = _scale(reach)
+        middle, step = max(0.0, 1.0 - 2.0 * reach), rounded_down(reach)
+        circles = [one for one in (1.0 - step, 1.0, 1.0 + step) if one > middle]
         for axes, rings in zip(column, every, strict=True):
             for ring, look in zip(rings, looks.values(), strict=False):
                 ring.draw(axes, look)
@@ -170,9 +171,8 @@ class Rose(DirectionalFigure):
             axes.set_xticks(np.radians(np.arange(0, 360, 45)))
             axes.grid(color="0.85", lw=0.5)
             axes.spines["polar"].set_color("0.7")
-        return reach
 
-    def add_legend(self, place: Any, scales: dict[str, Any]) -> None:
+    def add_legend(self, place: Any, panels: Any) -> None:
         """Add the legend below, with the meaning of angle, circles and bars."""
         handles = [Line2D([], [], **look) for look in self.looks.values()]
         labels = [rf"polar angle $\varphi={phi:g}^\circ$" for phi in self.looks]
@@ -182,11 +182,10 @@ class Rose(DirectionalFigure):
             over = f"over the angle from {first} towards {second}"
             labels = [f"in {self.space}"]
         circles, bars = [], []
-        sides = (" (left)", " (right)") if len(scales) > 1 else ("",)
-        for side, (kind, reach) in zip(sides, scales.items(), strict=True):
-            middle, values = _scale(reach)
-            named = ", ".join(f"{one:g}" for one in values)
-            circles.append(f"{named} about {middle:.3g}{side}")
+        sides = (" (left)", " (right)") if len(panels[0]) > 1 else ("",)
+        for side, kind, axes in zip(sides, self.of, panels[0], strict=False):
+            named = ", ".join(f"{one:g}" for one in axes.get_yticks())
+            circles.append(f"{named} about {axes.get_ylim()[0]:.3g}{side}")
             bars.append(f"{BARS[kind]}{side}")
         note = (
             f"{over}, relative to isotropy\ncircles: {', '.join(circles)}\n"
@@ -196,12 +195,6 @@ class Rose(DirectionalFigure):
         if isinstance(place, FigureBase):
             where = {"loc": "outside lower center", "ncols": min(len(labels), MOST_COLUMNS)}
         place.legend(handles, labels, title=note, **where)
-
-
-def _scale(reach: float) -> tuple[float, list[float]]:
-    """The value in the middle of a rose, and those of its circles."""
-    middle, step = max(0.0, 1.0 - 2.0 * reach), rounded_down(reach)
-    return middle, [one for one in (1.0 - step, 1.0, 1.0 + step) if one > middle]
 
 
 def void_ring(frame: ScannedFrame, phi: float) -> Ring:
