@@ -52,11 +52,9 @@ def frame_meshes(result: FrameResult) -> Meshes:
     for name, one in windows.items():
         yield name, window_mesh(one.center, one.shape), fields
     if result.measurements:
-        # ellipsoids of all variants have the size of the last one's
-        last = result.rows[-1]
-        measured = result.measured(last.variant, number_of(last, "rv"))
-        position, _, region = measured.spheres_of(VARIANTS[last.variant])
-        reach = region.reach if region else float(np.linalg.norm(position, axis=1).max())
+        # ellipsoids of all variants have one size
+        extents = np.ptp(result.sample.packing.position, axis=0)
+        reach = window.radius if window else 0.5 * float(extents.max())
         for row in result.rows:
             yield from _variant_meshes(result, row, 0.3 * reach)
 
