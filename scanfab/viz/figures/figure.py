@@ -146,7 +146,6 @@ class FrameFigure(Figure):
     """
 
     kind = "frames"
-    columns = ("variant", "alpha_vs_axial")
     drawn: ClassVar[str] = ""
     """Start of the caption, which goes on with the variant, the source, and ``more``."""
     more: ClassVar[str] = ""
@@ -281,8 +280,8 @@ def make_figures(data: Any, kind: str, text: str | None = None, **offered: Any) 
         data = Table(data)
 
     def lacking(figure: Any) -> list[str]:
-        known = data.names if isinstance(data, Table) else figure.columns
-        return [name for name in figure.columns if name not in known]
+        needed = figure.columns if isinstance(data, Table) else ()
+        return [name for name in needed if name not in data.names]
 
     chosen: list[Any]
     if text is None:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from scanfab.base.option import flag_of
 from scanfab.base.spelling import counted
 from scanfab.pipeline.options import MEANINGS
-from scanfab.pipeline.record import HIDDEN, given_settings
+from scanfab.pipeline.record import given_settings
 from scanfab.table.curves import STRAINS, is_turned, strain_column
 from scanfab.table.row import Row as TableRow
 from scanfab.table.row import groups_of, number_of, numbers_of, total_error, variant_of, with_error
@@ -166,16 +166,14 @@ def input_table(manifest: Mapping[str, Any]) -> Part:
 
 
 def settings_table(asked: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    """Name, value and meaning of each setting of a manifest."""
-    given, found = given_settings(asked), []
-    for name in asked:
-        if name not in HIDDEN:
-            value = given.get(name, "auto" if name in ("spacing", "directions") else "-")
-            if isinstance(value, dict):
-                value = [f"{key}={item}" for key, item in value.items()]
-            if isinstance(value, list):
-                value = ", ".join(map(str, value))
-            found.append((flag_of(name)[2:], str(value), MEANINGS.get(name, "")))
+    """Name, value and meaning of each setting of a manifest that has a value."""
+    found = []
+    for name, value in given_settings(asked).items():
+        if isinstance(value, dict):
+            value = [f"{key}={item}" for key, item in value.items()]
+        if isinstance(value, list):
+            value = ", ".join(map(str, value))
+        found.append((flag_of(name)[2:], str(value), MEANINGS.get(name, "")))
     return found
 
 
