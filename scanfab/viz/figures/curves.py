@@ -22,7 +22,6 @@ from scanfab.viz.figures.style import LOOKS, MANY_LOOKS, WIDTH, band, plain, wid
 
 Look = dict[str, Any]
 
-OTHER: Look = {"color": "0.3", "marker": "v", "ls": "-"}
 MEANINGS = {"a": "whole", "b": "whole, rattlers void", "c": "RV", "d": "RV, rattlers void"}
 # Height of each further row of panels, inches.
 ROW = 2.1
@@ -71,8 +70,6 @@ def groups_of(rows: Sequence[Mapping[str, Any]]) -> list[Group]:
     sources = list(dict.fromkeys(curve.source for curve in curves))
     variants = sorted({curve.variant for curve in curves})
     by_source = len(sources) == 1 or 1 < len(variants) >= len(sources)
-    # several RVs of a variant need different looks
-    several_rvs = len({variant[0] for variant in variants}) < len(variants)
     panels: dict[str, list[Drawn]] = {one: [] for one in (sources if by_source else variants)}
     for place, curve in enumerate(curves):
         source, variant = curve.source, curve.variant
@@ -80,7 +77,8 @@ def groups_of(rows: Sequence[Mapping[str, Any]]) -> list[Group]:
         look = MANY_LOOKS[number % len(MANY_LOOKS)]
         if by_source:
             name = _spelt(variant) if len(sources) == 1 else f"variant {variant}"
-            look = look if several_rvs else LOOKS.get(variant, OTHER)
+            # RVs of several sizes are variants with other names
+            look = LOOKS.get(variant, look)
         else:
             name = f"variant {variant}, " * (len(variants) == 1) + plain(source)
         panels[source if by_source else variant].append(Drawn(curve, place, look, name))
