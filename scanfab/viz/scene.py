@@ -71,8 +71,8 @@ class Scene:
 
     grains: Grains
     center: FloatArray
-    """Centre of the RV, or of the grains if there is no RV, shape (3,)."""
-    windows: tuple[Convex, ...] = ()
+    """Centre of the RVs, shape (3,)."""
+    windows: tuple[Convex, ...]
     """The RVs about their centre, in ascending order."""
     lines: Segments | None = None
     """A few scan lines, in the dump's coordinates."""
@@ -82,9 +82,9 @@ class Scene:
     """The plane of the grains if they are discs."""
 
     @property
-    def window(self) -> Convex | None:
-        """The largest RV; None without one."""
-        return self.windows[-1] if self.windows else None
+    def window(self) -> Convex:
+        """The largest RV."""
+        return self.windows[-1]
 
     @property
     def is_section(self) -> bool:
@@ -118,7 +118,8 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     series : Series
         The frames.
     settings : Settings
-        Boundary, rattlers, RV, cut-off, axis and strain count.
+        Boundary, rattlers, RV, cut-off, axis and strain count. The RV is shown whatever the
+        variants.
     number : int, optional
         Which frame; negative from the end.
 
@@ -128,6 +129,7 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
         If there is no such frame, it cannot be read, no frame has grains, or the settings do not
         fit the series.
     """
+    settings = replace(settings, variants="c")
     # damaged frames are skipped; only a damaged frame that is asked for is an error
     frames = Frames(series, replace(settings, on_error="skip"))
     frame = series[number]
@@ -150,18 +152,11 @@ def scene_of(sample: Sample, *windows: Window, cutoff: float = 0.0) -> Scene:
 
     Grains of a periodic frame lie at their images next to the centre of the RVs.
     """
-    packing, window = sample.packing, windows[-1] if windows else None
-    center = np.zeros(3) if window is None else window.center
-    if window is None and len(packing):
-        chosen = sample.grains if sample.grains.any() else np.ones(len(packing), bool)
-        center = packing.position[chosen].mean(axis=0)
-        if packing.space.across is not None:
-            center[packing.space.across] = packing.place_across
-    grains = grains_of(sample, window)
-    if window is not None and packing.cell is not None:
+    packing, window = sample.packing, windows[-1]
+    grains, shapes = grains_of(sample, window), tuple(one.shape for one in windows)
+    if packing.cell is not None:
         grains = _about(window, grains, packing.cell)
-    shapes = tuple(one.shape for one in windows)
-    return Scene(grains, center, shapes, cutoff=cutoff, space=packing.space)
+    return Scene(grains, window.center, shapes, cutoff=cutoff, space=packing.space)
 
 
 def grains_of(sample: Sample, window: Window | None) -> Grains:
@@ -210,7 +205,7 @@ def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
     """
     Parallel scan lines, inclined to the axis, in a plane through the centre that holds the axis.
 
-    In the dump's coordinates; clipped to the RV, if there is one.
+    In the dump's coordinates; clipped to the RV.
     """
     grains, solid = scene.grains, ~scene.grains.boundary
     up = np.asarray(axis, dtype=np.float64)
@@ -220,11 +215,9 @@ def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
     along = np.cos(turn) * across + np.sin(turn) * up
     frame = np.stack([np.cross(depth, along), depth, along])
     position, radius = grains.position[solid] - scene.center, grains.radius[solid]
-    reach = float(np.linalg.norm(position, axis=1).max(initial=0.0))
-    if scene.window is not None:
-        reach = scene.window.reach
+    reach = scene.window.reach
     spacing = max(2.5 * float(radius.mean()), reach / 40) if len(radius) else reach
-    steps = np.arange(-reach + 0.5 * spacing, reach, spacing) if spacing > 0 else np.zeros(0)
+    steps = np.arange(-reach + 0.5 * spacing, reach, spacing)
     points = np.column_stack([steps, np.zeros_like(steps)])
     found = cut_lines(position, radius, frame, points, scene.window)
     return replace(found, ends=found.ends + scene.center)

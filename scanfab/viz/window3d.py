@@ -18,7 +18,7 @@ from scanfab.base.files import whole_file
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.viz.figures.style import COLOURS
 from scanfab.viz.meshes import lines_mesh, window_mesh
-from scanfab.viz.scene import OUTSIDE, SHADES, Scene, towards_viewer
+from scanfab.viz.scene import SHADES, Scene, towards_viewer
 
 ADVICE = (
     "install one of them: on Debian or Ubuntu apt-get install libegl1 libgl1 libosmesa6, or "
@@ -105,7 +105,7 @@ def _draw(plotter: Any, scene: Scene, up: FloatArray, title: str) -> None:
     shown = ~grains.boundary
     if scene.is_section:
         shown &= (grains.position - scene.center) @ toward < grains.radius
-    elif window is not None:
+    else:
         # grains outside the RV and in front of its centre would hide it
         shown &= grains.in_window | ((grains.places - scene.center) @ look <= 0.0)
     names = _add_grains(plotter, scene, shown, toward)
@@ -119,9 +119,8 @@ def _draw(plotter: Any, scene: Scene, up: FloatArray, title: str) -> None:
         plotter.add_mesh(mesh, color=COLOURS["blue"], **style)
     if scene.lines is not None:
         names |= _add_lines(plotter, scene)
-    points, radius = grains.position[shown], grains.radius[shown]
-    if window is not None:
-        points, radius = np.vstack([points, scene.center]), np.append(radius, window.reach)
+    points = np.vstack([grains.position[shown], scene.center])
+    radius = np.append(grains.radius[shown], window.reach)
     aim(plotter, points, radius, up, look)
     add_words(plotter, title, names)
     plotter.enable_anti_aliasing("ssaa")
@@ -135,10 +134,11 @@ def _add_grains(plotter: Any, scene: Scene, shown: BoolArray, toward: FloatArray
     Gives back the names of the legend with their colours.
     """
     grains, is_flat = scene.grains, scene.space.is_plane
-    kinds = [("grain in the RV", COLOURS["sky"]), ("grain outside", "#D2D7DB")]
-    if scene.window is None:
-        kinds[OUTSIDE] = ("grain", COLOURS["sky"])
-    kinds.append(("rattler", COLOURS["orange"]))
+    kinds = [
+        ("grain in the RV", COLOURS["sky"]),
+        ("grain outside", "#D2D7DB"),
+        ("rattler", COLOURS["orange"]),
+    ]
     colours = np.array([pyvista.Color(colour).float_rgb for _, colour in kinds])[grains.kind]
     colours *= np.array(SHADES)[grains.shade][:, None]
     position, radius = grains.position, grains.radius
@@ -200,12 +200,10 @@ def aim(
     plotter : pyvista.Plotter
         Its camera is placed.
     points, radius : ndarray, shapes (N, 3) and (N,)
-        Centres and radii of the balls, dump's unit; without balls the picture shows the origin.
+        Centres and radii of the balls, at least one, dump's unit.
     up, look : ndarray, shape (3,)
         Vectors upwards and towards the camera, at any angle.
     """
-    if len(points) == 0:
-        points, radius = np.zeros((1, 3)), np.ones(1)
     toward = look / np.linalg.norm(look)
     right = np.cross(up, toward)
     right /= np.linalg.norm(right)

@@ -64,8 +64,7 @@
   // right and up are unit vectors of the plane that they lie in
   function cutLines(disks, data, right, up) {
     const mean = data.spheres.reduce((sum, ball) => sum + ball[3], 0) / data.spheres.length;
-    const reach = data.rv === null ? 1000 : data.rv;
-    const step = Math.max(2.5 * mean, reach / 40);
+    const reach = data.rv, step = Math.max(2.5 * mean, reach / 40);
     const cos = Math.cos(LINE_ANGLE), sin = Math.sin(LINE_ANGLE);
     const found = [];
     for (let offset = -reach + step / 2; offset < reach; offset += step) {
@@ -75,12 +74,10 @@
         const middle = cos * u + sin * v;
         if (half > 0) chords.push([middle - half, middle + half]);
       }
-      if (data.window !== null) {
-        const through = sum(-sin * offset, right, cos * offset, up);
-        const [enters, leaves] = span(data.window, through, sum(cos, right, sin, up));
-        if (!(enters < leaves)) continue;
-        chords.push([-Infinity, enters], [leaves, Infinity]);
-      }
+      const through = sum(-sin * offset, right, cos * offset, up);
+      const [enters, leaves] = span(data.window, through, sum(cos, right, sin, up));
+      if (!(enters < leaves)) continue;
+      chords.push([-Infinity, enters], [leaves, Infinity]);
       chords.sort((one, other) => one[0] - other[0]);
       let solid = chords.length ? chords[0][1] : 0;
       for (const [from, to] of chords) {
@@ -174,7 +171,6 @@
     }
 
     function drawWindow() {
-      if (data.window === null) return;
       pen.strokeStyle = RV;
       pen.lineWidth = 2 * dense / scale;
       pen.setLineDash([8, 5].map((part) => part * dense / scale));

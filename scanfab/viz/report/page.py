@@ -20,8 +20,12 @@ from scanfab.viz.scene import SHADES, Scene, towards_viewer
 
 # A browser turns so many spheres without effort.
 MOST_GRAINS = 4_000
-# Colours of grains in the RV, grains outside and rattlers; the paler ones are for cut grains.
-KIND_COLOURS = ((COLOURS["sky"], "#B4DDF5"), ("#C9CED3", "#E8EAEC"), (COLOURS["orange"], "#F5DB9F"))
+# Kinds of grains with their colours; the paler ones are for cut grains.
+KINDS = (
+    {"name": "grains in the RV", "colour": COLOURS["sky"], "pale": "#B4DDF5"},
+    {"name": "grains outside", "colour": "#C9CED3", "pale": "#E8EAEC"},
+    {"name": "rattlers", "colour": COLOURS["orange"], "pale": "#F5DB9F"},
+)
 
 # CSS pixels an inch, and pixels an inch of pictures that are no vectors.
 PIXELS, DPI = 96, 130
@@ -96,24 +100,22 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     distance = np.linalg.norm(grains.places[shown] - scene.center, axis=1)
     nearest = np.argsort(distance, kind="stable")[:MOST_GRAINS]
     reach = np.linalg.norm(position[nearest], axis=1) + radius[nearest]
-    size = float(reach.max(initial=0.0)) or (scene.window.reach if scene.window else 1.0)
+    size = float(reach.max(initial=0.0)) or scene.window.reach
     scale = 1000.0 / size
     up = np.asarray(axis, dtype=np.float64)
     # the rotation (rows) after which the axis is z; y leads away from the viewer
     away = -towards_viewer(up, scene.space)
     turn = np.stack([np.cross(away, up), away, up])
-    names = ["grains in the RV", "grains outside" if scene.window else "grains", "rattlers"]
-    named = zip(names, KIND_COLOURS, strict=True)
     shades = [] if grains.body is None else [grains.shade[shown]]
     numbers = np.rint(np.column_stack([position @ turn.T, radius]) * scale)
     spheres = np.column_stack([numbers, grains.kind[shown], *shades]).astype(int)[nearest]
     return {
-        "kinds": [{"name": name, "colour": one, "pale": pale} for name, (one, pale) in named],
+        "kinds": KINDS,
         "spheres": spheres.tolist(),
         "shades": SHADES if shades else [1.0],
         "axes": _axes(up, turn),
-        "rv": None if scene.window is None else scene.window.reach * scale,
-        "window": None if scene.window is None else _window_data(scene.window, turn, scale),
+        "rv": scene.window.reach * scale,
+        "window": _window_data(scene.window, turn, scale),
         "cutoff": scene.cutoff * scale,
         "size": size,
         "left_out": int(shown.sum() - len(nearest)),

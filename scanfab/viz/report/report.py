@@ -254,7 +254,7 @@ def show_frames(one: Input, manifest: Mapping[str, Any]) -> dict[str, Any]:
     rows = [row for row in one.rows if row["source"] == one.rows[0]["source"]]
     filled = [row for row in rows if row["alpha_vs_axial"] is not None]
     number = int(max(numbers_of(filled or rows, "frame"), default=0))
-    look = look_at(series, replace(settings, variants="c"), number)
+    look = look_at(series, settings, number)
     figures: list[Figure] = []
     if filled and not one.is_map:
         figures = make_figures(ScannedFrames(series, settings, rows), "frames")

@@ -6,7 +6,7 @@ import pyvista
 from matplotlib.figure import Figure
 
 import scanfab
-from scanfab import Cell, Packing, SettingsError
+from scanfab import Cell, Packing, SettingsError, Window, sphere
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
 from scanfab.viz.compute_file import VtkFolder
@@ -63,7 +63,8 @@ def test_the_viewer_sees_the_first_axis_on_the_right():
 
 
 def test_the_lines_of_a_section_lie_in_the_plane(packing):
-    scene = scene_of(scanfab.Sample(packing, np.zeros(150, bool)))
+    window = Window([6.0, 6.0, 0.0], sphere(5.0, XY))
+    scene = scene_of(scanfab.Sample(packing, np.zeros(150, bool)), window)
     lines = section_lines(scene, (0.0, 1.0, 0.0))
     assert len(lines.length) > 20
     assert not lines.ends[..., 2].any()
