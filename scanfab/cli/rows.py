@@ -14,7 +14,7 @@ from scanfab.cli.options import checked, excerpt_of, open_series, take_output, u
 from scanfab.cli.settings_file import as_listed
 from scanfab.cli.signals import ending_in_order, telling
 from scanfab.pipeline.map_settings import MapSettings
-from scanfab.pipeline.options import Output, as_options
+from scanfab.pipeline.options import Output
 from scanfab.pipeline.settings import Settings
 
 if TYPE_CHECKING:
@@ -132,17 +132,8 @@ class _Drawing:
 def _write(job: Job, excerpt: Excerpt) -> None:
     """Write the rows as they come; if that fails or is interrupted, say how to continue."""
     as_table = job.output is None and is_readable()
-
-    def words() -> str:
-        ranges = (
-            f"\nscanfab: {as_options(note.told(where))}"
-            for series in job.notes
-            for note, where in series.ranges()
-        )
-        return _standing(job) + "".join(ranges)
-
     try:
-        with telling(words):
+        with telling(lambda: _standing(job)):
             prints = job.output is None and not as_table
             with working(job.frames, job.done, prints) as advance:
                 if job.output is not None:

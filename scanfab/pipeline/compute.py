@@ -209,7 +209,7 @@ def compute_frames(
     done: Container[int] = (),
     observe: Observer | None = None,
     executor: Executor | None = None,
-    notes: SeriesNotes | None = None,
+    name: str = "",
 ) -> Iterator[list[Row]]:
     """
     Compute the rows of :func:`compute`, frame by frame in the order of the series.
@@ -222,8 +222,8 @@ def compute_frames(
         Frames to leave out, because an earlier run has computed them.
     observe : callable, optional
         Called with the :class:`FrameResult` of each frame, in the process that computes it.
-    notes : SeriesNotes, optional
-        Issues what there is to say of the frames.
+    name : str, optional
+        The name of the series in the notes on its frames, if there are several series.
 
     Yields
     ------
@@ -237,9 +237,9 @@ def compute_frames(
     with collected() as told:
         number, _, first = frames.reference()
     plan = make_plan(settings, first)
-    reference = number, float(first.packing.radius[first.grains].min())
     tell(plan.notes)
-    notes = notes or SeriesNotes(frames.settings)
+    smallest = float(first.packing.radius[first.grains].min())
+    notes = SeriesNotes(frames.settings, name, (number, smallest))
     own = ThreadPoolExecutor(settings.workers)
     try:
         jobs = _jobs(frames, plan, done, observe, told, is_far=executor is not None)
@@ -248,7 +248,7 @@ def compute_frames(
             if computed.rows:
                 yield computed.rows
     finally:
-        notes.end(reference)
+        notes.end()
         # an interrupted run does not wait for the frames under way
         own.shutdown(wait=False, cancel_futures=True)
 

@@ -32,7 +32,6 @@ from scanfab.pipeline.record import (
     read_table,
     write_manifest,
 )
-from scanfab.pipeline.series_notes import SeriesNotes
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import as_written
 from scanfab.table.row import Row
@@ -84,8 +83,6 @@ class Job:
     executor: Executor | None = None
     """As for :func:`scanfab.compute`."""
 
-    notes: list[SeriesNotes] = field(init=False)
-    """What there is to say of each series."""
     asked: dict[str, Any] = field(init=False)
     """The settings that decide the bytes of the table, from :func:`asked_for`."""
     finished: FrameRows = field(default_factory=dict, init=False)
@@ -112,8 +109,6 @@ class Job:
             self.asked["reference"] = references[0]
         else:
             self.asked["references"] = references
-        named = names if len(names) > 1 else [""]
-        self.notes = [SeriesNotes(self.settings, name) for name in named]
         if self.manifest_path is not None:
             check_folder(self.manifest_path)
         outputs = [*self.drawn, self.manifest_path, self.output]
@@ -233,10 +228,14 @@ class Job:
     def _computed(self, advance: Advance) -> Iterator[tuple[Series, list[Row]]]:
         """The rows of each frame that is computed now, with its series."""
         observers = self.observers or repeat(None)
-        for one, notes, observe in zip(self.series, self.notes, observers, strict=False):
-            done = {frame for source, frame in self.finished if source == one.name}
+        for one, observe in zip(self.series, observers, strict=False):
             computed = compute_frames(
-                one, self.settings, done=done, observe=observe, notes=notes, executor=self.executor
+                one,
+                self.settings,
+                done={frame for source, frame in self.finished if source == one.name},
+                observe=observe,
+                executor=self.executor,
+                name=one.name if len(self.series) > 1 else "",
             )
             try:
                 for rows in computed:

@@ -54,10 +54,11 @@ class SeriesNotes:
 
     A note is issued at the first frame that it holds for. If it holds for several frames, one more
     line names them at the end. ``name`` is that of the series; it is told if it is not empty.
+    ``reference`` is the number of the reference frame and its smallest radius.
     """
 
-    def __init__(self, settings: Settings, name: str = "") -> None:
-        self.settings, self.name = settings, name
+    def __init__(self, settings: Settings, name: str, reference: tuple[int, float]) -> None:
+        self.settings, self.name, self.reference = settings, name, reference
         self._frames: list[int] = []
         self._held: dict[tuple[str, tuple[str, ...]], tuple[Note, list[int]]] = {}
         """The first note of each kind, and the places of its frames among all frames."""
@@ -86,8 +87,8 @@ class SeriesNotes:
             if places[-1:] != [len(self._frames) - 1]:
                 places.append(len(self._frames) - 1)
 
-    def ranges(self) -> Iterator[tuple[Note, str]]:
-        """The notes that hold for several frames, in short, and these frames in words."""
+    def end(self) -> None:
+        """Issue the lines at the end of a series."""
         for note, places in self._held.values():
             if len(places) > 1 and note.kind is not SkippedFrameWarning:
                 # consecutive places have the same difference to their number in the list
@@ -98,36 +99,24 @@ class SeriesNotes:
                 spelt = ", ".join(
                     f"{run[0]} to {run[-1]}" if run[1:] else f"{run[0]}" for run in runs
                 )
-                yield (
-                    note._replace(
-                        text=f"as in frame {self._frames[places[0]]}, {note.text.split(': ')[0]}"
-                    ),
-                    f"frames {spelt}",
-                )
-
-    def end(self, reference: tuple[int, float] | None) -> None:
-        """
-        Issue the lines at the end of a series.
-
-        ``reference`` is the number of the reference frame and its smallest radius.
-        """
-        for note, where in self.ranges():
-            self._tell([note], where)
-        self._tell(self._of_series(reference))
+                text = f"as in frame {self._frames[places[0]]}, {note.text.split(': ')[0]}"
+                self._tell([note._replace(text=text)], f"frames {spelt}")
+        self._tell(self._of_series())
 
     def _tell(self, notes: Iterable[Note], where: str = "") -> None:
         tell(notes, ", ".join(filter(None, [self.name, where])))
 
-    def _of_series(self, reference: tuple[int, float] | None) -> Iterator[Note]:
+    def _of_series(self) -> Iterator[Note]:
         """Notes that only all frames together show."""
+        number, radius = self.reference
         smallest = np.array([facts.smallest for facts in self._facts])
         ends = dict.fromkeys(f"{f(smallest):.4g}" for f in (np.min, np.max) if len(smallest))
         spelt = " to ".join(ends)
-        if reference is not None and np.any(np.abs(smallest / reference[1] - 1.0) > GROWTH):
+        if np.any(np.abs(smallest / radius - 1.0) > GROWTH):
             yield Note(
                 "radii_change",
-                f"the smallest radius is {spelt}, but 1rmin is {reference[1]:.4g} in all frames, "
-                f"as in frame {reference[0]}: "
+                f"the smallest radius is {spelt}, but 1rmin is {radius:.4g} in all frames, "
+                f"as in frame {number}: "
                 f"`reference` chooses another frame for the lengths of the series",
                 kind=ScanfabNote,
             )
