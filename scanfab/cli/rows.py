@@ -132,22 +132,19 @@ class _Drawing:
 def _write(job: Job, excerpt: Excerpt) -> None:
     """Write the rows as they come; if that fails or is interrupted, say how to continue."""
     as_table = job.output is None and is_readable()
+    prints = job.output is None and not as_table
     try:
         with telling(lambda: _standing(job)):
-            prints = job.output is None and not as_table
-            with working(job.frames, job.done, prints) as advance:
-                if job.output is not None:
-                    job.write(advance)
-                elif as_table:
-                    rows = list(job.rows(advance))
-                else:
-                    # closed here: if the reader of a pipe ends, the last notes are still told
-                    with closing(job.rows(advance)) as rows_so_far:
-                        print_csv(rows_so_far, excerpt, job.settings.columns)
+            # closed here: if the reader of a pipe ends, the last notes are still told
+            with (
+                working(job.frames, job.done, prints) as advance,
+                closing(job.rows(advance)) as computed,
+            ):
+                if prints:
+                    print_csv(computed, excerpt, job.settings.columns)
+                rows = list(computed)
             if as_table:
                 print_table(rows, excerpt)
-            if job.output is None:
-                job.save_manifests()
     except (scanfab.ScanfabError, OSError) as error:
         # with the same wrong option the same command would stop again
         if job.output is not None and job.done and not isinstance(error, scanfab.SettingsError):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -21,7 +21,6 @@ from scanfab.pipeline.compute import Observer, compute_frames
 from scanfab.pipeline.frames import NoChosenFrameError, number_of_reference, of_whole
 from scanfab.pipeline.options import Told
 from scanfab.pipeline.record import (
-    FREE,
     FrameRows,
     PartFile,
     Record,
@@ -65,7 +64,7 @@ class Job:
     """Slices of series become whole series; then `settings` choose the frames of the slices."""
     settings: Settings
     output: Path | None = None
-    """FILE; without it the rows must be taken from :meth:`rows`."""
+    """FILE; without it no rows are written."""
     excerpt: Excerpt = ALL
     """Columns and digits of the rows in FILE."""
     resume: bool = False
@@ -89,6 +88,7 @@ class Job:
     """The rows of all finished frames, including those of earlier runs."""
     resumed: Record | None = field(default=None, init=False)
     """The complete FILE that is resumed, if there is one."""
+    _part: PartFile | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         parts = [of_whole(one, self.settings) for one in self.series]
@@ -165,22 +165,20 @@ class Job:
         SettingsError
             If the rows were made with other settings or of other inputs.
         """
-        if self.output is None:
+        if self._part is None:
             yield
             return
         with self._part.alone():
             if self.resume:
-                self._take_over(self.output)
+                self._take_over(self._part)
             yield
 
     def rows(self, advance: Advance = lambda: None) -> Generator[Row, None, None]:
-        """The rows that are computed now; a frame is finished once its rows are taken."""
-        for _, rows in self._computed(advance):
-            yield from rows
-
-    def write(self, advance: Advance = lambda: None) -> None:
         """
-        Compute the rows and write them to FILE, inside a block of :meth:`begun`.
+        Compute the missing rows, write FILE and the manifests, and yield what is computed now.
+
+        With FILE, this must be inside a block of :meth:`begun`. Without it, a frame is finished
+        once its rows are taken.
 
         Raises
         ------
@@ -189,21 +187,31 @@ class Job:
         OSError
             If the file cannot be written to.
         """
-        assert self.output is not None
-        if not (self.resume and self._part.frames):
-            self._part.begin(self.asked)
+        part, known = self._part, set[Path]()
+        if part is not None and not (self.resume and part.frames):
+            part.begin(self.asked)
             if self.resumed is not None:
-                self._part.add(self.resumed.manifest["inputs"], self.every_row)
-        known = set[Path]()
-        for one, rows in self._computed(advance):
-            files = dict.fromkeys((*named_files(self.asked), *one.files(rows[0].frame, known)))
-            self._part.add([input_entry(file) for file in files if file not in known], rows)
-            known.update(files)
+                part.add(self.resumed.manifest["inputs"], self.every_row)
+        for one, rows in self._computed():
+            frame = rows[0].frame
+            if part is not None:
+                files = dict.fromkeys((*named_files(self.asked), *one.files(frame, known)))
+                part.add([input_entry(file) for file in files if file not in known], rows)
+                known.update(files)
+            yield from rows
+            self.finished[one.name, frame] = rows
+            advance()
+        for one in self.series:
+            if isinstance(one, FollowedSeries):
+                one.end()
+        if part is None:
+            self._save_manifests()
+            return
         columns = self.settings.columns
-        write_rows(self.output, self.every_row, columns, self.excerpt, self.save_manifests)
-        self._part.remove()
+        write_rows(part.output, self.every_row, columns, self.excerpt, self._save_manifests)
+        part.remove()
 
-    def save_manifests(self) -> None:
+    def _save_manifests(self) -> None:
         """Write the manifest beside FILE, and where the user asked for it."""
         files = {*named_files(self.asked), *(path for one in self.series for path in one.files())}
         versions = {name: version(name) for name in PACKAGES}
@@ -225,7 +233,7 @@ class Job:
             outdated = self.output if self.resumed is None else None
             write_manifest(manifest_of(self.output), found, outdated)
 
-    def _computed(self, advance: Advance) -> Iterator[tuple[Series, list[Row]]]:
+    def _computed(self) -> Iterator[tuple[Series, list[Row]]]:
         """The rows of each frame that is computed now, with its series."""
         observers = self.observers or repeat(None)
         for one, observe in zip(self.series, observers, strict=False):
@@ -238,45 +246,36 @@ class Job:
                 name=one.name if len(self.series) > 1 else "",
             )
             try:
-                for rows in computed:
-                    yield one, rows
-                    self.finished[one.name, rows[0].frame] = rows
-                    advance()
+                yield from zip(repeat(one), computed)
             except NoChosenFrameError as none:
                 # an array of more jobs than frames has jobs without frames
                 note(f"{str(none).removeprefix('frames: ')}, so the table has no rows of it")
-        for one in self.series:
-            if isinstance(one, FollowedSeries):
-                one.end()
 
-    def _take_over(self, output: Path) -> None:
-        """Take over the frames that FILE.part holds, else those of a complete FILE."""
-        # a followed series counts with the files that exist now
-        series = [one.as_it_is if isinstance(one, FollowedSeries) else one for one in self.series]
-        if self._part.frames:
-            record = self._part.read()
-            self.finished = self._checked(record, series)
-        elif output.is_file():
-            record = self.resumed = read_table(output)
-            self.finished = self._checked(record, series, FREE)
+    def _take_over(self, part: PartFile) -> None:
+        """
+        Take over the frames that FILE.part holds, else those of a complete FILE.
+
+        SettingsError is raised if this run would compute other rows.
+        """
+        if part.frames:
+            record = part.read()
+        elif part.output.is_file():
+            record = self.resumed = read_table(part.output)
         else:
             return
-        frames = _joined_frames(record, self.settings.frames, [len(one) for one in series])
-        self.settings = replace(self.settings, frames=frames)
-
-    def _checked(
-        self, record: Record, series: Sequence[Series], free: Collection[str] = ()
-    ) -> FrameRows:
-        """The complete frames of a record; SettingsError if this run would compute other rows."""
-        for reason in _objections(record, self.asked, series, free):
+        # a followed series counts with the files that exist now
+        series = [one.as_it_is if isinstance(one, FollowedSeries) else one for one in self.series]
+        for reason in _objections(record, self.asked, series):
             advice = "name another `output=FILE`, or leave out `resume` to compute all again"
             raise SettingsError(f"{record.path}: `resume` cannot go on with it: {reason}: {advice}")
         count = record.settings.rows_per_frame
-        return {key: rows for key, rows in record.rows.items() if len(rows) == count}
+        self.finished = {key: rows for key, rows in record.rows.items() if len(rows) == count}
+        frames = _joined_frames(record, self.settings.frames, [len(one) for one in series])
+        self.settings = replace(self.settings, frames=frames)
 
 
 def _objections(
-    record: Record, asked: Mapping[str, Any], series: Sequence[Series], free: Collection[str]
+    record: Record, asked: Mapping[str, Any], series: Sequence[Series]
 ) -> Iterator[str]:
     """
     Reasons why a run would compute other rows than those of a record; none if it would not.
@@ -292,10 +291,8 @@ def _objections(
         The settings of this run.
     series : sequence of Series
         The series of this run.
-    free : collection of str
-        Settings that may differ.
     """
-    if differing := record.differing(asked, free):
+    if differing := record.differing(asked):
         yield f"it was made with other settings ({differing})"
     if not record.rows:
         return

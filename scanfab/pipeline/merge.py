@@ -12,7 +12,7 @@ from scanfab.base.errors import ReadError, SettingsError, warn
 from scanfab.base.files import refuse_inputs
 from scanfab.io.families import PathLike
 from scanfab.io.options import parse_frames
-from scanfab.pipeline.record import FREE, Record, part_of, read_table, write_manifest
+from scanfab.pipeline.record import Record, part_of, read_table, write_manifest
 from scanfab.pipeline.values import as_written
 from scanfab.table.row import Row
 from scanfab.table.table import Table
@@ -98,7 +98,7 @@ def _joined_manifest(records: Sequence[Record], frames: slice) -> dict[str, Any]
     inputs: dict[str, tuple[Mapping[str, Any], Path]] = {}
     counts: dict[str, int] = {}
     for record in records:
-        if differing := first.differing(record.manifest["settings"], FREE):
+        if differing := first.differing(record.manifest["settings"]):
             raise ReadError(f"{record.path}: has other settings ({differing}) than {first.path}")
         for path, entry in record.inputs.items():
             before, part = inputs.setdefault(path, (entry, record.path))

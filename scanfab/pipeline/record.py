@@ -102,9 +102,9 @@ class Record(NamedTuple):
         inputs = {str(entry.get("path")): entry for entry in manifest["inputs"]}
         return cls(path, settings, manifest, inputs, found, names)
 
-    def differing(self, asked: Mapping[str, Any], free: Collection[str] = ()) -> str:
-        """The names of the settings that differ from others, except the ``free`` ones."""
-        before = self.manifest["settings"]
+    def differing(self, asked: Mapping[str, Any]) -> str:
+        """The names of the settings that differ from others; those of a table except ``FREE``."""
+        before, free = self.manifest["settings"], FREE if "frames" in self.manifest else ()
         names = {name for name in (*before, *asked) if before.get(name) != asked.get(name)}
         words = {"scanfab": "version of scanfab"}
         return ", ".join(sorted(words.get(name, name) for name in names - {*free}))

@@ -132,7 +132,7 @@ def compute_file(
         excerpt = Excerpt.make(settings.columns, fields, digits)
         job = table_job(series, settings, outputs, excerpt, told=told, executor=executor)
         with job.begun():
-            job.write(lambda: progress and progress(job.done, job.frames()))
+            list(job.rows(lambda: progress and progress(job.done, job.frames())))
     return load(Path(output))
 
 
