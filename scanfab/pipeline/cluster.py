@@ -80,24 +80,18 @@ def dask_executor(
         raise SettingsError("name a cluster by either `scheduler` or `scheduler_file`")
     try:
         from distributed import Client
+        from distributed.utils import silence_logging_cmgr
     except ImportError:
         install = "pip install 'scanfab[cluster]'"
         raise SettingsError(f"a Dask cluster needs the package distributed: {install}") from None
     address = str(scheduler) if scheduler_file is None else _address_in(Path(scheduler_file))
     # Dask logs lost connections; our error says the same
-    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
-    levels = [logger.level for logger in loggers]
-    client = None
-    try:
-        for logger in loggers:
-            logger.setLevel(logging.CRITICAL + 1)
+    with silence_logging_cmgr(logging.CRITICAL + 1):
         client = _connected(Client, address)
-        yield DaskExecutor(client, address)
-    finally:
-        if client is not None:
+        try:
+            yield DaskExecutor(client, address)
+        finally:
             client.close(timeout=2)
-        for logger, level in zip(loggers, levels, strict=True):
-            logger.setLevel(level)
 
 
 def _connected(connect: Any, address: str) -> Any:
@@ -137,7 +131,7 @@ class DaskExecutor(Executor):
         self.client, self.address = client, address
         self._submit: Callable[..., Future[Any]]
         self._submit = client.get_executor(pure=False, retries=RETRIES).submit
-        if not self._threads():
+        if not self.threads():
             # a warning, so that --quiet shows it too: nothing else tells why nothing happens
             what = "the scheduler has no workers yet: frames wait for them, without a limit"
             warn(f"{address}: {what}: start some with `dask worker {address}`")
@@ -146,11 +140,7 @@ class DaskExecutor(Executor):
         """Let a worker call a function; a function with a ``path`` reads that file."""
         return self._submit(computed_there, fn, versions_here(), *args, **kwargs)
 
-    def room(self) -> int:
-        """How many frames may be under way: one for each thread of the workers, and at least 1."""
-        return max(self._threads(), 1)
-
-    def _threads(self) -> int:
+    def threads(self) -> int:
         """
         The number of threads of all workers; ClusterError if the scheduler does not answer.
 

@@ -342,7 +342,8 @@ def _in_order(
     try:
         while waiting or end is None:
             # only Dask knows how many threads its workers have
-            room = executor.room() if isinstance(executor, DaskExecutor) else settings.workers
+            known = executor.threads() if isinstance(executor, DaskExecutor) else settings.workers
+            room = max(known, 1)
             fresh, computed = list[_Job](), None
             if waiting and (end or len(waiting) >= room):
                 wait([waiting[0][1]], PAUSE)

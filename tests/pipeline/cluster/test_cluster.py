@@ -143,7 +143,7 @@ def test_packings_do_not_pile_up(executor):
             yield packing
 
     assert len(scanfab.compute(packings(), executor=executor, **QUICK)) == 60
-    assert max(most) <= executor.room() + 6
+    assert max(most) <= executor.threads() + 6
 
 
 def test_a_worker_that_dies_costs_its_frames_again(cluster, is_same, after_a_row):
