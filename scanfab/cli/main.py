@@ -50,8 +50,9 @@ def run(args: list[str]) -> int:
 
     from scanfab.base.errors import DimensionError, NoReferenceError
     from scanfab.cli.group import cli
-    from scanfab.cli.signals import interrupted_words
+    from scanfab.cli.signals import interrupted_words, tell_if_ended
 
+    tell_if_ended()
     # --debug may stand anywhere; click knows the option only to list it in the help
     debug = "--debug" in args
     args = [word for word in args if word != "--debug"]

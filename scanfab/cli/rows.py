@@ -12,7 +12,7 @@ import scanfab
 from scanfab.cli.console import announce, draw, is_readable, print_csv, print_table, working
 from scanfab.cli.options import checked, excerpt_of, open_series, take_output, usage_errors
 from scanfab.cli.settings_file import as_listed
-from scanfab.cli.signals import ending_in_order, telling
+from scanfab.cli.signals import ending_in_order, tell_if_ended
 from scanfab.pipeline.map_settings import MapSettings
 from scanfab.pipeline.options import Output
 from scanfab.pipeline.settings import Settings
@@ -133,18 +133,18 @@ def _write(job: Job, excerpt: Excerpt) -> None:
     """Write the rows as they come; if that fails or is interrupted, say how to continue."""
     as_table = job.output is None and is_readable()
     prints = job.output is None and not as_table
+    tell_if_ended(lambda: _standing(job))
     try:
-        with telling(lambda: _standing(job)):
-            # closed here: if the reader of a pipe ends, the last notes are still told
-            with (
-                working(job.frames, job.done, prints) as advance,
-                closing(job.rows(advance)) as computed,
-            ):
-                if prints:
-                    print_csv(computed, excerpt, job.settings.columns)
-                rows = list(computed)
-            if as_table:
-                print_table(rows, excerpt)
+        # closed here: if the reader of a pipe ends, the last notes are still told
+        with (
+            working(job.frames, job.done, prints) as advance,
+            closing(job.rows(advance)) as computed,
+        ):
+            if prints:
+                print_csv(computed, excerpt, job.settings.columns)
+            rows = list(computed)
+        if as_table:
+            print_table(rows, excerpt)
     except (scanfab.ScanfabError, OSError) as error:
         # with the same wrong option the same command would stop again
         if job.output is not None and job.done and not isinstance(error, scanfab.SettingsError):

@@ -18,17 +18,9 @@ PLAIN_LINE = "\r\x1b[2K\x1b[?25h"
 _more: list[Callable[[], str]] = []
 
 
-@contextmanager
-def telling(words: Callable[[], str]) -> Iterator[None]:
-    """Inside the block, add these words to "interrupted", for instance "after 4 of 5 frames"."""
-    _more[:] = [words]
-    try:
-        yield
-    except Exception:
-        _more.clear()
-        raise
-    # not in a finally: after KeyboardInterrupt the words are still needed for the message
-    _more.clear()
+def tell_if_ended(*words: Callable[[], str]) -> None:
+    """From now on add these words to "interrupted", for instance "after 4 of 5 frames"."""
+    _more[:] = words
 
 
 def interrupted_words(number: int) -> str:

@@ -10,7 +10,7 @@ import pytest
 
 from scanfab.base.errors import ReadError
 from scanfab.cli import group, main
-from scanfab.cli.signals import interrupted_words, telling
+from scanfab.cli.signals import interrupted_words, tell_if_ended
 from tests.helpers.interruptions import FAST, PROGRAM
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
@@ -54,7 +54,7 @@ def test_a_closed_pipe_ends_quietly(series) -> None:
 # a shell's background jobs ignore SIGINT
 START = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
 DEAF = """
-from scanfab.cli.signals import telling
+from scanfab.cli.signals import tell_if_ended
 
 class Deaf:
     def __del__(self):
@@ -62,13 +62,13 @@ class Deaf:
         time.sleep(0.1)
 
 def run(args):
-    with telling(lambda: "after 4 of 5 frames"):
-        Deaf()
-        try:
-            os.kill(os.getpid(), signal.SENT)
-            time.sleep(0.1)
-        except BaseException:
-            pass
+    tell_if_ended(lambda: "after 4 of 5 frames")
+    Deaf()
+    try:
+        os.kill(os.getpid(), signal.SENT)
+        time.sleep(0.1)
+    except BaseException:
+        pass
     sys.exit("it went on")
 """
 ENDED = [("SIGINT", 130, "interrupted"), ("SIGTERM", 143, "terminated")]
@@ -97,8 +97,9 @@ def test_a_signal_ends_the_process_at_once(tmp_path, sent, code, word):
 
 
 def test_words_of_a_command_that_is_over_are_not_told():
-    with telling(lambda: "after 1 of 2 frames"):
-        assert interrupted_words(signal.SIGINT) == "scanfab: interrupted after 1 of 2 frames"
+    tell_if_ended(lambda: "after 1 of 2 frames")
+    assert interrupted_words(signal.SIGINT) == "scanfab: interrupted after 1 of 2 frames"
+    assert main.run(["--help"]) == 0
     assert interrupted_words(signal.SIGINT) == "scanfab: interrupted"
 
 
