@@ -94,11 +94,8 @@ def whole_file(path: Path) -> Iterator[Path]:
     part = path.with_name(f"{path.stem[:60]}.{os.urandom(4).hex()}.part{path.suffix}")
     remove = partial(part.unlink, missing_ok=True)
     with named_errors(path, part), undone_at_end(remove):
-        try:
-            yield part
-            os.replace(part, path)
-        finally:
-            remove()
+        yield part
+        os.replace(part, path)
 
 
 @contextmanager
@@ -167,11 +164,12 @@ def at_end(step: Step) -> None:
 
 @contextmanager
 def undone_at_end(step: Step) -> Iterator[None]:
-    """Within the block, call a function if the process ends."""
+    """Call a function at the end of the block, or of the process if that comes first."""
     _steps.append(step)
     try:
         yield
     finally:
+        step()
         _steps.remove(step)
 
 

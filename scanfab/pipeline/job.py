@@ -125,7 +125,8 @@ class Job:
     def found_void_fabric(self) -> bool:
         """Whether any row has a void fabric; also if a FILE that is resumed has no such columns."""
         names = ("alpha_vs", "alpha_vs_axial")
-        if self.resumed and self.resumed.rows and self.resumed.columns.isdisjoint(names):
+        written = self.excerpt.fields or names
+        if self.resumed is not None and self.resumed.rows and not {*names} & {*written}:
             return True
         rows = (row for rows in self.finished.values() for row in rows)
         return any(row[name] is not None for row in rows for name in names)
@@ -188,7 +189,7 @@ class Job:
             If the file cannot be written to.
         """
         part, known = self._part, set[Path]()
-        if part is not None and not (self.resume and part.frames):
+        if part is not None and not (self.resume and part.holds_frames):
             part.begin(self.asked)
             if self.resumed is not None:
                 part.add(self.resumed.manifest["inputs"], self.every_row)
@@ -257,7 +258,7 @@ class Job:
 
         SettingsError is raised if this run would compute other rows.
         """
-        if part.frames:
+        if part.holds_frames:
             record = part.read()
         elif part.output.is_file():
             record = self.resumed = read_table(part.output)

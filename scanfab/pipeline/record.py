@@ -51,8 +51,6 @@ from scanfab.table.writing import ALL, Excerpt, manifest_of
 FREE = ("frames", "sources")
 # entries of a manifest that are lists
 LISTS = ("inputs", "warnings", "notes")
-# options that take their numbers one by one
-APART = ("rv_center", "rv_size", "cell")
 # a file is read by so many bytes at a time
 PIECE = 1 << 20
 # entries of the settings that are no options
@@ -76,8 +74,6 @@ class Record(NamedTuple):
     """The entries of the inputs in the manifest, by path."""
     rows: FrameRows
     """Rows of a damaged table may be fewer than a frame has."""
-    columns: frozenset[str]
-    """The columns that were written; empty if there is no row."""
 
     @classmethod
     def of(cls, path: Path, manifest: dict[str, Any], rows: Sequence[Mapping[str, Any]]) -> Record:
@@ -86,8 +82,8 @@ class Record(NamedTuple):
             settings = restored_settings(manifest["settings"])
         except SettingsError as error:
             raise SettingsError(f"{path}: {error}") from None
-        names, known = frozenset(rows[0] if rows else ()), {one.name for one in settings.columns}
-        if lost := sorted(names - known):
+        known = {one.name for one in settings.columns}
+        if lost := sorted({*rows[0]} - known if rows else ()):
             advice = "install the package that made them"
             raise SettingsError(
                 f"{path}: nothing here makes its columns {', '.join(lost)}: {advice}"
@@ -100,7 +96,7 @@ class Record(NamedTuple):
             complete = row_of(settings.columns, row)
             found.setdefault((row["source"], row["frame"]), []).append(complete)
         inputs = {str(entry.get("path")): entry for entry in manifest["inputs"]}
-        return cls(path, settings, manifest, inputs, found, names)
+        return cls(path, settings, manifest, inputs, found)
 
     def differing(self, asked: Mapping[str, Any]) -> str:
         """The names of the settings that differ from others; those of a table except ``FREE``."""
@@ -209,14 +205,11 @@ def _words(flag: str, name: str, value: Any) -> list[str]:
     """An option as words of a command line."""
     if isinstance(value, dict):
         value = [f"{key}={column}" for key, column in value.items()]
-    if isinstance(value, list):
-        parts = [shortest(one) if isinstance(one, float) else str(one) for one in value]
-        if name == "boundary":
-            return [word for rule in parts for word in (flag, rule)]
-        if name in APART:
-            return [flag, *parts]
-        value = ",".join(parts)
-    text = shortest(value) if isinstance(value, float) else str(value)
+    values = value if isinstance(value, list) else [value]
+    texts = [shortest(one) if isinstance(one, float) else str(one) for one in values]
+    if name == "boundary":
+        return [word for rule in texts for word in (flag, rule)]
+    text = ",".join(texts)
     # a value that starts with a dash would be taken for an option
     return [f"{flag}={text}"] if text.startswith("-") else [flag, text]
 
@@ -314,9 +307,8 @@ class PartFile:
 
     def __init__(self, output: Path) -> None:
         self.output, self.path = output, part_of(output)
-        self.frames = 0
-        """Number of finished frames that it holds, inside a block of :meth:`alone`."""
-        self._lines: list[bytes] = []
+        self.holds_frames, self._lines = False, list[bytes]()
+        """Whether an earlier run has left finished frames, inside a block of :meth:`alone`."""
 
     @contextmanager
     def alone(self) -> Iterator[None]:
@@ -324,11 +316,8 @@ class PartFile:
         with locked(self.path) as self._stream, undone_at_end(self._remove_if_empty):
             lines = self.path.read_bytes().splitlines(keepends=True)
             self._lines = [line for line in lines if line.endswith(b"\n")]
-            self.frames = max(len(self._lines) - 1, 0)
-            try:
-                yield
-            finally:
-                self._remove_if_empty()
+            self.holds_frames = len(self._lines) > 1
+            yield
 
     def read(self) -> Record:
         """Read the finished frames and cut off an unfinished one; ReadError if it is damaged."""
@@ -345,7 +334,7 @@ class PartFile:
 
     def begin(self, asked: Mapping[str, Any]) -> None:
         """Start again with these settings; finished frames are kept under another name."""
-        if self.frames:
+        if self.holds_frames:
             names = (f"{self.output.stem}.{n}{self.output.suffix}" for n in count(1))
             others = map(self.output.with_name, names)
             other = next(one for one in others if not (one.exists() or part_of(one).exists()))
@@ -356,12 +345,10 @@ class PartFile:
         with named_errors(self.path):
             self._stream.truncate(0)
         self._write({"settings": asked})
-        self.frames = 0
 
     def add(self, inputs: Iterable[Mapping[str, Any]], rows: Iterable[Row]) -> None:
         """Append a finished frame, with the input files that no earlier frame was made of."""
         self._write({"inputs": list(inputs), "rows": [ALL.of(row) for row in rows]})
-        self.frames += 1
 
     def remove(self) -> None:
         """Remove the file and its lock: the table is complete."""
@@ -380,6 +367,5 @@ class PartFile:
     def _remove_if_empty(self) -> None:
         """Remove the file if it holds no frame: there is nothing to resume."""
         is_there = not self._stream.closed and self.path.exists()
-        # counted in the file, as a signal may come just before `frames` is increased
         if is_there and self.path.read_bytes().count(b"\n") < 2:
             self.remove()
