@@ -301,18 +301,11 @@ class VariantColumns:
             # a note on the RV says why
             return {}
         if not self.measured.meets_solids:
-            with_rattlers = replace(self.variant, without_rattlers=False)
-            rattlers = sample.number(sample.solids(with_rattlers, self.window))
-            if not rattlers:
-                return {"no_solid": f"no grain reaches into the {self.window}"}
-            reaching = " that reach into the RV" if self.variant.in_window else ""
-            return {"no_solid": f"no grain is left, all {rattlers}{reaching} are rattlers"}
+            grain = "no grain but rattlers" if self.variant.without_rattlers else "no grain"
+            place = "is left" if self.window is None else f"reaches into the {self.window}"
+            return {"no_solid": f"{grain} {place}"}
         if self.edge == ENDS and self.window is None and self.measurement.solids.inner is None:
-            text = (
-                "the sample is flat or too small for `edge=ends`: the whole is then measured in an "
-                "ellipsoid that lies one largest radius inside the hull of the grain centres, and "
-                "none fits"
-            )
+            text = "the sample is flat or too small for `edge=ends`: no ellipsoid fits into it"
             return {"no_inner_window": text}
         if self.measured.segment_count == 0:
             times = self.cutoff / float(sample.packing.radius[sample.grains].min())

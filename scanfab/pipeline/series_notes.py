@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from scanfab.base.errors import Note, ScanfabNote, SkippedFrameWarning, tell
-from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray
 from scanfab.packing.bodies import Grouping, regrouped
 from scanfab.packing.cell import Cell
@@ -59,9 +58,8 @@ class SeriesNotes:
 
     def __init__(self, settings: Settings, name: str, reference: tuple[int, float]) -> None:
         self.settings, self.name, self.reference = settings, name, reference
-        self._frames: list[int] = []
         self._held: dict[tuple[str, tuple[str, ...]], tuple[Note, list[int]]] = {}
-        """The first note of each kind, and the places of its frames among all frames."""
+        """The first note of each kind, and the numbers of its frames."""
         self._flips = Flips(settings.frames.step)
         self._grouping: tuple[int, Grouping] | None = None
         self._facts: list[Facts] = []
@@ -78,28 +76,26 @@ class SeriesNotes:
                 self._grouping = self._grouping or (number, facts.grouping)
                 found += filter(None, [regrouped(*self._grouping, facts.grouping)])
         self._rows += rows
-        self._frames.append(number)
         for note in found:
-            _, places = self._held.setdefault((note.code, note.variants), (note, []))
-            if not places or note.kind is SkippedFrameWarning:
+            _, frames = self._held.setdefault((note.code, note.variants), (note, []))
+            if not frames or note.kind is SkippedFrameWarning:
                 self._tell([note], f"frame {number}")
             # a frame of several cut-offs has the same note several times
-            if places[-1:] != [len(self._frames) - 1]:
-                places.append(len(self._frames) - 1)
+            if frames[-1:] != [number]:
+                frames.append(number)
 
     def end(self) -> None:
         """Issue the lines at the end of a series."""
-        for note, places in self._held.values():
-            if len(places) > 1 and note.kind is not SkippedFrameWarning:
-                # consecutive places have the same difference to their number in the list
-                runs = (
-                    [self._frames[place] for _, place in run]
-                    for _, run in groupby(enumerate(places), lambda pair: pair[1] - pair[0])
-                )
+        step = abs(self.settings.frames.step or 1)
+        for note, frames in self._held.values():
+            if len(frames) > 1 and note.kind is not SkippedFrameWarning:
+                # in a run of frames the number grows by the step
+                runs = groupby(enumerate(frames), lambda pair: pair[1] - step * pair[0])
+                ends = [[number for _, number in run] for _, run in runs]
                 spelt = ", ".join(
-                    f"{run[0]} to {run[-1]}" if run[1:] else f"{run[0]}" for run in runs
+                    f"{run[0]} to {run[-1]}" if run[1:] else f"{run[0]}" for run in ends
                 )
-                text = f"as in frame {self._frames[places[0]]}, {note.text.split(': ')[0]}"
+                text = f"as in frame {frames[0]}, {note.text.split(': ')[0]}"
                 self._tell([note._replace(text=text)], f"frames {spelt}")
         self._tell(self._of_series())
 
@@ -146,10 +142,6 @@ class SeriesNotes:
             # its minor axes differ so much that its axial part is small
             return
         near = [name for name, part in zip(AXES, axis, strict=True) if abs(part) > ALONG]
-        if near:
-            major = f'{near[0]}: choose `axis="{near[0]}"`'
-        else:
-            shear = 'in simple shear `axis="X,Y,Z"` takes the direction of compression'
-            major = f"{spelt_place(axis)}: {shear}"
-        text = f"the loading axis is not the major axis of the contact fabric, {major}"
-        yield Note("turned_axis", text, kind=ScanfabNote)
+        major = near[0] if near else ",".join(f"{part:.3g}" for part in axis)
+        text = "the loading axis is not the major axis of the contact fabric"
+        yield Note("turned_axis", f'{text}, {major}: choose `axis="{major}"`', kind=ScanfabNote)
