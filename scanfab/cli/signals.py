@@ -38,9 +38,8 @@ def catch_signals() -> None:
 @contextmanager
 def ending_in_order(end: Callable[[], object]) -> Iterator[None]:
     """Inside the block, the first signal calls ``end``; a second signal ends the process."""
-
-    before = {number: signal.getsignal(number) for number in ENDED}
-    before = {number: what for number, what in before.items() if what is not signal.SIG_IGN}
+    found = [(number, signal.getsignal(number)) for number in ENDED]
+    before = {number: what for number, what in found if what is not signal.SIG_IGN}
 
     def restore() -> None:
         for number, what in before.items():

@@ -16,7 +16,7 @@ from scanfab.pipeline.record import Record, part_of, read_table, write_manifest
 from scanfab.pipeline.values import as_written
 from scanfab.table.row import Row
 from scanfab.table.table import Table
-from scanfab.table.writing import Excerpt, check_output, manifest_of, write_rows
+from scanfab.table.writing import Excerpt, manifest_of, write_rows
 
 
 def merge_tables(
@@ -74,7 +74,6 @@ def merge_tables(
         raise SettingsError("expected the parts of a table, found none")
     chosen = parse_frames("frames", frames)
     if output is not None:
-        check_output(Path(output))
         refuse_inputs([Path(output)], [*paths, *map(manifest_of, paths)])
     records = [_read(path) for path in paths]
     manifest = _joined_manifest(records, chosen)
@@ -127,8 +126,6 @@ def _read(path: Path) -> Record:
     if part_of(path).exists():
         how = "the same command with `resume` goes on with it"
         raise ReadError(f"{path}: is not finished, as {part_of(path).name} is there: {how}")
-    if not path.exists():
-        raise ReadError(f"{path}: there is no such part: run its job")
     try:
         part = read_table(path)
     except SettingsError as error:

@@ -78,10 +78,7 @@ class Record(NamedTuple):
     @classmethod
     def of(cls, path: Path, manifest: dict[str, Any], rows: Sequence[Mapping[str, Any]]) -> Record:
         """Make a record of rows as they were read; SettingsError if the settings are invalid."""
-        try:
-            settings = restored_settings(manifest["settings"])
-        except SettingsError as error:
-            raise SettingsError(f"{path}: {error}") from None
+        settings = restored_settings(manifest["settings"], path)
         known = {one.name for one in settings.columns}
         if lost := sorted({*rows[0]} - known if rows else ()):
             advice = "install the package that made them"
@@ -140,13 +137,14 @@ def asked_for(
     return dict(json.loads(json.dumps(found, default=os.fspath)))
 
 
-def restored_settings(asked: Mapping[str, Any]) -> Settings:
-    """Make the settings of a manifest; SettingsError if any of them cannot be used any more."""
+def restored_settings(asked: Mapping[str, Any], path: Path) -> Settings:
+    """Make the settings of a table's manifest; SettingsError if any cannot be used any more."""
     kind = MapSettings if is_map(asked) else Settings
     try:
         return kind(**{name: asked[name] for name in kind.__dataclass_fields__ if name in asked})
     except (AttributeError, TypeError, ValueError, SettingsError) as error:
-        raise SettingsError(f"the settings of the manifest cannot be used: {error}") from None
+        what = f"the settings of the manifest cannot be used: {error}"
+        raise SettingsError(f"{path}: {what}") from None
 
 
 def repeat_command(

@@ -177,7 +177,7 @@ SPOILT = [
     (1, cut(-4), "lacks frame 4"),
     (1, lambda part: Path(f"{part}.manifest.json").unlink(), "there is no part_1.csv.manifest"),
     (1, lambda part: part.rename(f"{part}.part"), "is not finished"),
-    (1, Path.unlink, "there is no such part"),
+    (1, Path.unlink, "cannot be read: No such file"),
     (1, with_nan, "found nan in the column mean_length"),
     (0, with_foreign_column, "nothing here makes its columns mine"),
     (0, told(5, "inputs", 0), "expected a manifest of scanfab compute"),

@@ -5,6 +5,7 @@ import json
 import platform
 import shlex
 from importlib.metadata import version
+from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
@@ -94,7 +95,7 @@ def test_all_settings_but_the_workers_are_named_and_come_back():
     asked = asked_for(["d"], {"radius": 0.1}, settings)
     assert (asked["sources"], asked["radius"], asked["cutoff"]) == (["d"], 0.1, "0.3rmax")
     assert set(Settings.__dataclass_fields__) - set(asked) == {"workers"}
-    restored = restored_settings(json.loads(json.dumps(asked)))
+    restored = restored_settings(json.loads(json.dumps(asked)), Path("table.csv"))
     for name in chosen:
         assert getattr(restored, name) == getattr(settings, name)
 
@@ -136,4 +137,4 @@ def test_the_command_of_a_manifest_gives_the_same_bytes(tmp_path, monkeypatch, w
     assert f" {named} " in repeated
     assert run(shlex.split(repeated)[1:]) == 0
     assert again.read_bytes() == table.read_bytes()
-    assert restored_settings(asked).seed == 0
+    assert restored_settings(asked, table).seed == 0

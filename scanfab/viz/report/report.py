@@ -245,7 +245,7 @@ def show_frames(one: Input, manifest: Mapping[str, Any]) -> dict[str, Any]:
         if path.exists() and path.stat().st_size != file.get("size"):
             raise SettingsError(f"{path} has changed since the table was computed")
     asked = manifest["settings"]
-    series, settings = reopen(asked), restored_settings(asked)
+    series, settings = reopen(asked), restored_settings(asked, one.path)
     if settings.cutoffs:
         # the cut-off whose rows are reported
         cutoff = settings.cutoff if one.cutoff is None else Length(one.cutoff)
