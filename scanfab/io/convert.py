@@ -15,7 +15,7 @@ from scanfab.base.option import refuse_unknown
 from scanfab.io.families import PathLike
 from scanfab.io.formats.own import HEADS, companion_kind, companion_there, companions_of
 from scanfab.io.options import parse_frames
-from scanfab.io.series import Series
+from scanfab.io.series import Series, counts_from_end
 from scanfab.io.sources import READING, read_series
 from scanfab.io.writer import Writer, writer_for, writer_named
 from scanfab.packing.packing import Packing
@@ -133,11 +133,9 @@ def _packings(source: Any, chosen: slice) -> Iterator[tuple[int, Packing]]:
     packings = [source] if isinstance(source, Packing) else source
     if not isinstance(packings, Iterable):
         raise SettingsError(f"source: expected a path, a Series or packings, found {source!r}")
-    bounds = (chosen.start, chosen.stop, chosen.step)
-    if any((bound or 0) < 0 for bound in bounds):
-        # a bound that counts from the end needs the number of packings
+    if counts_from_end(chosen):
         return iter(list(enumerate(packings))[chosen])
-    return islice(enumerate(packings), *bounds)
+    return islice(enumerate(packings), chosen.start, chosen.stop, chosen.step)
 
 
 def save_packing(packing: Packing, path: Path, writer: Writer) -> None:

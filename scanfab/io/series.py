@@ -162,10 +162,8 @@ class Series:
         range
             It may be longer than the series.
         """
-        bounds = (frames.start, frames.stop, frames.step)
-        if any(bound is not None and bound < 0 for bound in bounds):
-            return self.numbers[: len(self)][frames]
-        return self.numbers[frames]
+        every = self.numbers[: len(self)] if counts_from_end(frames) else self.numbers
+        return every[frames]
 
     def space_of(self, number: int, position: FloatArray, id: IntArray | None = None) -> Space:
         """
@@ -358,6 +356,11 @@ class Series:
         for step, path in ((s, p) for family in self.contacts for s, p in family.files.items()):
             if (step is None or step <= last or number == ENDLESS) and path not in known:
                 yield path
+
+
+def counts_from_end(frames: slice) -> bool:
+    """Whether a slice counts from the end of a series."""
+    return any((bound or 0) < 0 for bound in (frames.start, frames.stop, frames.step))
 
 
 def _of_moment(snapshots: Sequence[Snapshot], grains: Snapshot, sure: bool) -> Snapshot | None:

@@ -23,7 +23,7 @@ from scanfab.base.errors import (
 from scanfab.base.spelling import counted
 from scanfab.io.follow import FollowedSeries
 from scanfab.io.frame import Frame
-from scanfab.io.series import ENDLESS, Series
+from scanfab.io.series import ENDLESS, Series, counts_from_end
 from scanfab.packing.boundary import select_boundary, spelt_rules, unnamed_boundary
 from scanfab.packing.doubts import cell_hint, doubts_of
 from scanfab.packing.packing import Packing
@@ -73,6 +73,10 @@ class _Stream:
     def __len__(self) -> int:
         return self._taken + sum(1 for _ in self)
 
+    def numbers_of(self, frames: slice) -> range:
+        """The numbers of a slice; packings are counted only if it counts from their end."""
+        return range(len(self) if counts_from_end(frames) else ENDLESS)[frames]
+
     def as_they_come(self) -> Iterator[Packing]:
         """Take each packing, so that it is forgotten: no more are in memory than necessary."""
         while self._kept or next(iter(self), None) is not None:
@@ -112,7 +116,7 @@ class Frames:
             self.source, self.settings = of_whole(source, settings)
         else:
             self.source = _Stream([source] if isinstance(source, Packing) else source)
-        if isinstance(self.source, FollowedSeries) and _counts_from_end(self.settings.frames):
+        if isinstance(self.source, FollowedSeries) and counts_from_end(self.settings.frames):
             what = f"{as_written(self.settings.frames)} counts from the end of the series"
             raise SettingsError(f"frames: {what}, which nobody knows while it is followed")
         self.named = number_of_reference(self.source, self.settings)
@@ -318,17 +322,9 @@ def sample_of(frame: Unread, settings: Settings) -> Sample:
     return Sample(packing, boundary, settings.min_contacts, rule, settings.min_force)
 
 
-def _counts_from_end(frames: slice) -> bool:
-    return any((bound or 0) < 0 for bound in (frames.start, frames.stop, frames.step))
-
-
 def chosen_frames(source: Series | _Stream, frames: slice) -> range:
     """The numbers of the chosen frames, in the order of the source."""
-    if isinstance(source, Series):
-        chosen = source.numbers_of(frames)
-    else:
-        # packings are counted only if necessary, because some may still come
-        chosen = range(len(source) if _counts_from_end(frames) else ENDLESS)[frames]
+    chosen = source.numbers_of(frames)
     return chosen if chosen.step > 0 else chosen[::-1]
 
 
