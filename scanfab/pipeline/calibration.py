@@ -17,7 +17,7 @@ from scanfab.base.spelling import counted
 from scanfab.io.options import parse_frames
 from scanfab.packing.sample import VARIANTS
 from scanfab.pipeline.frame import compute_frame
-from scanfab.pipeline.frames import Frames, NoChosenFrameError, Source, doubts_of_frame
+from scanfab.pipeline.frames import Frames, Source, doubts_of_frame
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import make_plan
 from scanfab.pipeline.settings import MAX_CHORDS, OF_SAMPLE, Settings
@@ -194,10 +194,7 @@ class _OneFrame:
 
     def __init__(self, source: Source, settings: Settings, frame: int) -> None:
         frames = Frames(source, replace(settings, frames=parse_frames("frame", frame)))
-        try:
-            self.number, wanted = frames.one()
-        except NoChosenFrameError:
-            raise SettingsError(f"frame: there is no frame {frame}: {frames.extent()}") from None
+        self.number, wanted = frames.one()
         # the first frame of the series that has grains makes the plan
         number, _, self.first = frames.reference()
         sample = self.first if number == self.number else frames.sample(self.number, wanted)

@@ -259,14 +259,9 @@ class Frames:
             return NoChosenFrameError(self.source.lack)
         if count == 0:
             return SettingsError(f"expected frames, found none in {self.name or 'the source'}")
-        frames = as_written(self.settings.frames)
-        return NoChosenFrameError(f"frames: the series has no frame in {frames}: {self.extent()}")
-
-    def extent(self) -> str:
-        """How many frames there are, in words."""
-        count = len(self.source)
         numbers = "1 frame, 0" if count == 1 else f"{count} frames, 0 to {count - 1}"
-        return f"{self.name or 'the packing'} has {numbers}"
+        what = f"the series has no frame in {as_written(self.settings.frames)}"
+        return NoChosenFrameError(f"{what}: {self.name or 'the packing'} has {numbers}")
 
 
 def number_of_reference(source: Series | _Stream, settings: Settings) -> int | None:

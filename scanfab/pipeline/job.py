@@ -250,7 +250,7 @@ class Job:
                 yield from zip(repeat(one), computed)
             except NoChosenFrameError as none:
                 # an array of more jobs than frames has jobs without frames
-                note(f"{str(none).removeprefix('frames: ')}, so the table has no rows of it")
+                note(f"{none}, so the table has no rows of it")
 
     def _take_over(self, part: PartFile) -> None:
         """

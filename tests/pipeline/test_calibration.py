@@ -112,7 +112,7 @@ LEAVE_OUT = "leave out `cutoffs`, `moment`, `frames` and all but one `rv`"
 
 
 REFUSED = [
-    ({"frame": -2}, "frame: there is no frame -2: .* has 1 frame, 0"),
+    ({"frame": -2}, "no frame in -2:-1: .* has 1 frame, 0"),
     ({"moment": 2}, LEAVE_OUT),
     ({"cutoffs": "0.1,0.2"}, LEAVE_OUT), ({"rv": (0.5, 0.6)}, LEAVE_OUT),
     ({"frames": ":1"}, LEAVE_OUT),

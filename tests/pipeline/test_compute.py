@@ -44,7 +44,7 @@ def test_chosen_frames_have_the_rows_that_they_have_among_all(shrinking, frames,
 
 
 def test_no_frames_at_all_are_an_error(shrinking):
-    none = "^frames: the series has no frame in "
+    none = "^the series has no frame in "
     for frames in ("4:", "-9:-5"):
         with pytest.raises(SettingsError, match=f"{none}.*: {shrinking.name} has 4 frames, 0 to 3"):
             scanfab.compute(shrinking, frames=frames, **SCAN)
