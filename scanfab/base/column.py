@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 
 from scanfab.base.errors import ScanfabError
+from scanfab.base.spelling import meant
 
 # 17 significant digits are enough for every float to read back as the same number, so they are also
 # the most that users can ask for. Manifests list the digits only if they differ from this.
@@ -74,9 +74,6 @@ def no_column(name: object, known: Iterable[str], what: str = "column") -> str:
     --------
     >>> from scanfab.base.column import no_column
     >>> no_column("alpha_v", ["frame", "alpha_vs"])
-    "there is no column 'alpha_v': did you mean alpha_vs?"
+    "there is no column 'alpha_v': did you mean 'alpha_vs'?"
     """
-    names = list(known)
-    near = get_close_matches(str(name), names, n=1)
-    hint = f"did you mean {near[0]}?" if near else f"the {what}s are {', '.join(names)}"
-    return f"there is no {what} {name!r}: {hint}"
+    return f"there is no {what} {name!r}: {meant(name, known, what)}"

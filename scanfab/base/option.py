@@ -10,13 +10,13 @@ import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
-from difflib import get_close_matches
 from functools import cache, partial, wraps
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.spelling import meant
 
 Parse = Callable[[str, Any], Any]
 Floats = tuple[float, ...]
@@ -153,8 +153,7 @@ def refuse_unknown(
     """
     for name in given:
         if name not in known:
-            near = get_close_matches(name, known, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
+            hint = meant(name, known, "option")
             if any(option.name == name for option in elsewhere):
                 hint = "it is an option of read_series"
             raise TypeError(f"{what} has no option {name!r}: {hint}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from difflib import get_close_matches
 
 
 def counted(number: int, singular: str, plural: str = "") -> str:
@@ -42,6 +43,23 @@ def spelt_place(values: Iterable[float]) -> str:
     '(0.3333, 0, 2e-09)'
     """
     return f"({', '.join(f'{value + 0.0:.4g}' for value in values)})"
+
+
+def meant(name: object, known: Iterable[str], what: str) -> str:
+    """
+    The advice for a wrong name: the most similar name of its kind, or all names.
+
+    Examples
+    --------
+    >>> from scanfab.base.spelling import meant
+    >>> meant("alpha_v", ["frame", "alpha_vs"], "column")
+    "did you mean 'alpha_vs'?"
+    >>> meant(3, ["frame", "alpha_vs"], "column")
+    'the columns are frame, alpha_vs'
+    """
+    names = list(known)
+    near = get_close_matches(str(name), names, n=1)
+    return f"did you mean {near[0]!r}?" if near else f"the {what}s are {', '.join(names)}"
 
 
 def spelt_time(seconds: float) -> str:

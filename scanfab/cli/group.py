@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from importlib import import_module
 
 import click
+
+from scanfab.base.spelling import meant
 
 # each command is a module of this name, with _ for -, which is imported when the command runs:
 # --help stays fast
@@ -38,9 +39,8 @@ class LazyGroup(click.Group):
         if cmd_name not in COMMANDS:
             if ctx.resilient_parsing:
                 return None
-            near = get_close_matches(cmd_name, COMMANDS, n=1)
-            hint = f"Did you mean {near[0]!r}?" if near else f"Choose from {', '.join(COMMANDS)}."
-            raise click.UsageError(f"No such command {cmd_name!r}. {hint}", ctx)
+            hint = meant(cmd_name, COMMANDS, "command")
+            raise click.UsageError(f"there is no command {cmd_name!r}: {hint}", ctx)
         name = cmd_name.replace("-", "_")
         command: click.Command = getattr(import_module(f"scanfab.cli.{name}"), name)
         return command

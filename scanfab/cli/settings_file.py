@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from difflib import get_close_matches
 from glob import glob
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import click
 from click.core import ParameterSource
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.spelling import meant
 from scanfab.pipeline.options import OPTIONS
 
 SECTION = "compute"
@@ -77,8 +77,7 @@ def _read(path: Path) -> dict[str, Any]:
             )
     options: dict[str, Any] = content.get(SECTION, {})
     for key in (key for key in options if key not in KEYS):
-        near = get_close_matches(key, KEYS, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else "give it on the command line"
+        hint = meant(key, KEYS, "option")
         raise click.UsageError(f"{path}: {key!r} cannot be set in a settings file: {hint}")
     return options
 

@@ -63,7 +63,7 @@ class Row(Mapping[str, Any]):
     True
     >>> row.alpha_v
     Traceback (most recent call last):
-    scanfab.base.column.NoColumnError: there is no column 'alpha_v': did you mean alpha_vs?
+    scanfab.base.column.NoColumnError: there is no column 'alpha_v': did you mean 'alpha_vs'?
     >>> row
     Row(frame=0                     variant='c'                 alpha_vs=0.0125)
     """

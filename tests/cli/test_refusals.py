@@ -33,8 +33,8 @@ LINES = [
     # words
     ("compute cube --quiet --verbose", 2, "--quiet and --verbose contradict each other"),
     ("compute one none", 2, "the sources have several settings files"),
-    ("computee", 2, "No such command 'computee'. Did you mean 'compute'?"),
-    ("nonsense", 2, "No such command 'nonsense'. Choose from compute, merge, compare, inspect"),
+    ("computee", 2, "there is no command 'computee': did you mean 'compute'?"),
+    ("nonsense", 2, "there is no command 'nonsense': the commands are compute, merge"),
     ("compute nowhere", 2, "nowhere: there is no such file, folder or glob"),
     ("compute -", 2, "standard input needs --format"),
     ("compute - . --format table", 2, "cannot be combined with other sources"),
@@ -50,7 +50,7 @@ LINES = [
     ("map cube --grid 2,2", 2, "three numbers of blocks, such as 4,4,8, found '2,2'"),
     # files to be written
     ("compute cube -o table.docx", 2, "results can be written as .csv"),
-    ("compute cube --fields frame,alpha_v", 2, "no column 'alpha_v': did you mean alpha_vs?"),
+    ("compute cube --fields frame,alpha_v", 2, "no column 'alpha_v': did you mean 'alpha_vs'?"),
     ("compute cube --resume", 2, "--resume needs -o FILE"),
     ("compute cube --vtk v --scheduler tcp://x:1", 2, "--vtk cannot be used with --scheduler"),
     ("compute cube --scheduler x --scheduler-file f", 2, "--scheduler"),

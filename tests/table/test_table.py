@@ -90,7 +90,7 @@ ASKS = [
 
 @pytest.mark.parametrize("ask", ASKS)
 def test_a_column_that_does_not_exist_is_an_error_that_names_the_nearest(table, ask):
-    with pytest.raises(KeyError, match=r"^there is no column 'alpha_v': did you mean alpha_vs"):
+    with pytest.raises(KeyError, match=r"^there is no column 'alpha_v': did you mean 'alpha_vs'"):
         ask(table)
     with pytest.raises(ScanfabError, match="no column 'qqq': the columns are source, frame"):
         table["qqq"]
@@ -139,7 +139,7 @@ def test_tensors_have_their_components_and_their_symmetry(results):
     expected = [[0.3, 0.01, 0.02], [0.01, 0.3, 0.03], [0.02, 0.03, 0.4]]
     np.testing.assert_array_equal(found[1], expected)
     assert np.isnan(found[0, 0, 2])
-    with pytest.raises(ScanfabError, match="no column 'gv_xx': did you mean gvs_xx"):
+    with pytest.raises(ScanfabError, match="no column 'gv_xx': did you mean 'gvs_xx'"):
         results.tensor("gv")
 
 
@@ -231,5 +231,5 @@ def test_a_foreign_format_is_like_the_own_ones_and_takes_no_files_from_them(
 
 
 def test_a_figure_that_does_not_exist_is_an_error_that_names_the_nearest(results):
-    with pytest.raises(AttributeError, match="no figure 'evolutoin': did you mean evol"):
+    with pytest.raises(AttributeError, match="no figure 'evolutoin': did you mean 'evol"):
         results.plot.evolutoin  # noqa: B018

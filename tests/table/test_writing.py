@@ -91,7 +91,7 @@ def test_columns_come_in_the_order_in_which_they_are_named(tmp_path, suffix):
 
 
 REFUSED = [
-    ("alpha_v", 17, "there is no column 'alpha_v': did you mean alpha_vs?"),
+    ("alpha_v", 17, "there is no column 'alpha_v': did you mean 'alpha_vs'?"),
     ("", 17, "there is no column ''"),
     ("frame,frame", 17, "the column frame is listed more than once"),
     (3, 17, "fields: expected names of columns, found 3"),
