@@ -56,12 +56,15 @@ class Option:
     """Default value as users would write it."""
     parse: Parse = lambda name, value: value
     """Function of name and value that checks and converts; converted values pass unchanged."""
-    choices: Iterable[str] | Callable[[], Iterable[str]] = ()
-    """Words that a shell completes. An option without a parser accepts no others."""
-    also: str = ""
-    """What is accepted beside the choices; for FILE a shell also completes file names."""
-    metavar: str = ""
-    """Form of the value in the help, if :attr:`form` would say too little."""
+    form: str = ""
+    """
+    Form of the value in the help, such as ``auto|cell|FILE``; empty for that of the type.
+
+    Alternatives without capitals are words, which a shell completes. An option without a parser
+    accepts nothing but these words.
+    """
+    words: Iterable[str] | Callable[[], Iterable[str]] = ()
+    """Further words that a shell completes."""
     spelling: str = ""
     """Flag of the command line, if it does not follow from the name."""
     several: bool = False
@@ -82,10 +85,9 @@ class Option:
         return self.spelling or flag_of(self.name)
 
     @property
-    def form(self) -> str:
-        """Form of the value in the help, such as ``auto|cell|FILE``; empty for any form."""
-        words = () if callable(self.choices) else (*self.choices, self.also)
-        return self.metavar or "|".join(filter(None, words))
+    def takes_file(self) -> bool:
+        """Whether the name of a file is among the values."""
+        return self.kind is Path or self.form.split("|")[-1].startswith(("FILE", "PATH"))
 
 
 def flag_of(name: str) -> str:
@@ -103,9 +105,8 @@ def flag_of(name: str) -> str:
 
 def option(parse: Parse | None = None, **declaration: Any) -> Any:
     """Declare an option as a field of a dataclass, with attributes of :class:`Option`."""
-    choices = declaration.get("choices")
-    if parse is None and isinstance(choices, tuple):
-        parse = one_of(*choices)
+    if parse is None and "|" in declaration.get("form", ""):
+        parse = one_of(*declaration["form"].split("|"))
     if parse is not None:
         declaration["parse"] = parse
     return field(default=declaration.get("default"), metadata=declaration)

@@ -20,7 +20,7 @@ from scanfab.base.option import GROUPS, Option
 from scanfab.cli.console import AS_CSV, Command
 from scanfab.cli.settings_file import as_listed, take_settings_file
 from scanfab.io.options import READING_OPTIONS, take_reading
-from scanfab.pipeline.options import DECLARED, Output, as_options
+from scanfab.pipeline.options import DECLARED, OPTIONS, Output, as_options
 from scanfab.pipeline.settings import Settings
 
 if TYPE_CHECKING:
@@ -35,16 +35,7 @@ S = TypeVar("S", bound=Settings)
 SETS: dict[str, Sequence[str]] = {
     "READING": [option.name for option in READING_OPTIONS],
     "SAMPLE": ("boundary", "min_contacts", "rattlers", "min_force", "contact_tolerance"),
-    "WINDOW": (
-        "reference",
-        "rv",
-        "rv_radius",
-        "rv_center",
-        "rv_shape",
-        "rv_size",
-        "rv_axis",
-        "rv_follows",
-    ),
+    "WINDOW": ["reference", *(name for name in OPTIONS if name.startswith("rv"))],
     "EXCERPT": ("fields", "digits"),
 }
 # --cutoff of commands that take tables
@@ -98,16 +89,14 @@ class SourceCommand(Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Join the numbers that follow an option into one word: click allows no variable count."""
-        joined: list[str] = []
-        rest = list(args)
-        while rest:
-            joined.append(rest.pop(0))
-            counts = COUNTS.get(joined[-1], ())
-            found = len(list(takewhile(NUMBER.fullmatch, rest))) if counts else 0
-            if taken := max((count for count in counts if count <= found), default=found):
-                joined.append(" ".join(rest[:taken]))
-                del rest[:taken]
-        return super().parse_args(ctx, joined)
+        args = list(args)
+        for flag in COUNTS.keys() & {*args}:
+            first = args.index(flag) + 1
+            found = len(list(takewhile(NUMBER.fullmatch, args[first:])))
+            count = max((known for known in COUNTS[flag] if known <= found), default=found)
+            if count:
+                args[first : first + count] = [" ".join(args[first : first + count])]
+        return super().parse_args(ctx, args)
 
 
 def options(
@@ -132,40 +121,36 @@ def in_order(declared: Mapping[str, Option]) -> list[str]:
 
 def _click_option(option: Option, changes: Mapping[str, Any]) -> Callable[[Function], Function]:
     """The click option for a declared option; ``changes`` replaces its attributes."""
-    is_folder = option.metavar == "DIR"
+    is_folder = option.form == "DIR"
     a_path = click.Path(dir_okay=is_folder, file_okay=not is_folder, path_type=Path)
     attributes = {
         "type": a_path if option.kind is Path else option.kind,
         "metavar": option.form or METAVARS.get(option.kind),
+        **({} if option.default is None else {"default": option.default}),
+        "is_flag": option.kind is bool or None,
         "multiple": option.several,
         "help": option.help,
         "shell_complete": partial(_completed, option),
         "callback": _output if option.name == "output" else None,
-        **({} if option.default is None else {"default": option.default}),
-        **({"is_flag": True} if option.kind is bool else {}),
         **changes,
     }
-    words, default = as_options(attributes["help"]), attributes.get("default")
-    # show the default 0 of a number, but not the default False of a switch
-    if default not in (None, ()) and default is not False and "(default: " not in words:
-        # click would write 10000000000.0 and 0.0 instead of 1e10 and 0
-        short = f"{default:g}".replace("e+", "e") if isinstance(default, float) else default
-        words += f"  [default: {short}]"
-    return click.option(option.flag, option.name, **attributes | {"help": words})
+    words = as_options(attributes["help"])
+    attributes |= {"help": words, "show_default": "(default: " not in words}
+    return click.option(option.flag, option.name, **attributes)
 
 
 def _completed(
     option: Option, ctx: click.Context, parameter: click.Parameter, text: str
 ) -> list[CompletionItem]:
     """The completions that a shell offers for an option: its words, and files if it takes any."""
-    words = option.choices() if callable(option.choices) else option.choices
+    words = [word for word in option.form.split("|") if word.islower() or word.isdigit()]
+    words += option.words() if callable(option.words) else option.words
     # in a list separated by commas, only the last word is completed
     before = text[: text.rfind(",") + 1] if ",..." in option.form else ""
     named = [before + word for word in words if word not in before.split(",")]
     items = [CompletionItem(word) for word in named if word.startswith(text)]
-    takes_files = option.also.startswith(("FILE", "PATH"))
     # files come first: bash forgets the words that it got before them
-    return [CompletionItem(text, type="file"), *items] if takes_files else items
+    return [CompletionItem(text, type="file"), *items] if option.takes_file else items
 
 
 def _output(ctx: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:

@@ -89,10 +89,10 @@ def _as_typed(key: str, value: Any, folder: Path) -> Any:
     Files that an option names are looked for in the folder of the settings file first.
     """
     option, several = KEYS[key], value if isinstance(value, list) else [value]
-    words, usual = [str(item) for item in several], option.form.split("|")
-    takes_file = usual[-1].startswith(("FILE", "PATH")) and len(words) == 1
-    if takes_file and words[0] not in usual and glob(words[0], root_dir=folder):
-        words = [str(folder / words[0])]
+    words = [str(item) for item in several]
+    file = words[0] if option.takes_file and len(words) == 1 else ""
+    if file not in option.form.split("|") and glob(file, root_dir=folder):
+        words = [str(folder / file)]
     typed = words if option.several else ",".join(words)
     option.parse(key, typed)
     return typed

@@ -90,45 +90,45 @@ def parse_dim(name: str, value: Any) -> str | int:
 class Reading:
     """The options of ``read_series``."""
 
-    format: str | None = reading(parse_format, metavar="NAME", choices=installed_readers)
+    format: str | None = reading(parse_format, form="NAME", words=installed_readers)
     """Reader to use (default: chosen by the content of the file)."""
-    columns: dict[str, str] | None = reading(parse_columns, metavar="NAMES")
+    columns: dict[str, str] | None = reading(parse_columns, form="NAMES")
     """
     Names of columns that differ from the usual names: "radius=c_rad,x=px". In a table without names
     use the numbers of the columns, from 1: "x=1,y=2,z=3,diameter=4".
     """
-    contact_columns: str | None = reading(parse_text, metavar="KEYWORDS")
+    contact_columns: str | None = reading(parse_text, form="KEYWORDS")
     """
     Meaning of the columns of a dump local: LIGGGHTS keywords "pos id force", or names of columns
     "id1=NAME,id2=NAME", which also work for tables of contacts.
     """
     skip: int = reading(parse_skip, default=0)
     """Number of lines to skip at the top of a text table."""
-    radius: float | None = reading(parse_positive, metavar="L")
+    radius: float | None = reading(parse_positive, form="L")
     """Radius of all grains in the dump's units, for dumps without radii."""
-    cell: tuple[float, ...] | None = reading(parse_cell, metavar="LX LY LZ [XY XZ YZ]|FILE.csv")
+    cell: tuple[float, ...] | None = reading(parse_cell, form="LX LY LZ [XY XZ YZ]|FILE.csv")
     """
     Periodic cell, for formats that do not store it. It repeats along x, y and z unless `periodic`
     says otherwise. FILE.csv lists the cell of each step or frame: columns step lx ly lz, and
     xy xz yz if it is tilted.
     """
-    periodic: str | None = reading(parse_periodic, metavar="xyz")
+    periodic: str | None = reading(parse_periodic, form="xyz")
     """Periodic directions (default: from the dump)."""
-    bodies: str | None = reading(parse_text, metavar="COLUMN")
+    bodies: str | None = reading(parse_text, form="COLUMN")
     """
     Column that numbers the clump of each sphere; a negative number is a grain of its own (default:
     id_multisphere, clumpId, clump_id or clump, if there is one); id: each sphere is a grain.
     """
-    max_unpacked: float | None = reading(parse_positive, metavar="TIMES")
+    max_unpacked: float | None = reading(parse_positive, form="TIMES")
     """How many times its compressed size a file may grow to (default: 1000)."""
     contacts: str | PathLike[str] = reading(
-        parse_contacts, default="auto", choices=("file", "geometric"), also="PATH"
+        parse_contacts, default="auto", form="file|geometric|PATH"
     )
     """
     Source of the contacts. PATH: a file, folder or glob, matched by step; file: the contact files
     of the dump; geometric: positions and radii (default: file if there is one, else geometric).
     """
-    dim: str | int = reading(parse_dim, default="auto", choices=("auto", "2", "3"))
+    dim: str | int = reading(parse_dim, default="auto", form="auto|2|3")
     """
     2: discs in a coordinate plane; 3: spheres; auto: 2 if the first frame with grains has at least
     ten grains and all centres share exactly one coordinate. The first frame decides for all.

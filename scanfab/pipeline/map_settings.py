@@ -53,8 +53,8 @@ class MapSettings(Settings):
     24
     """
 
-    variants: str = sample(parse_variants, default="a", metavar="LETTERS", first=True)
-    grid: tuple[int, int, int] | None = sample(optional(parse_grid), metavar="NX,NY,NZ", first=True)
+    variants: str = sample(parse_variants, default="a", form="LETTERS", first=True)
+    grid: tuple[int, int, int] | None = sample(optional(parse_grid), form="NX,NY,NZ", first=True)
     """Number of blocks along x, y and z (along the edges of a periodic cell)."""
     slices: int | None = sample(optional(block_count), first=True)
     """Number of slices of equal thickness along `axis`."""

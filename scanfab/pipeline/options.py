@@ -46,7 +46,7 @@ class Output:
     File for the results: .csv .tsv .json .jsonl .parquet; - is CSV on standard output (default:
     standard output, on a terminal as a readable table).
     """
-    fields: str | None = option(metavar="NAME,NAME,...", choices=_columns)
+    fields: str | None = option(form="NAME,NAME,...", words=_columns)
     """Which columns to write, in this order (default: all)."""
     digits: int = option(default=DEFAULT_DIGITS)
     """Significant digits of numbers; 17: the shortest text that reads back to the same number."""
@@ -55,9 +55,9 @@ class Output:
     Wait for the frames of a running simulation, and compute each frame when its files are complete.
     Ctrl-C or SIGTERM finishes the frames under way and ends the run; a second signal interrupts it.
     """
-    follow_for: float | None = running(group="reading", metavar="SECONDS")
+    follow_for: float | None = running(group="reading", form="SECONDS")
     """Same as `follow`, but stop after this many seconds without a new frame."""
-    scheduler: str | None = running(group="scan", metavar="tcp://HOST:PORT")
+    scheduler: str | None = running(group="scan", form="tcp://HOST:PORT")
     """
     Send the frames to the workers of a Dask cluster, in place of `workers`. The workers must find
     the same files at the same paths.
@@ -71,11 +71,11 @@ class Output:
     Write settings, seed, versions, and the size and hash of each input as JSON. With `output=FILE`
     they are always written to FILE.manifest.json.
     """
-    vtk: Path | None = running(metavar="DIR")
+    vtk: Path | None = running(form="DIR")
     """Write files for ParaView into this folder, for each frame that this run computes."""
     plot: Path | None = running()
     """Draw a figure: .png .svg .pdf."""
-    figure: str | None = running(metavar="NAME", choices=_figures)
+    figure: str | None = running(form="NAME", words=_figures)
     """
     Which figure to draw. Of the table: evolution, normalised, correlation or columns:NAME,NAME
     (default: all on one page). Of the first and last frame: rose (rose:30,60,90 for these polar
@@ -87,16 +87,16 @@ class Output:
 class Other:
     """Options of the other commands, which compute no table."""
 
-    frame: int = reading(default=0, decides=False, metavar="K")
+    frame: int = reading(default=0, decides=False, form="K")
     """Which frame; a negative number counts from the end."""
-    to: str | None = running(metavar="NAME", choices=installed_writers, first=True)
+    to: str | None = running(form="NAME", words=installed_writers, first=True)
     """Format to write (default: from the suffix of OUT); scanfab formats lists all formats."""
 
     strain_max: float | None = running(group="fabric")
     """Leave frames beyond this strain out of the fits."""
-    labels: str | None = running(spelling="--label", several=True, metavar="NAME")
+    labels: str | None = running(spelling="--label", several=True, form="NAME")
     """Name of a table, in place of its source. Repeat the option for each table, in order."""
-    screenshot: Path | None = running(metavar="FILE.png")
+    screenshot: Path | None = running(form="FILE.png")
     """Write a picture in place of opening a window; this needs no screen."""
 
 

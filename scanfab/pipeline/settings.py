@@ -25,7 +25,7 @@ from scanfab.io.options import READING_OPTIONS, parse_frames
 from scanfab.packing.boundary import BoundaryRule
 from scanfab.packing.rattlers import installed_rules
 from scanfab.pipeline import values
-from scanfab.pipeline.values import STRAIN_MODES, Axis, Length, Vector, as_written
+from scanfab.pipeline.values import SHAPES, STRAIN_MODES, Axis, Length, Vector, as_written
 from scanfab.scan.directions import RULES, DirectionRule, rule_of
 from scanfab.scan.edges import CLIP, EDGES, ENDS
 
@@ -39,7 +39,7 @@ OF_SAMPLE, LEAST_TOLERANCE = 0.05, 1e-4
 # a component of a unit vector up to this counts as 0
 ROUNDING = 1e-9
 # beginnings of direction rules, for shell completion
-DIRECTIONS = ("auto", *(f"{name}:" for name in RULES))
+DIRECTIONS = [f"{name}:" for name in RULES]
 # options that have a meaning only if another option has this value
 NEEDS = {
     "rv_radius": ("rv_shape", "sphere"),
@@ -75,76 +75,74 @@ class Settings:
     """
 
     rv: float | tuple[float, ...] = window(
-        values.parse_fractions, default=0.7, metavar="FRACTION[,FRACTION...]", first=True
+        values.parse_fractions, default=0.7, form="FRACTION[,FRACTION...]", first=True
     )
     """
     Size of the representative volume (RV), relative to the sample: the radius of a sphere as a
     fraction of half the smallest extent of the grains, the sizes of other shapes as fractions of
     half the extents. `compute` takes several: each gives a row of its own, from the same lines.
     """
-    rv_radius: float | None = window(values.parse_radius, metavar="L")
+    rv_radius: float | None = window(values.parse_radius, form="L")
     """Radius of the spherical RV in the dump's units, instead of `rv`."""
-    rv_center: Vector | None = window(values.parse_point, metavar="X Y Z")
+    rv_center: Vector | None = window(values.parse_point, form="X Y Z")
     """Centre of the RV in the dump's units (default: middle of the sample)."""
-    rv_shape: str = window(values.parse_shape, default="sphere", choices=values.SHAPES, also="FILE")
+    rv_shape: str = window(values.parse_shape, default="sphere", form="|".join([*SHAPES, "FILE"]))
     """
     Shape of the RV; FILE is a closed convex surface in the dump's units (.stl .vtp .ply .obj).
     """
-    rv_size: tuple[float, ...] = window(values.parse_sizes, metavar="A,B,C")
+    rv_size: tuple[float, ...] = window(values.parse_sizes, form="A,B,C")
     """
     Size of the RV in the dump's units, instead of `rv`: edges of the box, radius and height of the
     cylinder, semi-axes of the ellipsoid. Discs take two numbers.
     """
-    rv_axis: Axis | None = window(values.parse_rv_axis, choices=values.AXES, also="X,Y,Z")
+    rv_axis: Axis | None = window(values.parse_rv_axis, form="x|y|z|X,Y,Z")
     """Axis of the cylinder (default: `axis`)."""
-    rv_follows: str = window(default="none", choices=("none", "strain"))
+    rv_follows: str = window(default="none", form="none|strain")
     """
     none: the RV keeps its shape. strain: it deforms with what `strain` measures: the cell, or the
     extents of boundary or grains along x, y, z.
     """
-    edge: str = window(default=CLIP, choices=EDGES)
+    edge: str = window(default=CLIP, form="|".join(EDGES))
     """
     How to count void segments that the surface of the RV cuts. clip (the paper's): their part
     inside counts, so mean lengths are a little too small. start: their full length counts, one half
     for each end inside. ends: their part inside and the number of their ends inside count. Neither
     start nor ends has this bias.
     """
-    variants: str = sample(values.parse_variants, default="abcd", metavar="LETTERS", first=True)
+    variants: str = sample(values.parse_variants, default="abcd", form="LETTERS", first=True)
     """
     Which variants to compute, as letters: a whole sample, b whole sample without rattlers, c RV, d
     RV without rattlers.
     """
     boundary: tuple[BoundaryRule, ...] = sample(
-        values.parse_boundary, default=(), metavar="EXPR", several=True, first=True
+        values.parse_boundary, default=(), form="EXPR", several=True, first=True
     )
     """
     Which particles are boundary: "type=2", "mask=3,4", "id>=13723", "id=1..800", "type!=1". Repeat
     the option to combine conditions (or); in Python, give a list.
     """
-    cutoff: Length = scan(values.parse_length, default="1rmin", metavar="L")
+    cutoff: Length = scan(values.parse_length, default="1rmin", form="L")
     """
     Shortest void segment that counts: a length in the dump's units, or relative to the radii of the
     grains, such as 1rmin, 0.5rmean, 2rmax.
     """
-    cutoffs: tuple[Length, ...] = scan(values.parse_lengths, metavar="FROM:TO:STEP|L,L,...")
+    cutoffs: tuple[Length, ...] = scan(values.parse_lengths, form="FROM:TO:STEP|L,L,...")
     """
     Several cut-offs, with a row for each, from one pass over the void segments; the scan then meets
     the tolerance at `cutoff`.
     """
-    moment: int = fabric(values.parse_moment, default=1, choices=("1", "2"))
+    moment: int = fabric(values.parse_moment, default=1, form="1|2")
     """
     1: mean length of the void segments; 2: mean of their squared lengths divided by their mean
     length.
     """
-    spacing: Length | None = scan(
-        values.parse_spacing, default="auto", metavar="L", choices=("auto",)
-    )
+    spacing: Length | None = scan(values.parse_spacing, default="auto", form="auto|L")
     """
     Distance between neighbouring scan lines: a length in the dump's units, or relative to the
     radii, such as 0.2rmin; auto meets `tolerance`.
     """
     directions: DirectionRule | None = scan(
-        values.parse_directions, default="auto", metavar="N|RULE", choices=DIRECTIONS
+        values.parse_directions, default="auto", form="auto|N|RULE", words=DIRECTIONS
     )
     """
     Directions of the scan: N axes, rounded up to the next exact rule, or lebedev:DEGREE,
@@ -152,14 +150,14 @@ class Settings:
     equal-angle-full:STEP; auto meets `tolerance`.
     """
     tolerance: float | None = scan(
-        values.parse_tolerance, kind=str, default="auto", metavar="X", choices=("auto",), first=True
+        values.parse_tolerance, kind=str, default="auto", form="auto|X", first=True
     )
     """
     Standard error of alpha_vs_axial that the scan aims at in every variant, if spacing or
     directions are auto. auto: for each row the larger of 1e-4 and a twentieth of its
     alpha_vs_axial_sample_se; in map and calibrate 1e-4.
     """
-    max_chords: float | None = scan(values.parse_work, metavar="N")
+    max_chords: float | None = scan(values.parse_work, form="N")
     """
     Limit for the work of an auto scan: in each frame the scans of the whole sample and of the RVs
     each stop before they cut more than this number of chords from grains (each line also counts as
@@ -169,46 +167,46 @@ class Settings:
     min_contacts: int = sample(values.parse_count, default=2)
     """A grain with fewer contacts (a clump: with fewer neighbours) is a rattler."""
     rattlers: str = sample(
-        values.parse_rattlers, default="count", metavar="RULE", choices=installed_rules
+        values.parse_rattlers, default="count", form="RULE", words=installed_rules
     )
     """
     Rule that finds rattlers. count: one pass over all contacts; recursive: further passes without
     the contacts of rattlers, until no new ones are found; force: one pass over the contacts whose
     force exceeds `min_force`.
     """
-    min_force: float = sample(values.parse_share, default=0.0)
+    min_force: float = sample(values.parse_share, default=0)
     """
     With `rattlers="force"`: a contact counts only if its normal force exceeds X times the mean.
     """
-    contact_tolerance: float = sample(values.parse_share, default=0.0)
+    contact_tolerance: float = sample(values.parse_share, default=0)
     """
     For contacts found by geometry: two grains touch if their distance is below (r1 + r2)(1 + X).
     """
-    axis: Axis = fabric(values.parse_axis, choices=values.AXES, also="X,Y,Z")
+    axis: Axis = fabric(values.parse_axis, form="x|y|z|X,Y,Z")
     """
     Loading axis, along which the anisotropies are signed (default: z; for discs the second axis of
     their plane).
     """
-    with_: tuple[str, ...] = fabric(
-        values.parse_groups, metavar="GROUP,...", choices=values.GROUP_NAMES
-    )
+    with_: tuple[str, ...] = fabric(values.parse_groups, form="GROUP,...", words=values.GROUP_NAMES)
     """
     Groups of further columns: forces (branches, strong and weak contacts), state (void ratio,
     stress, fabric against stress), invariants, harmonics. Several: forces,state.
     """
-    strain: str = sample(values.parse_strain, default="auto", choices=STRAIN_MODES, also="FILE.csv")
+    strain: str = sample(
+        values.parse_strain, default="auto", form="|".join([*STRAIN_MODES, "FILE.csv"])
+    )
     """
     What the axial strain is measured by: the extent of cell, boundary or grains, or FILE.csv with
     the columns step (or frame) and strain. auto: the cell if it is periodic along the loading axis,
     else the boundary; without either the strain is empty.
     """
-    frames: slice = reading(parse_frames, metavar="A:B:C", first=True)
+    frames: slice = reading(parse_frames, form="A:B:C", first=True)
     """
     Which frames: a number (0 is the first, -1 the last), or a Python slice such as :10, ::5 or -3:
     (default: all).
     """
     reference: int | None = reading(
-        optional(whole("the number of a frame, such as 0 or -1", lambda _: True)), metavar="FRAME"
+        optional(whole("the number of a frame, such as 0 or -1", lambda _: True)), form="FRAME"
     )
     """
     Number of the reference frame in each series. This frame sets L0, the RV, rmin, rmean and rmax,
@@ -219,7 +217,7 @@ class Settings:
     """Seed of the random numbers."""
     workers: int = scan(values.parse_workers, first=True, decides=False)
     """Number of parallel workers (default: all cores)."""
-    on_error: str = reading(default="stop", choices=("stop", "skip"))
+    on_error: str = reading(default="stop", form="stop|skip")
     """What to do when a frame cannot be read."""
 
     def __init__(self, **options: Any) -> None:
@@ -244,7 +242,7 @@ class Settings:
 
     def _clashes(self) -> Iterator[str]:
         """Messages about options that contradict each other, each with what to do."""
-        shape, takes = self.rv_shape, values.SHAPES.get(self.rv_shape)
+        shape, takes = self.rv_shape, SHAPES.get(self.rv_shape)
         sizes = {"rv_radius": self.rv_radius, "rv_size": self.rv_size, "rv_shape": takes is None}
         several = f"`rv` asks for {len(self.rvs)}: leave out one of the two options"
         for name, given in sizes.items():
@@ -267,7 +265,7 @@ class Settings:
 
     def _check_sizes(self, dimension: int) -> None:
         """Raise DimensionError if the RV has too many or too few sizes for discs or spheres."""
-        shape, takes = self.rv_shape, values.SHAPES.get(self.rv_shape)
+        shape, takes = self.rv_shape, SHAPES.get(self.rv_shape)
         count = 2 if shape == "cylinder" else dimension
         if takes and len(self.rv_size) not in (0, count):
             found = ",".join(f"{size:g}" for size in self.rv_size)

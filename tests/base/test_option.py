@@ -13,9 +13,9 @@ from scanfab.base.option import number, one_of, option, optional, options_of, ta
 
 @dataclass(frozen=True)
 class Weather:
-    wind_speed: float = option(group="sample", default=3.0, metavar="KNOTS")
+    wind_speed: float = option(group="sample", default=3.0, form="KNOTS")
     """How hard it blows."""
-    rain: int | None = option(group="scan", spelling="--wet", metavar="N|auto")
+    rain: int | None = option(group="scan", spelling="--wet", form="N|auto")
     """
     Of
     `wind_speed`.
