@@ -20,6 +20,7 @@ from scanfab.base.spelling import meant
 
 Parse = Callable[[str, Any], Any]
 Floats = tuple[float, ...]
+Parses = Callable[[str, Any], tuple[Any, ...]]
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -212,15 +213,16 @@ whole = partial(number, kind=int)
 """A parser of one whole number for which a condition holds."""
 
 
-def numbers(expected: str, holds: Callable[[Floats], bool]) -> Callable[[str, Any], Floats]:
+def numbers(expected: str, holds: Callable[[Floats], bool], kind: type = float) -> Parses:
     """A parser of finite numbers: a sequence, a text with commas or blanks, or one number."""
 
-    def parse(name: str, value: Any) -> tuple[float, ...]:
+    def parse(name: str, value: Any) -> tuple[Any, ...]:
         words = value.replace(",", " ").split() if isinstance(value, str) else value
         with suppress(TypeError, ValueError, OverflowError):
             values = tuple(map(float, words if isinstance(words, Iterable) else [words]))
-            if all(map(math.isfinite, values)) and holds(values):
-                return values
+            is_kind = all(one.is_integer() if kind is int else math.isfinite(one) for one in values)
+            if is_kind and holds(values):
+                return tuple(map(kind, values))
         raise unusable(name, expected, value)
 
     return parse
@@ -242,6 +244,9 @@ def one_of(*words: str) -> Parse:
     return accepted(f"{', '.join(words[:-1])} or {words[-1]}", lambda value: value in words)
 
 
-def optional(parse: Parse) -> Parse:
-    """The same parser, which also accepts None for an option that is not given."""
-    return lambda name, value: None if value is None else parse(name, value)
+def optional(parse: Parse, word: str | None = None) -> Parse:
+    """The same parser, but None and a word such as ``auto`` give None: the user chose no value."""
+    words = (None, word)
+    return lambda name, value: (
+        None if isinstance(value, str | None) and value in words else parse(name, value)
+    )

@@ -6,12 +6,12 @@ from typing import Any
 
 import click
 
-from scanfab.cli.options import SourceCommand, in_order, options
+from scanfab.cli.options import SourceCommand, options
 from scanfab.pipeline.options import OPTIONS
 
 
 @click.command(cls=SourceCommand)
-@options(*in_order(OPTIONS))
+@options(*OPTIONS)
 def compute(sources: tuple[str, ...], **chosen: Any) -> int:
     """
     Compute the fabric table: one row per frame and variant.

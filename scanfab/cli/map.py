@@ -7,12 +7,12 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from scanfab.cli.options import SourceCommand, checked, in_order, open_series, options
+from scanfab.cli.options import SourceCommand, checked, open_series, options
 from scanfab.pipeline.options import MAP_OPTIONS, Output
 
 
 @click.command(cls=SourceCommand)
-@options(*in_order(MAP_OPTIONS), declared=MAP_OPTIONS)
+@options(*MAP_OPTIONS, declared=MAP_OPTIONS)
 @options("frame", default=None, help="Only this frame; a negative number counts from the end.")
 def map(sources: tuple[str, ...], frame: int | None, **chosen: Any) -> int:
     """

@@ -113,12 +113,6 @@ def options(
     return add
 
 
-def in_order(declared: Mapping[str, Option]) -> list[str]:
-    """The names of options, in the order of the groups in the help."""
-    order = ("output", "sample", "reading", "window", "scan", "fabric")
-    return sorted(declared, key=lambda name: order.index(declared[name].group))
-
-
 def _click_option(option: Option, changes: Mapping[str, Any]) -> Callable[[Function], Function]:
     """The click option for a declared option; ``changes`` replaces its attributes."""
     is_folder = option.form == "DIR"

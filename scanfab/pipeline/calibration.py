@@ -224,7 +224,7 @@ class _OneFrame:
         elif settings.needs_window and settings.rv_shape in SHAPES:
             # a surface from a file has one size, so it has no ladder
             variants = "".join(variant for variant in settings.variants if variant in "cd")
-            words = {"rv_radius": None, "rv_size": (), "variants": variants}
+            words = {"rv_radius": None, "rv_size": None, "variants": variants}
             steps = {value: {"rv": value, **words} for value in RV_FRACTIONS}
         rows: list[Row] = []
         for value, changed in steps.items():

@@ -16,17 +16,10 @@ if TYPE_CHECKING:
 
 
 BLOCK_OPTIONS = ("grid", "slices", "shells")
-block_count = whole("1 or more", lambda number: number >= 1)
-
-
-def parse_grid(name: str, value: Any) -> tuple[int, int, int]:
-    """Parse three whole numbers of at least 1, in a text with commas or blanks or a sequence."""
-    parse = numbers(
-        "three numbers of blocks, such as 4,4,8",
-        lambda grid: len(grid) == 3 and all(count >= 1 and count.is_integer() for count in grid),
-    )
-    first, second, third = map(int, parse(name, value))
-    return first, second, third
+parse_blocks = optional(whole("1 or more", lambda number: number >= 1))
+parse_grid = optional(
+    numbers("three numbers of blocks, such as 4,4,8", lambda n: len(n) == 3 and min(n) >= 1, int)
+)
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -54,11 +47,11 @@ class MapSettings(Settings):
     """
 
     variants: str = sample(parse_variants, default="a", form="LETTERS", first=True)
-    grid: tuple[int, int, int] | None = sample(optional(parse_grid), form="NX,NY,NZ", first=True)
+    grid: tuple[int, int, int] | None = sample(parse_grid, form="NX,NY,NZ", first=True)
     """Number of blocks along x, y and z (along the edges of a periodic cell)."""
-    slices: int | None = sample(optional(block_count), first=True)
+    slices: int | None = sample(parse_blocks, first=True)
     """Number of slices of equal thickness along `axis`."""
-    shells: int | None = sample(optional(block_count), first=True)
+    shells: int | None = sample(parse_blocks, first=True)
     """Number of shells of equal thickness about the centre."""
 
     def _clashes(self) -> Iterator[str]:
@@ -69,13 +62,9 @@ class MapSettings(Settings):
                 f"a map has one kind of blocks: expected exactly one of `grid`, `slices` and "
                 f"`shells`, found {' and '.join(named) or 'none'}"
             )
-        if self.cutoffs:
-            yield "cutoffs: a map has one cut-off: give it as `cutoff`"
-        if len(self.rvs) > 1:
-            yield f"rv: expected one size, because a map has one RV, found {len(self.rvs)}"
-        if self.with_:
-            groups = ", ".join(self.with_)
-            yield f"with_: a map has no further columns, found {groups}: use `compute`"
+        several = {"rv": len(self.rvs) > 1, "cutoffs": self.cutoffs, "with_": self.with_}
+        for name in (name for name, given in several.items() if given):
+            yield f"{name}: a map has one RV, one cut-off and no further columns: use `compute`"
 
     @property
     def budget(self) -> float:

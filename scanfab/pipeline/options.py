@@ -6,7 +6,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -101,13 +101,13 @@ class Other:
 
 
 OPTIONS = {
-    option.name: option for option in (*READING_OPTIONS, *options_of(Settings), *options_of(Output))
+    option.name: option for option in (*options_of(Output), *options_of(Settings), *READING_OPTIONS)
 }
 """Options of compute, by name."""
 
 MAP_OPTIONS = {
     option.name: option
-    for option in (*READING_OPTIONS, *options_of(MapSettings), *options_of(Output))
+    for option in (*options_of(Output), *options_of(MapSettings), *READING_OPTIONS)
     if option.name not in ("cutoffs", "figure", "with_")
 }
 """Options of map, by name."""
@@ -152,24 +152,14 @@ MEANINGS = {name: as_options(option.help) for name, option in DECLARED.items() i
 """For the report: the help of each option that decides a result, by name."""
 
 
+@dataclass
 class Told:
     """Warnings and notes as manifests list them: each text once, spelt as on the command line."""
 
-    def __init__(self) -> None:
-        self.warnings: list[str] = []
-        self.notes: list[str] = []
-        self.skipped = 0
-        """Number of frames that were skipped."""
-
-    def add(self, message: Warning) -> bool:
-        """Keep a warning or note; returns whether its text is new."""
-        self.skipped += isinstance(message, SkippedFrameWarning)
-        known = self.notes if isinstance(message, ScanfabNote) else self.warnings
-        text = as_options(str(message))
-        is_new = text not in known
-        if is_new:
-            known.append(text)
-        return is_new
+    warnings: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    skipped: int = 0
+    """Number of frames that were skipped."""
 
 
 @contextmanager
@@ -189,7 +179,11 @@ def listening(show: Callable[[Warning], object] | None = None) -> Iterator[Told]
             def hear(message: Any, category: type[Warning], *place: Any, **more: Any) -> None:
                 if not issubclass(category, ScanfabWarning | ScanfabNote):
                     others(message, category, *place, **more)
-                elif told.add(message):
+                    return
+                told.skipped += category is SkippedFrameWarning
+                known = told.notes if category is ScanfabNote else told.warnings
+                if (text := as_options(str(message))) not in known:
+                    known.append(text)
                     (show or later.append)(message)
 
             for kind in (ScanfabWarning, ScanfabNote):

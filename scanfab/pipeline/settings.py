@@ -40,11 +40,12 @@ OF_SAMPLE, LEAST_TOLERANCE = 0.05, 1e-4
 ROUNDING = 1e-9
 # beginnings of direction rules, for shell completion
 DIRECTIONS = [f"{name}:" for name in RULES]
-# options that have a meaning only if another option has this value
+# options that have a meaning only if another option has one of these values
 NEEDS = {
-    "rv_radius": ("rv_shape", "sphere"),
-    "rv_axis": ("rv_shape", "cylinder"),
-    "min_force": ("rattlers", "force"),
+    "rv_radius": ("rv_shape", ("sphere",)),
+    "rv_size": ("rv_shape", ("box", "cylinder", "ellipsoid")),
+    "rv_axis": ("rv_shape", ("cylinder",)),
+    "min_force": ("rattlers", ("force",)),
 }
 
 
@@ -90,7 +91,7 @@ class Settings:
     """
     Shape of the RV; FILE is a closed convex surface in the dump's units (.stl .vtp .ply .obj).
     """
-    rv_size: tuple[float, ...] = window(values.parse_sizes, form="A,B,C")
+    rv_size: tuple[float, ...] | None = window(values.parse_sizes, form="A,B,C")
     """
     Size of the RV in the dump's units, instead of `rv`: edges of the box, radius and height of the
     cylinder, semi-axes of the ellipsoid. Discs take two numbers.
@@ -242,20 +243,18 @@ class Settings:
 
     def _clashes(self) -> Iterator[str]:
         """Messages about options that contradict each other, each with what to do."""
-        shape, takes = self.rv_shape, SHAPES.get(self.rv_shape)
-        sizes = {"rv_radius": self.rv_radius, "rv_size": self.rv_size, "rv_shape": takes is None}
-        several = f"`rv` asks for {len(self.rvs)}: leave out one of the two options"
-        for name, given in sizes.items():
-            if given and len(self.rvs) > 1:
-                yield f"{name}: gives the RV one size, but {several}"
-        if self.rv_size and not takes:
-            instead = "choose `rv_radius`" if takes == "" else "its file gives the size"
-            yield f"rv_size: the shape {shape} takes no sizes: {instead}"
+        is_file, several = self.rv_shape not in SHAPES, f"`rv` asks for {len(self.rvs)}"
+        sizes = {"rv_radius": self.rv_radius, "rv_size": self.rv_size, "rv_shape": is_file}
+        for name in (name for name, given in sizes.items() if given and len(self.rvs) > 1):
+            yield f"{name}: gives the RV one size, but {several}: leave out one of the two options"
         for name, (other, needed) in NEEDS.items():
-            found = getattr(self, other)
-            if getattr(self, name) and found != needed:
-                choose = f'leave out `{name}`, or choose `{other}="{needed}"`'
-                yield f"{name}: has no meaning if `{other}` is {found}: {choose}"
+            found, choose = (
+                getattr(self, other),
+                " or ".join(f'`{other}="{one}"`' for one in needed),
+            )
+            if getattr(self, name) and found not in needed:
+                advice = f"leave out `{name}`, or choose {choose}"
+                yield f"{name}: has no meaning if `{other}` is {found}: {advice}"
         if self.rv_follows == "strain" and self.strain not in STRAIN_MODES:
             lack = f"a file of strains ({self.strain}) does not give the strains along all axes"
             yield f"rv_follows: {lack}: choose another `strain`, or leave out `rv_follows`"
@@ -265,12 +264,11 @@ class Settings:
 
     def _check_sizes(self, dimension: int) -> None:
         """Raise DimensionError if the RV has too many or too few sizes for discs or spheres."""
-        shape, takes = self.rv_shape, SHAPES.get(self.rv_shape)
-        count = 2 if shape == "cylinder" else dimension
-        if takes and len(self.rv_size) not in (0, count):
-            found = ",".join(f"{size:g}" for size in self.rv_size)
+        shape, sizes = self.rv_shape, self.rv_size
+        if sizes and len(sizes) != (2 if shape == "cylinder" else dimension):
+            found, takes = ",".join(f"{size:g}" for size in sizes), SHAPES[shape]
             if dimension == 2:
-                takes = f"two, {takes.replace(',C', '')}, in the plane of the discs"
+                takes = takes.replace("A,B,C", "A,B in the plane of the discs")
             expected = f"expected {takes} (`rv_shape` is {shape})"
             raise DimensionError(f"rv_size: {expected}, found {found}")
 

@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -31,15 +32,21 @@ SHAPES = {
     "ellipsoid": "A,B,C, semi-axes",
 }
 
-
+# parsers for which auto is no value
+or_auto = partial(optional, word="auto")
 parse_radius = optional(number("a length above 0", lambda value: 0 < value < math.inf))
 parse_share = number("0 or more", lambda value: 0 <= value < math.inf)
 parse_work = optional(number("a number of at least 1", lambda value: value >= 1))
 parse_count = whole("0 or more", lambda value: value >= 0)
 parse_moment = whole("1 or 2", lambda moment: moment in (1, 2))
 parse_point = optional(numbers("three finite numbers", lambda vector: len(vector) == 3))
-parse_error = number(
-    "auto, or a number above 0, from 1e-15 to 1e15", lambda value: 1e-15 <= value <= 1e15
+parse_sizes = optional(
+    numbers(
+        "two or three lengths above 0, such as 2,3,4", lambda n: 2 <= len(n) <= 3 and min(n) > 0
+    )
+)
+parse_tolerance = or_auto(
+    number("auto, or a number above 0, from 1e-15 to 1e15", lambda value: 1e-15 <= value <= 1e15)
 )
 
 
@@ -116,15 +123,9 @@ def parse_length(name: str, text: str | float | Length) -> Length:
     return Length(parse(name, word.removesuffix(unit)), unit)
 
 
-def parse_tolerance(name: str, value: Any) -> float | None:
-    """Parse a standard error; ``auto`` gives None."""
-    return None if value is None or value == "auto" else float(parse_error(name, value))
-
-
-def parse_spacing(name: str, value: Any) -> Length | None:
-    """Parse a length above 0; ``auto`` gives None."""
-    if value is None or value == "auto":
-        return None
+@or_auto
+def parse_spacing(name: str, value: Any) -> Length:
+    """Parse a length above 0."""
     length = parse_length(name, value)
     if length.value == 0:
         raise unusable(name, "a length above 0, or auto", value)
@@ -198,14 +199,6 @@ def parse_fractions(name: str, value: Any) -> float | tuple[float, ...]:
     return fractions[0] if len(fractions) == 1 else tuple(fractions)
 
 
-def parse_sizes(name: str, value: Any) -> tuple[float, ...]:
-    """Parse two or three lengths; a value that is not given becomes an empty tuple."""
-    if value is None or (isinstance(value, tuple | list) and not value):
-        return ()
-    expected = "two or three lengths above 0, such as 2,3,4"
-    return numbers(expected, lambda sizes: len(sizes) in (2, 3) and min(sizes) > 0)(name, value)
-
-
 def parse_shape(name: str, value: Any) -> str:
     """Parse the shape of a window: a word, or an existing file with a surface."""
     text = str(value)
@@ -240,10 +233,9 @@ def parse_boundary(name: str, rules: Any) -> tuple[BoundaryRule, ...]:
     )
 
 
-def parse_directions(name: str, value: Any) -> DirectionRule | None:
-    """Parse a direction rule, whose axes must not lie in one plane; ``auto`` gives None."""
-    if value is None or value == "auto":
-        return None
+@or_auto
+def parse_directions(name: str, value: Any) -> DirectionRule:
+    """Parse a direction rule, whose axes must not lie in one plane."""
     rule = value if isinstance(value, DirectionRule) else direction_rule(str(value))
     if rule.is_flat:
         what = f"the {len(rule)} axes of {rule.name} lie in one plane"

@@ -34,7 +34,7 @@ def test_every_option_of_compute_is_declared_and_stands_in_a_group():
         assert len(re.findall(rf"^  {one.flag}(?![\w-])", text, re.M)) == 1
     most = text.split("\nReading:")[0].split("Most used options:")[1]
     assert re.findall(r"^  (-[\w-]+)", most, re.M) == [
-        "-o", "--variants", "--boundary", "--frames", "--rv", "--tolerance", "--workers",
+        "-o", "--rv", "--variants", "--boundary", "--tolerance", "--frames", "--workers",
     ]  # fmt: skip
     for one in ("A folder:", "Several files:", "A pipe:"):
         assert re.search(rf"^  {one} +.*scanfab compute", text, re.M)
