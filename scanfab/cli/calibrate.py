@@ -39,8 +39,8 @@ CHANGED = {
 }
 # further columns on a terminal; a narrow terminal drops the last ones, but never the first STAY
 SHOWN = (
-    "variant", "alpha_vs_axial", "alpha_vs_axial_se", "alpha_vs_axial_sample_se", "is_steady",
-    "time", "rule", "segments", "rule_bias",
+    "variant", "alpha_vs_axial", "alpha_vs_axial_se", "alpha_vs_axial_sample_se", "steady",
+    "seconds", "rule", "segments", "rule_bias", "note",
 )  # fmt: skip
 STAY = 6
 
@@ -95,30 +95,14 @@ def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
     tells_all = outputs.output is not None or is_readable()
     if not tells_all:
         print_csv(rows, excerpt, STEP_COLUMNS)
+    elif outputs.output is None and excerpt.fields:
+        print_rows(rows, excerpt.fields, len(excerpt.fields), digits_of(excerpt))
     elif outputs.output is None:
-        if excerpt.fields:
-            print_rows(rows, excerpt.fields, len(excerpt.fields), digits_of(excerpt))
-        else:
-            _print(rows, digits_of(excerpt))
+        for ladder, steps in groupby(rows, key=lambda row: row.ladder):
+            shown = [{**row, CHANGED[ladder]: row.value} for row in steps]
+            print_rows(shown, (CHANGED[ladder], *SHOWN), STAY, digits_of(excerpt))
+            click.echo()
     # if CSV goes to standard output, the findings must not mix with it
     for sentence in (*result.findings, command):
         click.echo(sentence, err=not tells_all)
     return 0
-
-
-def _print(rows: list[scanfab.Row], digits: int) -> None:
-    """Print a table for each ladder."""
-    steady = {None: "", 0: "no", 1: "yes"}
-    for ladder, steps in groupby(rows, key=lambda row: row.ladder):
-        shown = [
-            {
-                **row,
-                CHANGED[ladder]: row.value,
-                "rule_bias": row.rule_bias if row.rule_bias > 1e-12 else 0,
-                "time": f"{row.seconds:.2g} s",
-                "is_steady": steady[row.steady] + (" (!)" if row.note else ""),
-            }
-            for row in steps
-        ]
-        print_rows(shown, (CHANGED[ladder], *SHOWN), STAY, digits)
-        click.echo()

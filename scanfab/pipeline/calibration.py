@@ -178,10 +178,8 @@ def calibrate(
     target = max(settings.aim(), OF_SAMPLE * (sample or 0.0))
     best, recommended = one_frame.recommended(spacings, directions, target)
     findings = [_finding(name, rows) for name, rows in ladders.items() if rows]
-    reached, own = (
-        "unknown" if error is None else f"{error:.2g}"
-        for error in (_largest(best, "alpha_vs_axial_se"), sample)
-    )
+    errors = _largest(best, "alpha_vs_axial_se"), sample
+    reached, own = ("unknown" if error is None else f"{error:.2g}" for error in errors)
     findings.append(
         f"recommended: error of the scan {reached} (wanted {target:.2g}; of the sample {own}) "
         f"in {best[0].seconds:.2g} s"
@@ -213,8 +211,7 @@ class _OneFrame:
         steps: dict[float, dict[str, Any]] = {}
         if name == "spacing":
             rule = settings.directions or usual_rule(space)
-            spacings = {value: Length(value, "rmin") for value in SPACINGS}
-            steps = {value: {"spacing": one, "directions": rule} for value, one in spacings.items()}
+            steps = {k: {"spacing": Length(k, "rmin"), "directions": rule} for k in SPACINGS}
         elif name == "directions":
             spacing = settings.spacing or Length(FIXED_SPACING, "rmin")
             rules = [direction_rule(f"lebedev:{degree}") for degree in DEGREES]
@@ -320,8 +317,10 @@ def judged(rows: Sequence[Row], dimension: int = 3) -> list[Row]:
     for row in reversed(rows):
         later = [step for step in judged_rows if step.variant == row.variant]
         is_sound = None not in (row.alpha_vs_axial, row.alpha_vs_axial_se) and not row.note
-        agree = all(step.steady and _agree(row, step, most, dimension) for step in later)
-        judged_rows.append(Row(**{**row, "steady": int(is_sound and agree)}))
+        is_steady = is_sound and all(
+            step.steady and _agree(row, step, most, dimension) for step in later
+        )
+        judged_rows.append(Row(**{**row, "steady": int(is_steady)}))
     return judged_rows[::-1]
 
 
@@ -334,14 +333,12 @@ def _agree(row: Row, later: Row, most: float, dimension: int) -> bool:
     difference of both variances, which follow from the error of the larger RV, as it is better
     known.
     """
-    if row.alpha_vs_axial is None or later.alpha_vs_axial is None:
-        return False
     nested = 0.0
     if row.ladder == "rv" and row.rv_radius and later.rv_radius:
         # RVs ascend, so the later one is the larger
         more = (later.rv_radius / row.rv_radius) ** dimension
         nested = (later.alpha_vs_axial_sample_se or 0.0) * math.sqrt(more - 1.0)
-    error = math.hypot(row.alpha_vs_axial_se or 0.0, later.alpha_vs_axial_se or 0.0, nested)
+    error = math.hypot(row.alpha_vs_axial_se, later.alpha_vs_axial_se, nested)
     return bool(abs(row.alpha_vs_axial - later.alpha_vs_axial) <= most * error)
 
 
