@@ -55,12 +55,12 @@ NUMBER = re.compile(r"[-+]?[\d.]+([eE][-+]?\d+)?")
 
 
 @contextmanager
-def usage_errors(before: str = "") -> Iterator[None]:
-    """Turn errors of settings into usage errors; ``before`` is put before the message."""
+def usage_errors() -> Iterator[None]:
+    """Turn errors of settings into usage errors."""
     try:
         yield
     except (SettingsError, UnknownFormatError) as error:
-        raise click.UsageError(before + as_options(error)) from None
+        raise click.UsageError(as_options(error)) from None
 
 
 class SourceCommand(Command):
@@ -172,7 +172,6 @@ def take_output(chosen: dict[str, Any], *kinds: str) -> Output:
     with usage_errors():
         if outputs.figure is not None:
             find_figure(outputs.figure, *kinds)
-    with usage_errors("--plot: "):
         if outputs.plot is not None:
             check_plot_file(outputs.plot)
     return outputs

@@ -240,13 +240,9 @@ def _lines(
     """Spacing of the lines, number of replicates, what an auto scan may add, and the region."""
     space = box.space
     # the window, or for the whole sample the sphere of half its smallest extent
-    reach = 0.5 * box.smallest_extent if shape is None else shape.reach
-    area, depth = math.pi * reach**2, reach
-    if space.is_plane or (shape is not None and not shape.is_sphere):
-        shape = shape or sphere(reach, space)
-        area = shape.mean_shadow
-        depth = 0.75 * shape.volume / area
-    region = Region(area, depth, lengths["rmean"])
+    shape = shape or sphere(0.5 * box.smallest_extent, space)
+    area, reach = shape.mean_shadow, shape.reach
+    region = Region(area, 0.75 * shape.volume / area, lengths["rmean"])
     if settings.spacing is None:
         spacing = _auto_spacing(region, len(rule), settings.aim(), settings.blocks, space)
         words = {"replicates": REPLICATES, "auto": "replicates", "region": region}
