@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray, IntArray
@@ -15,6 +16,7 @@ from scanfab.fabric.contact import contact_fabric
 from scanfab.fabric.errors import Jackknife, jackknife
 from scanfab.fabric.tensor import FabricTensor, axial
 from scanfab.fabric.void import VoidFabric, void_fabric
+from scanfab.scan.gaps import GapSums
 
 # A stress with √(3/2 s:s) below this fraction of p, s its deviator, counts as isotropic.
 LEAST_RATIO = 0.02
@@ -29,24 +31,6 @@ class ContactForces(NamedTuple):
     """Normal force, compression positive, dump's force unit, shape (M,)."""
     force: FloatArray | None
     """Force on the second grain, shape (M, 3); None if the dump has only the normal part."""
-
-
-class BlockedSums(NamedTuple):
-    """
-    Sums of a scan over all blocks of the sample, and without each block.
-
-    A void segment belongs to the block that its middle lies in. Sums are total length (dump's unit)
-    and number of the kept segments, each of shape (R, D).
-    """
-
-    axes: FloatArray
-    """Unit vectors of each replicate, shape (R, D, 3)."""
-    weights: FloatArray
-    """Weights of the direction rule, shape (D,)."""
-    full: tuple[FloatArray, FloatArray | IntArray]
-    """Sums over all blocks."""
-    without: list[tuple[FloatArray, FloatArray | IntArray]]
-    """For each block, sums over all other blocks."""
 
 
 class SampleState(NamedTuple):
@@ -81,12 +65,24 @@ class SampleState(NamedTuple):
         return deviator / size
 
 
-def void_scatter(blocked: BlockedSums, axis: FloatArray, space: Space) -> Jackknife | None:
-    """Axial anisotropy of the void fabric without each block; None if any does not exist."""
-    axes, weights, full, without = blocked
+def void_scatter(
+    gaps: GapSums,
+    variant: str,
+    axis: npt.ArrayLike,
+    space: Space = SPACE,
+    cutoff: int = 0,
+    moment: int = 1,
+) -> Jackknife | None:
+    """
+    Axial anisotropy of the void fabric without each octant; None if any does not exist.
+
+    A void segment belongs to the octant (in a plane, quadrant) that its middle lies in. ``cutoff``
+    is the number of a cut-off of the scan.
+    """
     values = []
-    for length, segments in (full, *without):
-        fabric = void_fabric(axes, weights, length, segments, space)
+    for left_out in (None, *range(2**space.dimension)):
+        sums = gaps.kept(variant, cutoff, moment, left_out)
+        fabric = void_fabric(gaps.axes, gaps.weights, *sums, space)
         if fabric is None:
             return None
         values.append(axial(fabric.replicates, axis, space))
@@ -117,12 +113,16 @@ class Measured:
     """
     meets_solids: bool
     """Whether any solid lies where the lines run; without a solid there is no void fabric."""
-    blocked: BlockedSums
-    """Sums without each block of the sample, from other lines in the same frame."""
     normals: FloatArray
     """Unit normals of the contacts, shape (M, 3)."""
     blocks: IntArray
     """Block of the sample that each contact point lies in, from 0, shape (M,)."""
+    void_scatter: Jackknife | None = None
+    """
+    Axial anisotropy of the void fabric without each block, from other lines in the same frame.
+
+    None if any of these fabrics does not exist.
+    """
     space: Space = SPACE
     """The plane of the sample, if the grains are discs."""
     segment_count: int = 0
@@ -143,11 +143,6 @@ class Measured:
     def contact(self) -> FabricTensor | None:
         """The contact fabric; None without contacts."""
         return contact_fabric(self.normals, self.space)
-
-    @cached_property
-    def void_scatter(self) -> Jackknife | None:
-        """Axial anisotropy of the void fabric without each block; None if any does not exist."""
-        return None if self.void is None else void_scatter(self.blocked, self.axis, self.space)
 
     @cached_property
     def contact_scatter(self) -> Jackknife | None:

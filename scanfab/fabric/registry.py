@@ -20,7 +20,7 @@ from scanfab.fabric.harmonics import Harmonics
 from scanfab.fabric.invariants import Invariants
 from scanfab.fabric.measured import Measured
 from scanfab.fabric.state import State
-from scanfab.fabric.usual import Contact, Orientation, Scatter, Void
+from scanfab.fabric.usual import Usual
 
 GROUP = "scanfab.fabrics"
 
@@ -36,12 +36,7 @@ class Fabric(Protocol):
 
 
 # in the order of the columns in tables; a new fabric is added at the end
-OWN_FABRICS: dict[str, Fabric] = {
-    "void": Void(),
-    "contact": Contact(),
-    "scatter": Scatter(),
-    "orientation": Orientation(),
-}
+OWN_FABRICS: dict[str, Fabric] = {"usual": Usual()}
 
 # groups of further columns, which the option `with_` adds, by name
 GROUPS: dict[str, Fabric] = {

@@ -1,4 +1,4 @@
-"""Fabrics of every table: voids and contacts, their standard errors, and their major axes."""
+"""Columns of every table: the fabrics of voids and contacts, their standard errors and axes."""
 
 from __future__ import annotations
 
@@ -23,42 +23,26 @@ ANGLE = "angle between the major axes of void and contact fabric, 0 to 90"
 HALF = "half their difference, which shows compare the scan's noise in a slope"
 
 
-class Void:
-    """Columns of the void fabric."""
+VOID_COLUMNS = (
+    *numbers({"mean_length": "mean length of the kept segments, Σ w·sum / Σ w·count"}, LENGTH),
+    *tensor_columns("vs", "void fabric"),
+    *numbers({f"{VOID}_se": FROM_SCAN}),
+)
+"""Columns of the void fabric."""
+
+CONTACT_COLUMNS = (
+    *tensor_columns("c", "contact fabric"),
+    *numbers({f"{CONTACT}_se": f"its standard error {INDEPENDENT}"}),
+)
+"""Columns of the contact fabric."""
+
+
+class Usual:
+    """Columns of both fabrics, of their errors and of their major axes."""
 
     columns = (
-        *numbers({"mean_length": "mean length of the kept segments, Σ w·sum / Σ w·count"}, LENGTH),
-        *tensor_columns("vs", "void fabric"),
-        *numbers({f"{VOID}_se": FROM_SCAN}),
-    )
-
-    def values(self, measured: Measured) -> dict[str, Any]:
-        """Values by column; all None if there is no void fabric."""
-        fabric, axis = measured.void, measured.axis
-        if fabric is None:
-            return dict.fromkeys(column.name for column in self.columns)
-        own = {"mean_length": fabric.mean_length, f"{VOID}_se": fabric.axial_error(axis)}
-        return own | tensor_values("vs", fabric.tensor, axis)
-
-
-class Contact:
-    """Columns of the contact fabric."""
-
-    columns = (
-        *tensor_columns("c", "contact fabric"),
-        *numbers({f"{CONTACT}_se": f"its standard error {INDEPENDENT}"}),
-    )
-
-    def values(self, measured: Measured) -> dict[str, Any]:
-        """Values by column; all None without contacts."""
-        error = axial_error(measured.normals, measured.axis, measured.space)
-        return {**tensor_values("c", measured.contact, measured.axis), f"{CONTACT}_se": error}
-
-
-class Scatter:
-    """Columns of the error due to the sample, and of each anisotropy without each block."""
-
-    columns = (
+        *VOID_COLUMNS,
+        *CONTACT_COLUMNS,
         *of_both(
             "alpha_{0}_axial_sample_se",
             f"standard error of alpha_{{0}}_axial due to the sample, {SCATTER}",
@@ -77,30 +61,6 @@ class Scatter:
                 for k in range(1, BLOCKS + 1)
             }
         ),
-    )
-
-    def values(self, measured: Measured) -> dict[str, Any]:
-        """Values by column; None if the fabric, or the fabric without some block, is missing."""
-        row: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
-        void, axis = measured.void.tensor if measured.void else None, measured.axis
-        for name, tensor, scatter in (
-            (VOID, void, measured.void_scatter),
-            (CONTACT, measured.contact, measured.contact_scatter),
-        ):
-            if tensor is not None and scatter is not None:
-                row[f"{name}_sample_se"] = scatter.error
-                without = tensor.axial(axis) + scatter.shift
-                row |= {f"{name}_without_{k}": float(x) for k, x in enumerate(without, start=1)}
-        if measured.void_scatter is not None:
-            halves = enumerate(measured.void_scatter.half.tolist(), start=1)
-            row |= {f"{VOID}_half_{k}": half for k, half in halves}
-        return row
-
-
-class Orientation:
-    """Columns of the major axes of both fabrics and of the angle between them."""
-
-    columns = (
         *numbers(
             {
                 f"g{name}_axis_{k}": f"{k} of the unit vector along the largest principal value of "
@@ -113,14 +73,29 @@ class Orientation:
     )
 
     def values(self, measured: Measured) -> dict[str, Any]:
-        """Values by column; None for a missing fabric. The angle needs both fabrics."""
-        void = measured.void.tensor if measured.void else None
-        contact = measured.contact
+        """Values by column; None if a fabric, or a fabric without some block, is missing."""
+        void, contact, axis = measured.void, measured.contact, measured.axis
         row: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
-        for prefix, tensor in (("gvs", void), ("gc", contact)):
-            if tensor is not None:
-                along = zip("xyz", tensor.major_axis.tolist(), strict=True)
-                row |= {f"{prefix}_axis_{letter}": x for letter, x in along}
+        row[f"{CONTACT}_se"] = axial_error(measured.normals, axis, measured.space)
+        if void is not None:
+            row |= {"mean_length": void.mean_length, f"{VOID}_se": void.axial_error(axis)}
+        for name, tensor, scatter in (
+            ("vs", None if void is None else void.tensor, measured.void_scatter),
+            ("c", contact, measured.contact_scatter),
+        ):
+            if tensor is None:
+                continue
+            along = zip("xyz", tensor.major_axis.tolist(), strict=True)
+            row |= tensor_values(name, tensor, axis)
+            row |= {f"g{name}_axis_{letter}": x for letter, x in along}
+            if scatter is not None:
+                signed = f"alpha_{name}_axial"
+                without = enumerate((tensor.axial(axis) + scatter.shift).tolist(), start=1)
+                row |= {f"{signed}_without_{k}": x for k, x in without}
+                row[f"{signed}_sample_se"] = scatter.error
         if void is not None and contact is not None:
-            row["coaxiality_deg"] = void.angle_to(contact)
+            row["coaxiality_deg"] = void.tensor.angle_to(contact)
+        if void is not None and measured.void_scatter is not None:
+            halves = enumerate(measured.void_scatter.half.tolist(), start=1)
+            row |= {f"{VOID}_half_{k}": half for k, half in halves}
         return row

@@ -27,11 +27,11 @@ from scanfab.pipeline.frames import sample_of
 from scanfab.pipeline.map_rows import map_rows, places_of, tilings
 from scanfab.pipeline.measurement import (
     Measurement,
-    blocked_sums,
     doubts_of_lines,
     edge_of,
     left_out_of,
     measure,
+    scatter_of,
 )
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.rv import RV, empty_rvs
@@ -234,7 +234,7 @@ class VariantColumns:
             length=length,
             segments=segments,
             meets_solids=not self.lack and bool(sample.solids(self.variant, self.window).any()),
-            blocked=blocked_sums(measurement.blocked, measurement.block_rule, plan, name, place),
+            void_scatter=scatter_of(measurement.blocked, plan, name, place),
             blocks=self._blocks_of(chosen),
             normals=compressed(chosen, sample.contacts.normal),
             space=plan.space,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -14,13 +13,14 @@ from scanfab.base.convex import Convex
 from scanfab.base.errors import Note
 from scanfab.base.shapes import sphere
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.fabric.measured import BlockedSums, void_scatter
+from scanfab.fabric.errors import Jackknife
+from scanfab.fabric.measured import void_scatter
 from scanfab.packing.sample import Sample, Variant
 from scanfab.packing.window import Window, inner_ellipsoid
 from scanfab.pipeline.plan import NOISE, Plan
 from scanfab.pipeline.tolerance import is_quick, scan_to_tolerance
 from scanfab.scan.blocks import Blocks
-from scanfab.scan.directions import DirectionRule, design_of, usual_rule
+from scanfab.scan.directions import design_of, usual_rule
 from scanfab.scan.edges import CLIP, ENDS, START
 from scanfab.scan.gaps import GapSums, scan_gaps
 from scanfab.scan.kernels.grid import CellGrains
@@ -59,8 +59,6 @@ class Measurement:
     """All gaps of the same lines; None unless several cut-offs or another moment need them."""
     blocked: GapSums
     """Gaps of a second scan with fewer lines, by the block that their middle lies in."""
-    block_rule: DirectionRule
-    """Directions of the second scan."""
     blocks: tuple[Blocks, Blocks]
     """Octants of the whole sample and of the window, in the dump's coordinates."""
     notes: tuple[Note, ...] = ()
@@ -99,7 +97,7 @@ class Measurement:
     def at_cutoffs(self, cutoffs: Iterable[float]) -> Measurement:
         """The measurement of the same lines at other cut-offs, in the dump's unit."""
         plan = replace(self.plan, cutoffs=tuple(sorted(cutoffs)))
-        blocked, _ = _scan_octants(self.solids, plan, self.blocks)
+        blocked = _scan_octants(self.solids, plan, self.blocks)
         gaps = _all_gaps(self.solids, plan, self.sums, self.blocks)
         return replace(self, plan=plan, gaps=gaps, blocked=blocked)
 
@@ -123,14 +121,13 @@ def _measure(sample: Sample, plan: Plan, where: str) -> Measurement:
     """Scan fewer lines for the sample's error, which may set the tolerance, then all lines."""
     solids = solids_of(sample, plan.window, variants=plan.variants, edge=plan.settings.edge)
     blocks = _octants(sample, plan)
-    blocked, rule = _scan_octants(solids, plan, blocks)
+    blocked = _scan_octants(solids, plan, blocks)
     aims: dict[str, float] = {}
     if plan.auto:
         # the rows at this cut-off decide
         place = int(np.argmin(np.abs(np.array(plan.cutoffs) - plan.cutoff)))
-        axis = np.asarray(plan.settings.axis)
         for name in plan.variants:
-            scatter = void_scatter(blocked_sums(blocked, rule, plan, name, place), axis, plan.space)
+            scatter = scatter_of(blocked, plan, name, place)
             aims[name] = plan.settings.aim(None if scatter is None else scatter.error)
         held = [aims[name] for name in plan.variants if blocked.in_blocks(name, place)[1].any()]
         is_empty = not held or (plan.window is not None and plan.rvs[0].lack != "")
@@ -138,7 +135,7 @@ def _measure(sample: Sample, plan: Plan, where: str) -> Measurement:
         plan = replace(plan.aiming_at(1.0), auto="") if is_empty else plan.aiming_at(min(held))
     sums, plan, notes = scan_to_tolerance(solids, plan, aims, where)
     gaps = _all_gaps(solids, plan, sums, blocks)
-    return Measurement(sample, plan, solids, sums, gaps, blocked, rule, blocks, tuple(notes))
+    return Measurement(sample, plan, solids, sums, gaps, blocked, blocks, tuple(notes))
 
 
 def _all_gaps(
@@ -150,9 +147,7 @@ def _all_gaps(
     return gap_scan(solids, plan, blocks, plan.cutoffs, range(sums.replicates))
 
 
-def _scan_octants(
-    solids: Solids, plan: Plan, blocks: tuple[Blocks, Blocks]
-) -> tuple[GapSums, DirectionRule]:
+def _scan_octants(solids: Solids, plan: Plan, blocks: tuple[Blocks, Blocks]) -> GapSums:
     """Scan fewer lines, with gaps by octant, for the error due to the sample."""
     # the directions of an auto scan, or more directions for few grains
     count, rule = len(solids.grain_radius), usual_rule(solids.space)
@@ -165,10 +160,9 @@ def _scan_octants(
         try:
             quick = is_quick(solids, spacing, axes)
             lines = replace(plan, rule=rule, spacing=spacing)
-            sums = gap_scan(
+            return gap_scan(
                 solids, lines, blocks, plan.cutoffs, BLOCK_REPLICATES, most, quick=quick
             )
-            return sums, rule
         except FollowedTooFarError:
             # only a scan can tell how far lines run through a periodic medium
             if solids.chords(2.0 * spacing) < 1.0:
@@ -176,13 +170,10 @@ def _scan_octants(
             spacing *= 2.0
 
 
-def blocked_sums(
-    blocked: GapSums, rule: DirectionRule, plan: Plan, variant: str, place: int
-) -> BlockedSums:
-    """Sums over all octants and without each octant, of a variant at a cut-off of the plan."""
-    kept = partial(blocked.kept, variant, place, plan.settings.moment)
-    parts = range(2**plan.space.dimension)
-    return BlockedSums(blocked.axes, rule.weights, kept(), [kept(without=part) for part in parts])
+def scatter_of(blocked: GapSums, plan: Plan, variant: str, place: int) -> Jackknife | None:
+    """Anisotropy of the void fabric without each octant, of a variant at a cut-off of the plan."""
+    settings = plan.settings
+    return void_scatter(blocked, variant, settings.axis, plan.space, place, settings.moment)
 
 
 def gap_scan(

@@ -36,6 +36,8 @@ class GapSums:
 
     axes: FloatArray
     """Unit vectors, shape (R, D, 3)."""
+    weights: FloatArray
+    """Weights of the direction rule, shape (D,)."""
     variants: str
     """The variants, in the order of the arrays."""
     number: FloatArray
@@ -134,7 +136,7 @@ def scan_gaps(
     sums = sums.reshape(*offsets.shape[:2], len(variants), -1, len(least), 3)
     number, length, square = np.moveaxis(np.swapaxes(sums, 1, 2), -1, 0)
     scan = sums_of(triads, tallies, variants, solids.edge)
-    return GapSums(triads[:, :, 2], variants, number, length, square, scan)
+    return GapSums(triads[:, :, 2], rule.weights, variants, number, length, square, scan)
 
 
 def _binned(

@@ -10,7 +10,7 @@ from typing import Any
 from scanfab.base.column import LENGTH, Column
 from scanfab.fabric.predicted import PREDICTED_ALPHA, WINDOW_ALPHA
 from scanfab.fabric.registry import GROUPS, OWN_FABRICS, Fabric, load_fabrics
-from scanfab.fabric.usual import Contact, Void
+from scanfab.fabric.usual import CONTACT_COLUMNS, VOID_COLUMNS
 from scanfab.table.row import Row
 
 FRAME_COLUMNS = (
@@ -92,8 +92,8 @@ MAP_COLUMNS = (
     FRAME_COLUMNS[-1],
     *SAMPLE_COLUMNS,
     *(column for column in SCAN_COLUMNS if column.name != "lines"),
-    *Void.columns,
-    *Contact.columns,
+    *VOID_COLUMNS,
+    *CONTACT_COLUMNS,
     Column("coordination_se", float, "", f"of a map: {SCATTER}"),
     Column("solid_fraction_se", float, "", "of a map: the same of solid_fraction"),
     Column("mean_length_se", float, LENGTH, "of a map: the same of mean_length"),

@@ -228,7 +228,6 @@ def frame_of(name, rng):
         length=length * 100,
         segments=np.full(length.shape, 100),
         meets_solids=True,
-        blocked=None,
         normals=n,
         blocks=np.zeros(COUNT, int),
         space=space,

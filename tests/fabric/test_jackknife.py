@@ -11,10 +11,10 @@ from scanfab.fabric.errors import (
     jackknife_variance,
     variance_without_noise,
 )
-from scanfab.fabric.measured import BlockedSums, Measured
+from scanfab.fabric.measured import Measured, void_scatter
 from scanfab.fabric.registry import OWN_FABRICS
 from scanfab.scan.blocks import Blocks
-from scanfab.scan.gaps import scan_gaps
+from scanfab.scan.gaps import GapSums, scan_gaps
 from tests.helpers import naive
 from tests.helpers.lattices import Spheres, poisson_spheres, unit_vectors
 from tests.helpers.scanning import solids_of
@@ -23,14 +23,21 @@ AXIS = np.array([0.6, 0.0, 0.8])
 THIRDS = np.full(3, 1 / 3)
 
 
+def gaps_of(axes, length, number):
+    """Gaps of one variant and cut-off, from lengths and numbers by octant, shape (8, R, D)."""
+    over, under = (np.moveaxis(one, 0, -1)[:, None, ..., None] for one in (length, number))
+    return GapSums(axes, THIRDS, "a", under, over, over, None)
+
+
 def measured(length=(1.0, 1.0, 2.0), normals=8 * ((1.0, 0.0, 0.0),), meets=True, turns=2, **more):
     """Three axes along x, y and z, one segment each, of which each block holds an eighth."""
     axes, lengths = np.tile(np.eye(3), (turns, 1, 1)), np.tile(np.array(length), (turns, 1))
     number, places = (lengths > 0).astype(float), np.reshape(normals, (-1, 3))
-    rest = (7 / 8 * lengths, 7 / 8 * number)
+    axis = np.array([0.0, 0.0, 1.0])
+    gaps = gaps_of(axes, *(np.stack(BLOCKS * [one / 8]) for one in (lengths, number)))
     usual = {
-        "axis": np.array([0.0, 0.0, 1.0]),
-        "blocked": BlockedSums(axes, THIRDS, (lengths, number), BLOCKS * [rest]),
+        "axis": axis,
+        "void_scatter": void_scatter(gaps, "a", axis),
         "blocks": np.arange(len(places)) % BLOCKS,
     }
     return Measured(
@@ -109,18 +116,11 @@ def test_an_octant_without_contacts_moves_nothing_and_one_of_all_has_no_error():
     assert scatter(np.full(200, 4)) is None
 
 
-def void_scatter(axes, length, number):
-    """From lengths and numbers by octant, shape (8, R, D)."""
-    total = length.sum(axis=0), number.sum(axis=0)
-    without = [(total[0] - length[b], total[1] - number[b]) for b in range(8)]
-    return measured(axis=AXIS, blocked=BlockedSums(axes, THIRDS, total, without)).void_scatter
-
-
 def test_voids_are_recomputed_without_each_octant():
     random = np.random.default_rng(4)
     axes, number = unit_vectors(random, 1, 3), random.integers(5, 30, (8, 1, 3)).astype(float)
     length = number * random.uniform(0.8, 1.2, number.shape)
-    found = void_scatter(axes, length, number)
+    found = void_scatter(gaps_of(axes, length, number), "a", AXIS)
 
     def value(blocks):
         mean = length[blocks, 0].sum(axis=0) / number[blocks, 0].sum(axis=0)
@@ -132,7 +132,7 @@ def test_voids_are_recomputed_without_each_octant():
     assert found.error == pytest.approx(written_out(without))
     # without the octant that holds all segments there is no fabric
     length[1:], number[1:] = 0.0, 0.0
-    assert void_scatter(axes, length, number) is None
+    assert void_scatter(gaps_of(axes, length, number), "a", AXIS) is None
 
 
 def test_noise_of_the_replicates_is_taken_off():
