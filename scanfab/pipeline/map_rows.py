@@ -126,10 +126,13 @@ def _scan_blocks(
     for replicate in replicates:
         sums = gap_scan(solids, plan, blocks, [plan.cutoff], [replicate], most_steps)
         most_steps -= float(sums.scan.steps.sum())
-        kept = {name: sums.in_blocks(name, 0, plan.settings.moment) for name in plan.variants}
-        fabrics = {
-            name: block_fabrics(sums.axes, plan.rule.weights, *own) for name, own in kept.items()
-        }
+        fabrics = {}
+        for name in plan.variants:
+            own = sums.in_blocks(name, 0, plan.settings.moment)
+            # the numbers of the second moment are sums of lengths
+            segments = sums.in_blocks(name)[1].sum(axis=1)
+            fabric = block_fabrics(sums.axes, sums.weights, *own)
+            fabrics[name] = replace(fabric, segments=segments)
         parts.append(MapSums(**vars(sums.scan), fabrics=fabrics))
     whole: MapSums = concatenated(parts)
     return whole
@@ -336,6 +339,7 @@ class VariantMap:
     def notes(self) -> Iterator[Note]:
         """Notes on doubtful lines and blocks, and on the homogeneity of the sample."""
         fabrics, variant = self.fabrics, self.variant
+        # the scan of all gaps counts the kept ones by block
         kept = float(fabrics.segments.sum())
         left_out = left_out_of(self.scan, variant, edge_of(variant, self.plan, self.solids), kept)
         texts = doubts_of_lines(self.scan, variant, left_out)

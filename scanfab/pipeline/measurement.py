@@ -334,10 +334,8 @@ def edge_of(variant: Variant, plan: Plan, solids: Solids) -> str | None:
 
 def left_out_of(sums: ScanSums, variant: Variant, edge: str | None, kept: float) -> float | None:
     """Fraction of segments dropped because they leave the sample; None if they are cut."""
-    if edge != START:
-        return None
     left = float(sums.left_out[:, "abcd".index(variant.name)].sum())
-    return left / (left + kept) if left + kept else None
+    return left / (left + kept) if edge == START and left + kept else None
 
 
 def doubts_of_lines(sums: ScanSums, variant: Variant, left_out: float | None) -> dict[str, str]:

@@ -72,6 +72,20 @@ def test_blocks_together_are_the_row_of_compute(packing, variants):
         assert block[name] == whole[name], name
 
 
+def test_segments_are_counted_for_the_second_moment_too(packing):
+    first, second = (mapped(packing, slices=2, spacing=0.6, moment=k)[0] for k in (1, 2))
+    assert first["segments"].tolist() == second["segments"].tolist()
+    assert np.all(first["mean_length"] < second["mean_length"])
+
+
+@pytest.mark.parametrize(("rv", "is_told"), [(0.3, False), (0.9, True)])
+def test_what_the_rule_start_leaves_out_is_told(packing, rv, is_told):
+    """Few segments of an RV leave the sample from deep inside."""
+    whole = scanfab.find_contacts(Packing(packing.position, packing.radius))
+    _, told = mapped(whole, variants="c", rv=rv, edge="start", shells=1, spacing=0.6)
+    assert any("leave the sample and are left out" in one for one in told) == is_told
+
+
 def layers(random, flat):
     """A cell of two layers: spheres in the lower half, in the upper disks of overlapping ones."""
     position = simple_cubic(10).position
