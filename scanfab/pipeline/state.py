@@ -62,11 +62,11 @@ def sample_state(sample: Sample, variant: Variant, window: Window | None) -> Sam
     """
     counted = sample.once(sample.counted(variant, window) & ~sample.removed(variant))
     numbers = sample.numbers_of(variant)[counted]
-    held = numbers[numbers >= 2]
+    held, volume = numbers[numbers >= 2], _volume(sample.packing, window)
     return SampleState(
-        void_ratio=_void_ratio(sample, window),
+        void_ratio=None if volume is None else _void_ratio(sample, window, volume),
         coordination_mechanical=float(held.mean()) if len(held) else None,
-        stress=_stress(sample, window),
+        stress=None if volume is None else _stress(sample, window, volume),
         space=sample.packing.space,
     )
 
@@ -114,11 +114,10 @@ def _places_and_branches(packing: Packing) -> tuple[FloatArray, FloatArray]:
     return places, branches(places, contacts.pairs, contacts.image, packing.cell)
 
 
-def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
-    """The stress from all contacts of grains; None without forces or a volume."""
+def _stress(sample: Sample, window: Window | None, volume: float) -> FloatArray | None:
+    """The stress from all contacts of grains; None without forces."""
     packing, contacts = sample.packing, sample.contacts
-    volume = _volume(packing, window)
-    if contacts.force is None or volume is None:
+    if contacts.force is None:
         return None
     first, second = contacts.pairs.T
     places, branch = _places_and_branches(packing)
@@ -145,12 +144,9 @@ def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
     return love_weber(force, branch, volume)
 
 
-def _void_ratio(sample: Sample, window: Window | None) -> float | None:
-    """(1 - ν)/ν, where ν sums the volumes of grains; None without a volume or grains."""
+def _void_ratio(sample: Sample, window: Window | None, volume: float) -> float | None:
+    """(1 - ν)/ν, where ν sums the volumes of grains; None without grains."""
     packing, space = sample.packing, sample.packing.space
-    volume = _volume(packing, window)
-    if volume is None:
-        return None
     position, radius = packing.position[sample.grains], packing.radius[sample.grains]
     # overlaps between the spheres of a clump count once
     share = own_shares(packing, partial(_rays, space=space))[sample.grains]
