@@ -15,7 +15,7 @@ from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.strain import Flips
+from scanfab.pipeline.strain import flip_notes
 from scanfab.pipeline.values import AXES
 from scanfab.table.curves import is_turned
 from scanfab.table.row import Row
@@ -60,7 +60,8 @@ class SeriesNotes:
         self.settings, self.name, self.reference = settings, name, reference
         self._held: dict[tuple[str, tuple[str, ...]], tuple[Note, list[int]]] = {}
         """The first note of each kind, and the numbers of its frames."""
-        self._flips = Flips(settings.frames.step)
+        self._last: tuple[int, Cell | None] = 0, None
+        """Number and cell of the last frame that had grains."""
         self._grouping: tuple[int, Grouping] | None = None
         self._facts: list[Facts] = []
         self._rows: list[Row] = []
@@ -69,8 +70,10 @@ class SeriesNotes:
         self, number: int, rows: Sequence[Row], notes: Sequence[Note], facts: Facts | None
     ) -> None:
         """Issue the notes on a frame that no frame before had."""
-        found = [*notes, *self._flips.notes(number, facts and facts.cell)]
+        found = [*notes]
         if facts is not None:
+            found += flip_notes(*self._last, number, facts.cell)
+            self._last = number, facts.cell
             self._facts.append(facts._replace(grouping=None))
             if facts.grouping is not None:
                 self._grouping = self._grouping or (number, facts.grouping)

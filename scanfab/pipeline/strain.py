@@ -192,23 +192,14 @@ class Strains(NamedTuple):
         return {"strain": axial, "shear_strain": shear, "volumetric_strain": volumetric}
 
 
-class Flips:
-    """Finds frames of a series between which the cell is flipped."""
-
-    def __init__(self, step: int | None) -> None:
-        """``step`` is the step of the slice that chooses the frames."""
-        self.step = abs(step or 1)
-        self.before: tuple[int, Cell | None] = -self.step, None
-
-    def notes(self, number: int, cell: Cell | None) -> list[Note]:
-        """Notes on the cell of the next frame; frames must come in order."""
-        (early, before), self.before = self.before, (number, cell)
-        if early != number - self.step or not is_flipped(cell, before):
-            return []
-        text = (
-            f"the cell seems to be flipped between the frames {early} and {number}: from there on "
-            f"its vectors do not correspond to those of the first frame, so shear_strain is wrong "
-            f"(LAMMPS: use fix deform ... flip no)"
-        )
-        # each flip is a note of its own
-        return [Note(text, text)]
+def flip_notes(early: int, before: Cell | None, number: int, cell: Cell | None) -> list[Note]:
+    """A note if the cell of frame ``number`` seems to be flipped since the frame ``early``."""
+    if not is_flipped(cell, before):
+        return []
+    text = (
+        f"the cell seems to be flipped between the frames {early} and {number}: from there on its "
+        f"vectors do not correspond to those of the first frame, so shear_strain is wrong (LAMMPS: "
+        f"use fix deform ... flip no)"
+    )
+    # each flip is a note of its own
+    return [Note(text, text)]
