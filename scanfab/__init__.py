@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from scanfab.base.shapes import ellipsoid as ellipsoid
     from scanfab.base.shapes import polyhedron as polyhedron
     from scanfab.base.shapes import sphere as sphere
-    from scanfab.fabric.contact import contact_fabric as contact_fabric
     from scanfab.fabric.tensor import FabricTensor as FabricTensor
+    from scanfab.fabric.tensor import contact_fabric as contact_fabric
     from scanfab.fabric.void import VoidFabric as VoidFabric
     from scanfab.fabric.void import void_fabric as void_fabric
     from scanfab.io.convert import convert as convert
@@ -88,8 +88,7 @@ _NAMES = {
         "UnknownFormatError",
     ],
     "base.shapes": ["box", "cylinder", "ellipsoid", "polyhedron", "sphere"],
-    "fabric.contact": ["contact_fabric"],
-    "fabric.tensor": ["FabricTensor"],
+    "fabric.tensor": ["FabricTensor", "contact_fabric"],
     "fabric.void": ["VoidFabric", "void_fabric"],
     "io.convert": ["convert"],
     "io.follow": ["follow_series"],

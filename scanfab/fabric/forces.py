@@ -26,11 +26,10 @@ import numpy as np
 from scanfab.base.column import numbers
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.contact import axial_error, contact_fabric
 from scanfab.fabric.errors import error_of_mean
 from scanfab.fabric.invariants import fabric_deviator
 from scanfab.fabric.measured import Measured
-from scanfab.fabric.tensor import COMPONENTS
+from scanfab.fabric.tensor import COMPONENTS, axial_error, contact_fabric
 
 # tangential forces below this fraction of the mean normal force are rounding in the dump
 NO_FRICTION = 1e-4

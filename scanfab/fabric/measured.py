@@ -12,9 +12,8 @@ import numpy.typing as npt
 
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.fabric.contact import contact_fabric
 from scanfab.fabric.errors import Jackknife, jackknife
-from scanfab.fabric.tensor import FabricTensor, axial
+from scanfab.fabric.tensor import FabricTensor, axial, contact_fabric
 from scanfab.fabric.void import VoidFabric, void_fabric
 from scanfab.scan.gaps import GapSums
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from scanfab.base.column import LENGTH, numbers
-from scanfab.fabric.contact import axial_error
 from scanfab.fabric.errors import BLOCKS
 from scanfab.fabric.measured import Measured
-from scanfab.fabric.tensor import FABRICS, of_both, tensor_columns, tensor_values
+from scanfab.fabric.tensor import FABRICS, axial_error, of_both, tensor_columns, tensor_values
 
 ORDER = (
     " (at -x, -y, -z; the numbers grow fastest along x; for an oblique loading axis the octants "

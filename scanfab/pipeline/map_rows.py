@@ -15,9 +15,8 @@ from scanfab.base.errors import Note, ScanfabNote, ScanfabWarning, joined
 from scanfab.base.space import SPACE
 from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
-from scanfab.fabric.contact import axial_error, contact_fabric
 from scanfab.fabric.errors import homogeneity_of, part_errors, ratio, ratio_with_errors
-from scanfab.fabric.tensor import FabricTensor, axial, tensor_values
+from scanfab.fabric.tensor import FabricTensor, axial, axial_error, contact_fabric, tensor_values
 from scanfab.fabric.void import BlockFabrics, block_fabrics
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import VARIANTS, Sample, Variant

@@ -6,11 +6,11 @@ import pytest
 import scanfab
 from scanfab import Cell, Packing, compute
 from scanfab.base.space import Space
-from scanfab.fabric.contact import axial_error, contact_fabric
 from scanfab.fabric.forces import directional_mean
 from scanfab.fabric.harmonics import harmonic
 from scanfab.fabric.invariants import bias_of, fabric_deviator, intensity
 from scanfab.fabric.state import State
+from scanfab.fabric.tensor import axial_error, contact_fabric
 from scanfab.packing.bodies import lens_volumes
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.pipeline.state import sample_state

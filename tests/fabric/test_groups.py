@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from scanfab.base.space import SPACE, Space
-from scanfab.fabric.contact import contact_fabric
 from scanfab.fabric.forces import Forces, directional_mean
 from scanfab.fabric.harmonics import Harmonics, harmonic, tensor4
 from scanfab.fabric.invariants import Invariants, intensity
 from scanfab.fabric.measured import ContactForces, Measured, SampleState
 from scanfab.fabric.state import State
+from scanfab.fabric.tensor import contact_fabric
 from scanfab.fabric.void import void_fabric
 from scanfab.scan.directions import direction_rule, plane_rule
 from tests.helpers.lattices import unit_vectors

@@ -5,9 +5,8 @@ import pytest
 
 from scanfab import FabricTensor, contact_fabric, void_fabric
 from scanfab.base.space import Space
-from scanfab.fabric.contact import axial_error
 from scanfab.fabric.distribution import direction_points, fit_even, mean_length_function
-from scanfab.fabric.tensor import axial
+from scanfab.fabric.tensor import axial, axial_error
 from scanfab.scan.directions import direction_rule, plane_rule
 from tests.helpers import naive
 from tests.helpers.lattices import rotation, unit_vectors

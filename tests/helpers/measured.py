@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from scanfab.base.space import SPACE
-from scanfab.fabric.contact import contact_fabric
+from scanfab.fabric.tensor import contact_fabric
 from tests.helpers.lattices import unit_vectors
 
 

@@ -14,8 +14,8 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.option import numbers
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.contact import contact_fabric
 from scanfab.fabric.invariants import fabric_deviator
+from scanfab.fabric.tensor import contact_fabric
 from scanfab.viz.figures.figure import DirectionalFigure
 from scanfab.viz.figures.style import MANY_LOOKS, WIDTH, rounded_down
 

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 import scanfab
 from scanfab.base.errors import SettingsError
 from scanfab.base.space import SPACE
-from scanfab.fabric.contact import axial_error
 from scanfab.fabric.distribution import direction_points, fit_even
+from scanfab.fabric.tensor import axial_error
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
 from scanfab.table.row import column_of, total_errors
