@@ -130,9 +130,11 @@ def scan_strips(
             met = chosen[start[number] : start[number + 1]]
             sweep_strip(task, spheres, met, reach, listed, lists)
             for which in range(1 if counts.second is None else 2):
-                closed = bin_last_gaps(task, which) if in_bins else settle(task, which)
-                if closed > 0.0:
-                    solve_closed(task, spheres, met, which, int(closed))
+                solve_closed(task, spheres, met, which)
+                if in_bins:
+                    bin_last_gaps(task, which)
+                else:
+                    settle(task, which)
                 if beyond is not None and counts.measured is not None:
                     follow_measured(task, which, counts.measured, beyond)
                 if beyond is not None and counts.window is not None:

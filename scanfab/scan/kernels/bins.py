@@ -10,8 +10,8 @@ import numpy as np
 
 from scanfab.base.jit import inner, part
 from scanfab.base.typing import FloatArray
-from scanfab.scan.kernels.strips import FAR, Bins, Counts, Line, Partition, Task
-from scanfab.scan.kernels.sweep import add, begins_in, counted, listed_to
+from scanfab.scan.kernels.strips import FAR, Bins, Counts, Line, Partition
+from scanfab.scan.kernels.sweep import begins_in, listed_to
 
 # sums over the gaps of a block and bin
 NUMBER, LENGTH, SQUARE = range(3)
@@ -217,28 +217,3 @@ def add_gaps(
             sums[kind, of, place, NUMBER] += weighted
             sums[kind, of, place, LENGTH] += number * length
             sums[kind, of, place, SQUARE] += last_sum
-
-
-@part(forceinline=True, error_model="numpy")
-def count_gaps(
-    task: Task, which: int, line: Line, ends: FloatArray, count: int, sign: float
-) -> None:
-    """
-    Add the first gaps of a list, all on one line, to the tallies or the bins; sign -1 removes them.
-
-    ``ends`` holds where gaps start and end, shape (2, M).
-    """
-    counts = task.counts
-    if task.bins.cutoffs.size > 0:
-        gaps = room_for_gaps(count)
-        for k in range(count):
-            list_gap(gaps, k, line, ends[0, k], ends[1, k], counts)
-        add_gaps(task.bins, counts, gaps, np.uint64(count), sign, which, line[1])
-        return
-    for k in range(count):
-        low, high = ends[0, k], ends[1, k]
-        a, b, c, d, e, f = counted(True, low, high, line[2], line[3], counts)
-        if counts.window is not None and counts.window.start is not None and sign < 0.0:
-            # the sweep has added all its length to the void
-            f = max(high - low, 0.0)
-        add(task.tally, which, (sign * a, sign * b, sign * c, sign * d, sign * e, sign * f))

@@ -260,23 +260,16 @@ def bin_lists(task: Task, lists: Lists) -> None:
 
 
 @part()
-def bin_last_gaps(task: Task, which: int) -> float:
-    """
-    Put the last gap of each line, and the void behind its last solid, in bins.
-
-    Returns the number of closed lines, whose gaps are not put in bins here.
-    """
+def bin_last_gaps(task: Task, which: int) -> None:
+    """Put the last gap of each line, and the void behind its last solid, in bins."""
     lines, strip, counts = task.lines, task.strip, task.counts
-    gaps, closed = room_for_gaps(2 * strip.columns), 0.0
+    gaps = room_for_gaps(2 * strip.columns)
     for row in range(strip.rows):
         v, count = strip.first_v + row * strip.spacing, 0
         for column in range(strip.low[row], strip.high[row]):
             i = np.uint64(row * strip.pitch + column)
             k = i + SET * np.uint64(which)
             end, first, behind = lines[k + END], lines[k + GAP_START], FAR
-            if end == FAR:
-                closed += 1.0
-                continue
             line = strip.first_u + column * strip.spacing, v, lines[i + ENTRY], lines[i + EXIT]
             if counts.window is not None and counts.window.start is not None:
                 first, behind = begins_at(first, lines[k + BEFORE]), lines[k + BEHIND]
@@ -285,4 +278,3 @@ def bin_last_gaps(task: Task, which: int) -> float:
                 # void behind the last solid counts only in the window
                 count += (high - low > 0.0) & ((high < FAR) | (low < line[3]))
         add_gaps(task.bins, counts, gaps, np.uint64(count), 1.0, which, v)
-    return closed

@@ -13,9 +13,10 @@ import numpy as np
 
 from scanfab.base.jit import ONE, inner, part
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.scan.kernels.bins import count_gaps
+from scanfab.scan.kernels.bins import add_gaps, list_gap, room_for_gaps
 from scanfab.scan.kernels.cells import Cells, Ray, next_solid, room_for_ray
 from scanfab.scan.kernels.grid import Spheres, sort_by, sphere_at
+from scanfab.scan.kernels.lists import list_settled
 from scanfab.scan.kernels.strips import (
     BEFORE,
     BEHIND,
@@ -23,168 +24,141 @@ from scanfab.scan.kernels.strips import (
     ENTRY,
     EXIT,
     FAR,
+    GAP_END,
+    GAP_START,
     SET,
     Counts,
     Edge,
     Line,
     Measured,
-    Sphere,
     Task,
+    set_off,
     span,
 )
 from scanfab.scan.kernels.sweep import (
     ASTRAY,
     LENGTH,
+    NOTHING,
     STEPS,
     VOID,
     WHOLE,
     WINDOW,
-    begins_at,
+    add,
+    both,
+    counted,
     is_listed,
     listed_to,
-    moved,
-    reaches_in,
+    meet,
 )
 
+# chords that there is room for at first
+SOME = 256
 
-@part()
-def closed_lines(task: Task, which: int, closed: int) -> tuple[IntArray, IntArray]:
+
+@inner()
+def closed_lines(task: Task, which: int) -> tuple[IntArray, IntArray]:
     """The number of closed lines before each place of a strip, and the places of closed lines."""
-    strip = task.strip
-    first, place_of = np.zeros(strip.rows * strip.pitch + 1, np.int64), np.empty(closed, np.int64)
+    lines, state, closed = task.lines, SET * np.uint64(which), 0
+    places = task.strip.rows * task.strip.pitch
+    for i in range(np.uint64(places)):
+        closed += lines[i + state + END] == FAR
+    places = places if closed else 0  # most strips have none
+    first, place_of = np.zeros(places + 1, np.int64), np.empty(closed, np.int64)
     count = 0
     for place in range(first.size - 1):
-        if task.lines[np.uint64(place) + SET * np.uint64(which) + END] == FAR:
+        if lines[np.uint64(place) + state + END] == FAR:
             place_of[count] = place
             count += 1
         first[place + 1] = count
     return first, place_of
 
 
-@part(forceinline=True, error_model="numpy")
-def cut(
-    task: Task,
-    sphere: Sphere,
-    first: IntArray,
-    place_of: IntArray,
-    stop: IntArray,
-    chords: FloatArray,
-) -> int:
-    """
-    List the chords that a sphere cuts from closed lines; without room for them, count them.
-
-    The chords of line k are counted in ``stop[k + 2]``, and its list ends at ``stop[k + 1]``.
-    Returns the number of chords.
-    """
-    strip, met = task.strip, 0
-    rows = span(sphere.v, sphere.radius, strip.first_v, strip.per_spacing, 0, strip.rows)
-    columns = span(sphere.u, sphere.radius, strip.first_u, strip.per_spacing, 0, strip.columns)
-    if columns[0] >= columns[1]:
-        return 0
-    for row in range(rows[0], rows[1]):
-        dv = strip.first_v + row * strip.spacing - sphere.v
-        reach2 = sphere.radius * sphere.radius - dv * dv
-        at = row * strip.pitch
-        for line in range(first[at + columns[0]], first[at + columns[1]]):
-            du = strip.first_u - sphere.u + (place_of[line] - at) * strip.spacing
-            rest2 = reach2 - du * du
-            if not rest2 >= 0.0:
-                continue
-            met += 1
-            if chords.size > 0:
-                place, half_chord = stop[line + 1], np.sqrt(rest2)
-                chords[0, place] = sphere.depth - half_chord
-                chords[1, place] = sphere.depth + half_chord
-                stop[line + 1] += 1
-            else:
-                stop[line + 2] += 1
-    return met
-
-
 @part(error_model="numpy")
 def chords_of(
     task: Task, spheres: Spheres, chosen: IntArray, which: int, first: IntArray, place_of: IntArray
-) -> tuple[IntArray, FloatArray]:
+) -> tuple[FloatArray, IntArray]:
     """
-    List the chords of closed lines, line by line, each list in the order of depth.
+    Find the chords of closed lines, in the order of their spheres' depths.
 
-    Returns the start of each line's list, with the end of the last list behind, and where the
-    chords start and stop, shape (2, M).
+    Returns where each chord starts and stops and, as a third row, the number of the line's chord
+    before it, shape (3, M); and the number of each line's last chord. Behind a line's first chord
+    comes -1.
     """
-    stop, chords = np.zeros(place_of.size + 2, np.int64), np.empty((2, 0))
-    hit, hits = np.empty_like(chosen), 0
+    strip, met = task.strip, 0
+    chords, last = np.empty((3, SOME)), np.full(place_of.size, -1)
     for k in chosen:
-        if which == 0 or not spheres.removed[k]:
-            hit[hits] = k
-            hits += cut(task, sphere_at(spheres, k), first, place_of, stop, chords) > 0
-    for line in range(2, stop.size):
-        stop[line] += stop[line - 1]
-    chords = np.empty((2, stop[-1]))
-    # while a list fills, its start moves to its end
-    for k in hit[:hits]:
-        cut(task, sphere_at(spheres, k), first, place_of, stop, chords)
-    return stop, chords
+        sphere = sphere_at(spheres, k)
+        rows = span(sphere.v, sphere.radius, strip.first_v, strip.per_spacing, 0, strip.rows)
+        columns = span(sphere.u, sphere.radius, strip.first_u, strip.per_spacing, 0, strip.columns)
+        if columns[0] >= columns[1] or (which == 1 and spheres.removed[k]):
+            continue
+        for row in range(rows[0], rows[1]):
+            dv = strip.first_v + row * strip.spacing - sphere.v
+            reach2 = sphere.radius * sphere.radius - dv * dv
+            at = row * strip.pitch
+            for line in range(first[at + columns[0]], first[at + columns[1]]):
+                du = strip.first_u - sphere.u + (place_of[line] - at) * strip.spacing
+                rest2 = reach2 - du * du
+                if not rest2 >= 0.0:
+                    continue
+                if met == chords.shape[1]:
+                    chords = np.concatenate((chords, np.empty_like(chords)), axis=1)
+                half_chord = np.sqrt(rest2)
+                chords[0, met] = sphere.depth - half_chord
+                chords[1, met] = sphere.depth + half_chord
+                chords[2, met], last[line] = last[line], met
+                met += 1
+    return chords, last
 
 
 @part(error_model="numpy")
-def gaps_of(
-    line: Line, chords: FloatArray, order: IntArray, counts: Counts, gaps: FloatArray
-) -> tuple[int, float]:
-    """
-    List where the gaps that the sweep settles on one line start and end, shape (2, M).
-
-    Returns their number and where the line's last solid ends. With chords ordered by their middles,
-    these are the gaps that the sweep has counted, none after the line was closed. With chords
-    ordered by their starts, they are exact, since no chord can reach back.
-    """
-    _, _, enters, leaves = line
-    end, low, high = -FAR, -FAR, -FAR
-    before, behind, count = FAR, FAR, 0
-    if counts.window is not None and counts.window.start is not None:
-        before, behind = counts.window.margin - enters, leaves + counts.window.margin
-    elif counts.whole is None:
-        end = enters
-    for k in order:
-        start, stop = chords[0, k], chords[1, k]
-        if not is_listed(start, enters, counts):
-            continue
-        if counts.window is not None and counts.window.start is not None:
-            before = min(before, -stop) if start <= enters else before
-            behind = min(behind, start) if start >= leaves else behind
-            if not reaches_in(start, stop, enters, leaves):
-                continue
-        gaps[0, count], gaps[1, count] = begins_at(low, before), high
-        count += start > end
-        end, low, high = moved(start, stop, end, low, high)
-    if end < FAR:
-        gaps[0, count], gaps[1, count] = begins_at(low, before), high
-        gaps[0, count + 1], gaps[1, count + 1] = end, behind
-        count += 2
-    return count, end
+def sweep_again(
+    task: Task, which: int, place: int, chords: FloatArray, order: IntArray, sign: float
+) -> None:
+    """Sweep one line afresh over its chords, in this order; sign -1 removes the settled gaps."""
+    lines, strip, counts = task.lines, task.strip, task.counts
+    i, gaps, count = np.uint64(place), room_for_gaps(order.size), np.uint64(0)
+    k, (row, column) = i + SET * np.uint64(which), divmod(place, strip.pitch)
+    enters, leaves = lines[i + ENTRY], lines[i + EXIT]
+    u, v = strip.first_u + column * strip.spacing, strip.first_v + row * strip.spacing
+    line = u, v, enters, leaves
+    set_off(lines, k, enters, leaves, True, counts)
+    state = lines[k + END], lines[k + GAP_START], lines[k + GAP_END]
+    sums = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for j in order:
+        start, stop = chords[0, j], chords[1, j]
+        if task.bins.cutoffs.size > 0:
+            state, count = list_settled(task, k, line, (start, stop), state, gaps, count)
+        elif is_listed(start, enters, counts):
+            sums = both(sums, meet(lines, k, line, start, stop, counts))
+    if task.bins.cutoffs.size > 0:
+        lines[k + END], lines[k + GAP_START], lines[k + GAP_END] = state
+        add_gaps(task.bins, counts, gaps, count, sign, which, v)
+    a, b, c, d, e, f = sums
+    add(task.tally, which, (sign * a, sign * b, sign * c, sign * d, sign * e, sign * f))
 
 
 @part()
-def solve_closed(task: Task, spheres: Spheres, chosen: IntArray, which: int, closed: int) -> None:
-    """Replace what the sweep has tallied on closed lines by the gaps of their lists of chords."""
-    lines, strip = task.lines, task.strip
-    first, place_of = closed_lines(task, which, closed)
-    stop, chords = chords_of(task, spheres, chosen, which, first, place_of)
-    starts, gaps = chords[0], np.empty((2, chords.shape[1] + 2))
-    order = np.empty(starts.size, np.int64)
-    for k in range(order.size):
-        order[k] = k
-    for number in range(closed):
-        row, column = place_of[number] // strip.pitch, place_of[number] % strip.pitch
-        u, v = strip.first_u + column * strip.spacing, strip.first_v + row * strip.spacing
-        place = np.uint64(place_of[number])
-        line = u, v, lines[place + ENTRY], lines[place + EXIT]
-        its = order[stop[number] : stop[number + 1]]
-        count, _ = gaps_of(line, chords, its, task.counts, gaps)
-        count_gaps(task, which, line, gaps, count, -1.0)
-        sort_by(starts, its)
-        count, end = gaps_of(line, chords, its, task.counts, gaps)
-        count_gaps(task, which, line, gaps, count, 1.0)
-        lines[place + SET * np.uint64(which) + END] = end
+def solve_closed(task: Task, spheres: Spheres, chosen: IntArray, which: int) -> None:
+    """
+    Sweep closed lines again, over their chords in the order of their starts.
+
+    This is exact, since no chord can reach back. What the sweep by depth has counted is removed.
+    """
+    first, place_of = closed_lines(task, which)
+    if place_of.size == 0:
+        return
+    chords, last = chords_of(task, spheres, chosen, which, first, place_of)
+    order = np.empty(chords.shape[1], np.int64)
+    for number in range(place_of.size):
+        begin, k = order.size, last[number]
+        while k >= 0:
+            begin -= 1
+            order[begin] = k
+            k = np.int64(chords[2, k])
+        sweep_again(task, which, place_of[number], chords, order[begin:], -1.0)
+        sort_by(chords[0], order[begin:])
+        sweep_again(task, which, place_of[number], chords, order[begin:], 1.0)
 
 
 class Beyond(NamedTuple):
@@ -219,11 +193,15 @@ def add_followed(task: Task, which: int, line: Line, low: float, high: float, si
     if high - low > 0.5 * FAR:
         task.tally[which, WINDOW + ASTRAY] += 0.5
         return
-    ends, void = np.empty((2, 1)), task.tally[which, WINDOW + VOID]
-    ends[0, 0], ends[1, 0] = low, high
-    count_gaps(task, which, line, ends, ONE, sign)
+    counts = task.counts
+    if task.bins.cutoffs.size > 0:
+        gaps = room_for_gaps(ONE)
+        list_gap(gaps, 0, line, low, high, counts)
+        add_gaps(task.bins, counts, gaps, np.uint64(ONE), sign, which, line[1])
+        return
+    a, b, c, d, e, _ = counted(True, low, high, line[2], line[3], counts)
     # the sweep has already counted all void in the window
-    task.tally[which, WINDOW + VOID] = void
+    add(task.tally, which, (sign * a, sign * b, sign * c, sign * d, sign * e, NOTHING))
 
 
 @inner(error_model="numpy")

@@ -233,11 +233,10 @@ def last_gap(
     """
     end = lines[i + END]
     if edge.start is None:
-        low = end if end < FAR else leaves
-        return window_gap(low, FAR, counts.least, enters, leaves, counts, edge)
+        return window_gap(end, FAR, counts.least, enters, leaves, counts, edge)
     before, behind = lines[i + BEFORE], lines[i + BEHIND]
     length = behind - end
-    is_met = (end > -FAR) & (end < FAR)
+    is_met = end > -FAR
     ends_beyond = is_met & (end < leaves) & (behind < leaves + listed_to(edge))
     kept = ends_beyond & (length >= counts.least)
     void = leaves - (end if end > -FAR else enters)
@@ -340,23 +339,18 @@ def visit(task: Task, sphere: Sphere, kept: float) -> None:
 
 
 @inner(fastmath=REORDERED, error_model="numpy")
-def settle(task: Task, which: int) -> float:
-    """
-    Tally the last gap of each line and, in the window, the void behind its last solid.
-
-    Returns the number of closed lines. Here they are only counted; their gaps are solved later.
-    """
+def settle(task: Task, which: int) -> None:
+    """Tally the last gap of each line and, in the window, the void behind its last solid."""
     lines, strip, tally = task.lines, task.strip, task.tally
     counts = task.counts
     sums = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    met = length = closed = 0.0
+    met = length = 0.0
     crossing = np.int64(0)
     state = SET * np.uint64(which)
     for i in range(np.uint64(strip.rows * strip.pitch)):
         k = i + state
         end, low, high = lines[k + END], lines[k + GAP_START], lines[k + GAP_END]
         enters, leaves = lines[i + ENTRY], lines[i + EXIT]
-        closed += 1.0 if end == FAR else 0.0
         if counts.window is not None and counts.window.start is not None:
             last = settled_gap(end < FAR, low, high, lines[k + BEFORE], counts)
         else:
@@ -383,4 +377,3 @@ def settle(task: Task, which: int) -> float:
     if counts.window is not None:
         tally[which, WINDOW + LINES] += crossing
         tally[which, WINDOW + LINE_LENGTH] += length
-    return closed
