@@ -33,6 +33,7 @@ from scanfab.scan.kernels.lists import (
 from scanfab.scan.kernels.periodic import cell_grid, foot_of
 from scanfab.scan.kernels.resolve import Beyond, follow_beyond, follow_measured, solve_closed
 from scanfab.scan.kernels.strips import (
+    FAR,
     MOST_LINES,
     STATE_SIZE,
     Bins,
@@ -43,7 +44,7 @@ from scanfab.scan.kernels.strips import (
     begin,
     section_along,
 )
-from scanfab.scan.kernels.sweep import NOTHING, STEPS, settle, visit
+from scanfab.scan.kernels.sweep import LINE_LENGTH, NOTHING, STEPS, VOID, settle, visit
 
 
 class Axes(NamedTuple):
@@ -188,40 +189,27 @@ def scan_axes(
         if left <= 0.0:
             return
         triad, offset, tally = axes.triads[axis], axes.offsets[axis], tallies[axis]
-        beyond = None
         if extent is not None:
-            whole, reach, margin = counts.whole is not None, np.inf, 0.0
+            counted, endless, reach, margin = counts, False, np.inf, 0.0
+            whole = counts.whole is not None
             grid = open_grid(extent, triad, offset, axes.spacing, clip.reach, whole)
             if counts.window is not None and counts.window.start is not None:
                 # other spheres change no line
                 reach, margin = clip.reach, counts.window.margin
             spheres = project(grains, triad, grid, reach, margin, room)
             section = section_along(clip, triad)
-            if followed is not None:
-                beyond = Beyond(followed.cells, triad, followed.without_removed, left, False)
         else:
             prism, spheres, grid, measured = cell_grid(grains, triad[2], offset, axes.spacing)
-            section, triad = foot_of(prism), prism.triad
+            section, triad, endless = foot_of(prism, measured), prism.triad, prism.endless
+            counted = Counts(counts.least, counts.second, True, None, measured)
+        beyond = None
+        if followed is not None:
+            beyond = Beyond(followed.cells, triad, followed.without_removed, left, endless)
         here = bins_along(bins, triad, axis)
-        if extent is None and followed is not None and grains.periodic[prism.third]:
-            within = Counts(counts.least, counts.second, True, None, measured)
-            images = Beyond(followed.cells, triad, followed.without_removed, left, prism.endless)
-            scan_strips(
-                lines, spheres, grid, section, 0.0, tally, within, listed, lists, here, images
-            )
-        else:
-            # along an axis that is not periodic a line runs from the first solid to the last
-            scan_strips(
-                lines,
-                spheres,
-                grid,
-                section,
-                clip.reach,
-                tally,
-                counts,
-                listed,
-                lists,
-                here,
-                beyond,
-            )
+        scan_strips(
+            lines, spheres, grid, section, clip.reach, tally, counted, listed, lists, here, beyond
+        )
+        if extent is None and measured.length == FAR:
+            # the void and the length of a line from the first solid to the last mean nothing
+            tally[:, VOID] = tally[:, LINE_LENGTH] = 0.0
         left -= tally[0, STEPS]

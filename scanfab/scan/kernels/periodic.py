@@ -24,7 +24,7 @@ from scanfab.scan.kernels.grid import (
     room_to_project,
     sheared_grid,
 )
-from scanfab.scan.kernels.strips import Measured, Section, dot
+from scanfab.scan.kernels.strips import FAR, Measured, Section, dot
 
 # solids are listed up to so many mean radii beyond the prism; longer gaps are followed one by one
 BEYOND = 16.0
@@ -194,10 +194,18 @@ def cell_grid(
     skew = prism.skew_u / prism.base_v
     grid = sheared_grid(extent[2], extent[3], extent[0], extent[1], skew, offset, spacing)
     measured = Measured(prism.length, prism.length + BEYOND * mean)
+    if not grains.periodic[prism.third]:
+        # lines without a measured length run from the first solid to the last
+        measured = Measured(FAR, FAR)
     return prism, in_order(images, count), grid, measured
 
 
 @part()
-def foot_of(prism: Prism) -> Section:
-    """The plane through the origin on which the measured length of each line begins."""
-    return Section(np.empty((0, 4)), 0.0, 0.0, 0.0, 0.0, prism.rise_u, prism.rise_v)
+def foot_of(prism: Prism, measured: Measured) -> Section:
+    """
+    The plane through the origin on which the measured length of each line begins.
+
+    Lines without an end begin far before it.
+    """
+    level = measured.length if measured.length == FAR else 0.0
+    return Section(np.empty((0, 4)), level, 0.0, 0.0, 0.0, prism.rise_u, prism.rise_v)

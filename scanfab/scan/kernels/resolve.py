@@ -208,6 +208,8 @@ def add_followed(task: Task, which: int, line: Line, low: float, high: float, si
 def follow_measured(task: Task, which: int, measured: Measured, beyond: Beyond) -> None:
     """Tally the gaps that start in the measured length and end beyond the listed solids."""
     lines, strip, tally, ray = task.lines, task.strip, task.tally, room_for_ray()
+    if measured.length == FAR:
+        return
     for row in range(strip.rows):
         v = strip.first_v + row * strip.spacing
         for column in range(strip.low[row], strip.high[row]):
