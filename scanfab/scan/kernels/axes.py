@@ -9,7 +9,7 @@ import numpy as np
 from scanfab.base.jit import LANES, ZERO, Flag, kernel, part
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.bins import bins_along
-from scanfab.scan.kernels.cells import Cells
+from scanfab.scan.kernels.cells import Beyond, Cells, follow_beyond, follow_measured
 from scanfab.scan.kernels.grid import (
     Bounds,
     CellGrains,
@@ -28,10 +28,10 @@ from scanfab.scan.kernels.lists import (
     bin_lists,
     list_chords,
     room_for_lists,
+    solve_closed,
     sweep_lists,
 )
 from scanfab.scan.kernels.periodic import cell_grid, foot_of
-from scanfab.scan.kernels.resolve import Beyond, follow_beyond, follow_measured, solve_closed
 from scanfab.scan.kernels.strips import (
     FAR,
     MOST_LINES,

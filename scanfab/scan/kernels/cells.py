@@ -1,9 +1,10 @@
 """
-Grains sorted into the cells of a grid, so that a ray finds the next one in a few steps.
+Grains sorted into the cells of a grid, through which long segments are followed to their ends.
 
-The grid divides the box of the grains or, where they repeat, their periods. Every grain stands in
-all cells that it may reach into; one that reaches through a periodic face stands in those on the
-other side, too, with the image by which it does.
+The sweep leaves segments that reach beyond the listed solids. In the grid, a ray finds the next
+grain in a few steps. The grid divides the box of the grains or, where they repeat, their periods.
+Every grain stands in all cells that it may reach into; one that reaches through a periodic face
+stands in those on the other side, too, with the image by which it does.
 """
 
 from __future__ import annotations
@@ -13,9 +14,35 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.jit import inner, kernel
+from scanfab.base.jit import ONE, inner, kernel
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
-from scanfab.scan.kernels.strips import FAR
+from scanfab.scan.kernels.bins import add_gaps, list_gap, room_for_gaps
+from scanfab.scan.kernels.strips import (
+    BEFORE,
+    BEHIND,
+    END,
+    ENTRY,
+    EXIT,
+    FAR,
+    SET,
+    Counts,
+    Edge,
+    Line,
+    Measured,
+    Task,
+)
+from scanfab.scan.kernels.sweep import (
+    ASTRAY,
+    LENGTH,
+    NOTHING,
+    STEPS,
+    VOID,
+    WHOLE,
+    WINDOW,
+    add,
+    counted,
+    listed_to,
+)
 
 Int32Array = npt.NDArray[np.int32]
 
@@ -235,3 +262,121 @@ def next_solid(
         goes_on = found > nearest and nearest <= farthest and steps <= most_steps
         goes_on = goes_on and enters_next(cells, ray, through)
     return found, steps
+
+
+class Beyond(NamedTuple):
+    """All grains, for following lines along one axis."""
+
+    cells: Cells
+    triad: FloatArray
+    without_removed: bool
+    """Whether the first set of solids lacks the removed grains, too."""
+    most_steps: float
+    """Most steps of following; a scan that needs more ends early, and its sums mean nothing."""
+    endless: bool
+    """Whether a line that meets no further solid stays in a channel of a periodic medium."""
+
+
+@inner(forceinline=True, error_model="numpy")
+def followed(
+    line: Line, beyond: Beyond, which: int, ray: Ray, depth: float, sign: float
+) -> tuple[float, float]:
+    """Distance from a place on a line to the next solid, ahead or back; FAR if there is none."""
+    triad = beyond.triad
+    for i in range(3):
+        ray.place[i] = line[0] * triad[0, i] + line[1] * triad[1, i] + depth * triad[2, i]
+        ray.along[i] = sign * triad[2, i]
+    without = beyond.without_removed or which == 1
+    return next_solid(beyond.cells, ray, without, beyond.most_steps)
+
+
+@inner(forceinline=True, error_model="numpy")
+def add_followed(task: Task, which: int, line: Line, low: float, high: float, sign: float) -> None:
+    """Count a segment, with sign -1 remove it; a segment without an end is counted as left out."""
+    if high - low > 0.5 * FAR:
+        task.tally[which, WINDOW + ASTRAY] += 0.5
+        return
+    counts = task.counts
+    if task.bins.cutoffs.size > 0:
+        gaps = room_for_gaps(ONE)
+        list_gap(gaps, 0, line, low, high, counts)
+        add_gaps(task.bins, counts, gaps, np.uint64(ONE), sign, which, line[1])
+        return
+    a, b, c, d, e, _ = counted(True, low, high, line[2], line[3], counts)
+    # the sweep has already counted all void in the window
+    add(task.tally, which, (sign * a, sign * b, sign * c, sign * d, sign * e, NOTHING))
+
+
+@inner(error_model="numpy")
+def follow_measured(task: Task, which: int, measured: Measured, beyond: Beyond) -> None:
+    """Tally the gaps that start in the measured length and end beyond the listed solids."""
+    lines, strip, tally, ray = task.lines, task.strip, task.tally, room_for_ray()
+    if measured.length == FAR:
+        return
+    for row in range(strip.rows):
+        v = strip.first_v + row * strip.spacing
+        for column in range(strip.low[row], strip.high[row]):
+            u = strip.first_u + column * strip.spacing
+            place = np.uint64(row * strip.pitch + column)
+            enters, end = lines[place + ENTRY], lines[place + SET * np.uint64(which) + END]
+            is_empty = end == -FAR
+            end = enters if is_empty else end
+            if not enters <= end < enters + measured.length:
+                continue
+            if tally[0, STEPS] >= beyond.most_steps:
+                return
+            line = u, v, enters, enters
+            far, steps = followed(line, beyond, which, ray, end, 1.0)
+            tally[0, STEPS] += steps
+            if far == FAR and beyond.endless:
+                tally[which, WHOLE + ASTRAY] += 1.0
+                tally[which, WHOLE + VOID] += enters + measured.length - end
+            elif far < FAR and not is_empty:
+                add_followed(task, which, line, end, end + far, 1.0)
+
+
+@inner(error_model="numpy")
+def follow_beyond(task: Task, which: int, edge: Edge, beyond: Beyond) -> None:
+    """
+    Tally the segments with one end in the window that reach beyond the listed solids.
+
+    A line has at most two of them, one at either end. The sweep has counted the first one as if it
+    began where the list does. Segments that meet no further solid leave the sample; only their
+    number is known.
+    """
+    lines, strip, tally, counts = task.lines, task.strip, task.tally, task.counts
+    ray, margin = room_for_ray(), listed_to(edge)
+    # with a margin of FAR, the end of every segment is known
+    every = Counts(counts.least, counts.second, None, Edge(edge.ends, edge.start, FAR), None)
+    known = Task(lines, strip, every, tally, task.bins)
+    # the listed part of a first segment is long enough to count it
+    adds_on = task.bins.cutoffs.size == 0 and margin > counts.least
+    for row in range(strip.rows):
+        v = strip.first_v + row * strip.spacing
+        for column in range(strip.low[row], strip.high[row]):
+            place = np.uint64(row * strip.pitch + column)
+            state = place + SET * np.uint64(which)
+            enters, leaves, end = lines[place + ENTRY], lines[place + EXIT], lines[state + END]
+            # NaN: a line that misses the window
+            is_met = end > -FAR
+            begins_before = is_met & (-lines[state + BEFORE] <= enters - margin)
+            goes_on = is_met & (end < leaves) & (lines[state + BEHIND] >= leaves + margin)
+            if not (begins_before or goes_on) or tally[0, STEPS] >= beyond.most_steps:
+                continue
+            u = strip.first_u + column * strip.spacing
+            line = u, v, enters, leaves
+            if begins_before:
+                far, steps = followed(line, beyond, which, ray, enters - margin, -1.0)
+                tally[0, STEPS] += steps
+                begins = enters - margin - far
+                if adds_on and far < FAR:
+                    tally[which, WINDOW + LENGTH] += 0.5 * (-lines[state + BEFORE] - begins)
+                else:
+                    first, steps = followed(line, beyond, which, ray, enters, 1.0)
+                    tally[0, STEPS] += steps
+                    add_followed(known, which, line, -lines[state + BEFORE], enters + first, -1.0)
+                    add_followed(known, which, line, begins, enters + first, 1.0)
+            if goes_on:
+                far, steps = followed(line, beyond, which, ray, leaves + margin, 1.0)
+                tally[0, STEPS] += steps
+                add_followed(known, which, line, end, leaves + margin + far, 1.0)

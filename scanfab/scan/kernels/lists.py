@@ -5,6 +5,9 @@ Where lines are so far apart that a sphere meets few of them, rows of lines with
 short for vector instructions. So the spheres, in the order of their depths, add their chords to the
 lists of their lines, and the sweep takes the first chord of many lines, then the second, and so on.
 The same lists serve where gaps are put in bins, line by line.
+
+Lines that the sweep has closed are solved from lists of all their chords, which is slow and always
+exact.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ import numpy as np
 from scanfab.base.jit import LANES, ONE, REORDERED, ZERO, inner, part
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.bins import add_gaps, list_gap, room_for_gaps
-from scanfab.scan.kernels.grid import Spheres, sphere_at
+from scanfab.scan.kernels.grid import Spheres, sort_by, sphere_at
 from scanfab.scan.kernels.strips import (
     BEFORE,
     BEHIND,
@@ -31,6 +34,7 @@ from scanfab.scan.kernels.strips import (
     Line,
     Strip,
     Task,
+    set_off,
     span,
 )
 from scanfab.scan.kernels.sweep import (
@@ -59,6 +63,8 @@ LEAST_REACH2 = 1e-300
 # gaps that are put in bins together
 TOGETHER = 512
 ALMOST = np.uint64(TOGETHER - ROOM)
+# chords of closed lines that there is room for at first
+SOME = 256
 
 # Chord: where it starts and stops. State: the end of the solid on a line, and the ends of its last
 # gap.
@@ -278,3 +284,109 @@ def bin_last_gaps(task: Task, which: int) -> None:
                 # void behind the last solid counts only in the window
                 count += (high - low > 0.0) & ((high < FAR) | (low < line[3]))
         add_gaps(task.bins, counts, gaps, np.uint64(count), 1.0, which, v)
+
+
+@inner()
+def closed_lines(task: Task, which: int) -> tuple[IntArray, IntArray]:
+    """The number of closed lines before each place of a strip, and the places of closed lines."""
+    lines, state, closed = task.lines, SET * np.uint64(which), 0
+    places = task.strip.rows * task.strip.pitch
+    for i in range(np.uint64(places)):
+        closed += lines[i + state + END] == FAR
+    places = places if closed else 0  # most strips have none
+    first, place_of = np.zeros(places + 1, np.int64), np.empty(closed, np.int64)
+    count = 0
+    for place in range(first.size - 1):
+        if lines[np.uint64(place) + state + END] == FAR:
+            place_of[count] = place
+            count += 1
+        first[place + 1] = count
+    return first, place_of
+
+
+@part(error_model="numpy")
+def chords_of(
+    task: Task, spheres: Spheres, chosen: IntArray, which: int, first: IntArray, place_of: IntArray
+) -> tuple[FloatArray, IntArray]:
+    """
+    Find the chords of closed lines, in the order of their spheres' depths.
+
+    Returns where each chord starts and stops and, as a third row, the number of the line's chord
+    before it, shape (3, M); and the number of each line's last chord. Behind a line's first chord
+    comes -1.
+    """
+    strip, met = task.strip, 0
+    chords, last = np.empty((3, SOME)), np.full(place_of.size, -1)
+    for k in chosen:
+        sphere = sphere_at(spheres, k)
+        rows = span(sphere.v, sphere.radius, strip.first_v, strip.per_spacing, 0, strip.rows)
+        columns = span(sphere.u, sphere.radius, strip.first_u, strip.per_spacing, 0, strip.columns)
+        if columns[0] >= columns[1] or (which == 1 and spheres.removed[k]):
+            continue
+        for row in range(rows[0], rows[1]):
+            dv = strip.first_v + row * strip.spacing - sphere.v
+            reach2 = sphere.radius * sphere.radius - dv * dv
+            at = row * strip.pitch
+            for line in range(first[at + columns[0]], first[at + columns[1]]):
+                du = strip.first_u - sphere.u + (place_of[line] - at) * strip.spacing
+                rest2 = reach2 - du * du
+                if not rest2 >= 0.0:
+                    continue
+                if met == chords.shape[1]:
+                    chords = np.concatenate((chords, np.empty_like(chords)), axis=1)
+                half_chord = np.sqrt(rest2)
+                chords[0, met] = sphere.depth - half_chord
+                chords[1, met] = sphere.depth + half_chord
+                chords[2, met], last[line] = last[line], met
+                met += 1
+    return chords, last
+
+
+@part(error_model="numpy")
+def sweep_again(
+    task: Task, which: int, place: int, chords: FloatArray, order: IntArray, sign: float
+) -> None:
+    """Sweep one line afresh over its chords, in this order; sign -1 removes the settled gaps."""
+    lines, strip, counts = task.lines, task.strip, task.counts
+    i, gaps, count = np.uint64(place), room_for_gaps(order.size), np.uint64(0)
+    k, (row, column) = i + SET * np.uint64(which), divmod(place, strip.pitch)
+    enters, leaves = lines[i + ENTRY], lines[i + EXIT]
+    u, v = strip.first_u + column * strip.spacing, strip.first_v + row * strip.spacing
+    line = u, v, enters, leaves
+    set_off(lines, k, enters, leaves, True, counts)
+    state = lines[k + END], lines[k + GAP_START], lines[k + GAP_END]
+    sums = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for j in order:
+        start, stop = chords[0, j], chords[1, j]
+        if task.bins.cutoffs.size > 0:
+            state, count = list_settled(task, k, line, (start, stop), state, gaps, count)
+        elif is_listed(start, enters, counts):
+            sums = both(sums, meet(lines, k, line, start, stop, counts))
+    if task.bins.cutoffs.size > 0:
+        lines[k + END], lines[k + GAP_START], lines[k + GAP_END] = state
+        add_gaps(task.bins, counts, gaps, count, sign, which, v)
+    a, b, c, d, e, f = sums
+    add(task.tally, which, (sign * a, sign * b, sign * c, sign * d, sign * e, sign * f))
+
+
+@part()
+def solve_closed(task: Task, spheres: Spheres, chosen: IntArray, which: int) -> None:
+    """
+    Sweep closed lines again, over their chords in the order of their starts.
+
+    This is exact, since no chord can reach back. What the sweep by depth has counted is removed.
+    """
+    first, place_of = closed_lines(task, which)
+    if place_of.size == 0:
+        return
+    chords, last = chords_of(task, spheres, chosen, which, first, place_of)
+    order = np.empty(chords.shape[1], np.int64)
+    for number in range(place_of.size):
+        begin, k = order.size, last[number]
+        while k >= 0:
+            begin -= 1
+            order[begin] = k
+            k = np.int64(chords[2, k])
+        sweep_again(task, which, place_of[number], chords, order[begin:], -1.0)
+        sort_by(chords[0], order[begin:])
+        sweep_again(task, which, place_of[number], chords, order[begin:], 1.0)

@@ -36,7 +36,7 @@ the end of the last solid before the window and the beginning of the first solid
 its first segment begins and its last segment ends. The former is kept with a minus, so that both
 are found as a minimum, whatever the order of the chords. Solids are listed up to a margin beyond
 the window. A line that meets none there keeps the margin's end, and is followed further
-(:mod:`scanfab.scan.kernels.resolve`).
+(:mod:`scanfab.scan.kernels.cells`).
 """
 
 from __future__ import annotations
