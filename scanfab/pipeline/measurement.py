@@ -18,7 +18,7 @@ from scanfab.fabric.measured import void_scatter
 from scanfab.packing.sample import Sample, Variant
 from scanfab.packing.window import Window, inner_ellipsoid
 from scanfab.pipeline.plan import NOISE, Plan
-from scanfab.pipeline.tolerance import is_quick, scan_to_tolerance
+from scanfab.pipeline.tolerance import scan_to_tolerance
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import design_of, usual_rule
 from scanfab.scan.edges import CLIP, ENDS, START
@@ -158,11 +158,8 @@ def _scan_octants(solids: Solids, plan: Plan, blocks: tuple[Blocks, Blocks]) -> 
     spacing = coarse_spacing(solids, axes, plan, most)
     while True:
         try:
-            quick = is_quick(solids, spacing, axes)
             lines = replace(plan, rule=rule, spacing=spacing)
-            return gap_scan(
-                solids, lines, blocks, plan.cutoffs, BLOCK_REPLICATES, most, quick=quick
-            )
+            return gap_scan(solids, lines, blocks, plan.cutoffs, BLOCK_REPLICATES, most)
         except FollowedTooFarError:
             # only a scan can tell how far lines run through a periodic medium
             if solids.chords(2.0 * spacing) < 1.0:
@@ -183,14 +180,13 @@ def gap_scan(
     cutoffs: Sequence[float],
     replicates: Iterable[int],
     most_steps: float = math.inf,
-    quick: bool = False,
 ) -> GapSums:
     """List all gaps along the lines of a plan by block; blocks are in the dump's coordinates."""
     return scan_gaps(
         solids, plan.rule, spacing=plan.spacing, cutoffs=cutoffs,
         blocks=(blocks[0].moved(solids.origin), blocks[1].moved(solids.origin)),
         variants=plan.variants, replicates=replicates, seed=plan.settings.seed,
-        workers=plan.workers, most_steps=most_steps, quick=quick,
+        workers=plan.workers, most_steps=most_steps,
     )  # fmt: skip
 
 

@@ -46,8 +46,6 @@ MARGIN, SIGMAS = 1.1, 2.5
 CLOSEST = 0.05
 # lines are set closer if a larger fraction of the axes of a replicate keeps no segment
 MOST_EMPTY = 0.005
-# chords of a scan that takes a second or so
-QUICK_CHORDS = 3e7
 # without rattlers, what is left of a sample with a larger fraction of them is hardly a packing
 MOST_REMOVED = 0.9
 
@@ -71,17 +69,11 @@ def scan_variants(
     solids: Solids, plan: Plan, replicates: range, most_steps: float = math.inf
 ) -> ScanSums:
     """Scan some replicates; maps use a function of their own, which also sums block by block."""
-    quick = is_quick(solids, plan.spacing, len(plan.rule) * len(replicates))
     return scan_lines(
         solids, plan.rule, spacing=plan.spacing, cutoff=plan.cutoff, variants=plan.variants,
         replicates=replicates, seed=plan.settings.seed, workers=plan.workers,
-        most_steps=most_steps, quick=quick,
+        most_steps=most_steps,
     )  # fmt: skip
-
-
-def is_quick(solids: Solids, spacing: float, axes: int) -> bool:
-    """Whether a scan along so many axes takes less time than to compile a kernel for it."""
-    return solids.chords(spacing) * axes <= QUICK_CHORDS
 
 
 def variant_errors(sums: ScanSums, plan: Plan, variant: str) -> Errors:

@@ -98,14 +98,13 @@ def scan_gaps(
     seed: int = 0,
     workers: int = 1,
     most_steps: float = MOST_STEPS,
-    quick: bool = False,
 ) -> GapSums:
     """
     Scan the lines of :func:`scanfab.scan_lines`, and sort gaps by block and cut-off.
 
     Parameters
     ----------
-    solids, rule, spacing, variants, replicates, seed, workers, most_steps, quick
+    solids, rule, spacing, variants, replicates, seed, workers, most_steps
         As for :func:`scanfab.scan_lines`.
     cutoffs : sequence of float
         Cut-offs in ascending order, dump's length unit.
@@ -128,7 +127,6 @@ def scan_gaps(
     some = partial(
         _binned, solids,
         spacing=spacing, least=least, blocks=blocks, variants=variants, following=following,
-        quick=quick,
     )  # fmt: skip
     found = in_parts(some, triads, offsets, workers)
     tallies = found[:, :, -2 * TALLY_SIZE :].reshape(*offsets.shape[:2], 2, TALLY_SIZE)
@@ -148,7 +146,6 @@ def _binned(
     blocks: tuple[Blocks, Blocks],
     variants: str,
     following: Following,
-    quick: bool,
 ) -> FloatArray:
     """
     Number, length and square of the variants along some axes, (A, V, B, C, 3), and the tallies.
@@ -159,9 +156,7 @@ def _binned(
     # the same number of blocks for the whole and for the window
     axes, kept = len(triads), max(map(len, blocks))
     bins = Bins(partition_of(*blocks), least, np.zeros((axes, 2, 2, kept * len(least), 3)))
-    tallies = tally_triads(
-        solids, triads, offsets, spacing, least[0], variants, bins, following, quick
-    )
+    tallies = tally_triads(solids, triads, offsets, spacing, least[0], variants, bins, following)
     rows = ["abcd".index(variant) for variant in variants]
     sums = bins.sums.reshape(axes, 4, kept, len(least), 3)[:, rows]
     if len(least) > 1:

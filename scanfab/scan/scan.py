@@ -131,7 +131,6 @@ def scan_lines(
     seed: int = 0,
     workers: int = 1,
     most_steps: float = MOST_STEPS,
-    quick: bool = False,
 ) -> ScanSums:
     """
     Scan with one square grid of lines for each axis and replicate (in a plane, one row of lines).
@@ -158,9 +157,6 @@ def scan_lines(
         Seed of the random numbers; threads to use. The result does not depend on the threads.
     most_steps : float, optional
         Most steps of following lines through a periodic medium, see :attr:`ScanSums.steps`.
-    quick : bool, optional
-        Whether to scan an open whole with the kernel of a window. A first scan then waits some
-        seconds less for the compiler, but each chord takes up to a sixth longer.
 
     Returns
     -------
@@ -193,7 +189,6 @@ def scan_lines(
     some = partial(
         tally_triads, solids,
         spacing=spacing, cutoff=cutoff, variants=variants, following=following,
-        quick=quick,
     )  # fmt: skip
     return sums_of(triads, in_parts(some, triads, offsets, workers), variants, solids.edge)
 

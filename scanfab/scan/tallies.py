@@ -85,14 +85,12 @@ def tally_triads(
     variants: str,
     bins: Bins | None = None,
     following: Following | None = None,
-    quick: bool = False,
 ) -> FloatArray:
     """
     Scan along given line triads (D, 3, 3) with given shifts (D, 2), or (D, 1) in a plane.
 
     Returns the tallies of each axis and set of solids, shape (D, 2, TALLY_SIZE). If there are bins,
-    the gaps go there instead. ``following`` counts the steps of this part and of other parts. If
-    ``quick``, an open whole is scanned as a window without an end.
+    the gaps go there instead. ``following`` counts the steps of this part and of other parts.
 
     Raises
     ------
@@ -119,7 +117,7 @@ def tally_triads(
         lines.scan(True, CLIPPED, solids.window)
     else:
         if whole:
-            lines.scan_whole(quick)
+            lines.scan_whole()
         if window:
             lines.scan_window()
     lines.following.add(float(lines.tallies[:, 0, sweep.STEPS].sum()))
@@ -197,17 +195,14 @@ class _Lines(NamedTuple):
             self.tallies,
         )
 
-    def scan_whole(self, quick: bool) -> None:
+    def scan_whole(self) -> None:
         """
-        Scan the whole of an open sample.
+        Scan the whole of an open sample alone, as a window.
 
-        By ``ends`` it is an ellipsoid, a window of its own. Else all gaps between the first and the
-        last solid of a line count; if ``quick``, as in a window without an end.
+        By ``ends`` the window is an ellipsoid. Otherwise it has no end, so that all gaps between
+        the first and the last solid of a line count.
         """
         inner, found, sums = self.solids.inner, self.tallies, self.bins.sums
-        if self.solids.edge != ENDS and not quick:
-            self.scan(True, None, None)
-            return
         if self.solids.edge == ENDS:
             if inner is None:
                 return

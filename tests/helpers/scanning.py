@@ -37,9 +37,9 @@ def solids_of(spheres, window=0.0, removed=None):
     return Solids(spheres.position, spheres.radius, none if removed is None else removed, window)
 
 
-def scan_triads(solids, triads, offsets, spacing, cutoff, variants="abcd", quick=False):
+def scan_triads(solids, triads, offsets, spacing, cutoff, variants="abcd"):
     """Scan along given line triads, with given shifts of the lines, as one replicate."""
-    tallies = tally_triads(solids, triads, offsets, spacing, cutoff, variants, quick=quick)
+    tallies = tally_triads(solids, triads, offsets, spacing, cutoff, variants)
     return sums_of(triads[None], tallies[None], variants, solids.edge)
 
 
