@@ -13,12 +13,14 @@ from scanfab.base.convex import Convex
 from scanfab.base.errors import PackingError, SettingsError
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
-from scanfab.base.typing import BoolArray, FloatArray
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import CLIP
-from scanfab.scan.kernels.cells import Cells, fill_cells
+from scanfab.scan.kernels.cells import Cells
 from scanfab.scan.kernels.grid import Bounds, CellGrains
 from scanfab.scan.kernels.strips import FAR, Clip
+
+Int32Array = npt.NDArray[np.int32]
 
 # most lines of one axis and replicate: more would take minutes, even if they meet nothing
 MAX_LINES = 50_000_000
@@ -294,17 +296,36 @@ def cells_of(grains: CellGrains, width: float) -> Cells:
     low, high = (
         np.where(grains.periodic, x, np.clip(x, 0, parts - 1)).astype(np.int32) for x in (low, high)
     )
-    start, nothing = np.zeros(int(np.prod(parts)) + 1, np.int64), np.zeros(0, np.int32)
-    fill_cells(low, high, grains.periodic, parts, start, nothing, nothing.reshape(0, 3))
-    start = np.cumsum(start)
-    grain, image = np.empty(start[-1], np.int32), np.empty((start[-1], 3), np.int32)
-    fill_cells(low, high, grains.periodic, parts, start[:-1].copy(), grain, image)
-    sphere = np.column_stack([grains.position[grain] + image @ vectors, grains.radius[grain]])
+    start, grain, image = _by_cell(low, high, parts)
+    sphere = np.column_stack([grains.position[grain] - image @ vectors, grains.radius[grain]])
     farthest = [_farthest(grains, volume, solid) for solid in (slice(None), ~grains.removed)]
     return Cells(
         sphere, grains.removed[grain], vectors, inverse, corner, grains.periodic, parts, start,
         *farthest,
     )  # fmt: skip
+
+
+def _by_cell(
+    low: Int32Array, high: Int32Array, parts: IntArray
+) -> tuple[IntArray, Int32Array, Int32Array]:
+    """
+    List each grain in all cells from its first to its last, shapes (N, 3), also beyond the periods.
+
+    Returns the first entry of each cell, with the number of entries behind them; and of each entry
+    its grain, and how many periods its cell lies beyond the grid, shape (K, 3).
+    """
+    width = high - low + 1
+    cells = np.prod(width, axis=1, dtype=np.int32)
+    grain = np.repeat(np.arange(len(cells), dtype=np.int32), cells)
+    # the number of an entry among those of its grain, as steps along the three edges
+    step = np.arange(len(grain), dtype=np.int32) - np.repeat(np.cumsum(cells) - cells, cells)
+    over, along = np.divmod(step, width[grain, 0])
+    beside = np.stack([along, *np.divmod(over, width[grain, 1])[::-1]], axis=1)
+    image, cell = np.divmod(beside + low[grain], parts.astype(np.int32))
+    number = cell @ np.cumprod([1, *parts[:2]])
+    start = np.cumsum(np.bincount(number + 1, minlength=np.prod(parts) + 1))
+    order = np.argsort(number)
+    return start, grain[order], image[order]
 
 
 def _farthest(grains: CellGrains, volume: float, solid: BoolArray | slice) -> float:

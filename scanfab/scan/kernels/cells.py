@@ -12,9 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from scanfab.base.jit import ONE, inner, kernel
+from scanfab.base.jit import ONE, inner
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.kernels.bins import add_gaps, list_gap, room_for_gaps
 from scanfab.scan.kernels.strips import (
@@ -43,8 +42,6 @@ from scanfab.scan.kernels.sweep import (
     counted,
     listed_to,
 )
-
-Int32Array = npt.NDArray[np.int32]
 
 # allows vector instructions in a loop that looks for the smallest number
 NO_NAN = {"nnan", "nsz", "contract"}
@@ -83,40 +80,6 @@ class Cells(NamedTuple):
 def cell_of(parts: IntArray, i: int, j: int, k: int) -> int:
     """The number of a cell."""
     return int(i + parts[0] * (j + parts[1] * k))
-
-
-@kernel
-def fill_cells(
-    low: Int32Array,
-    high: Int32Array,
-    periodic: BoolArray,
-    parts: IntArray,
-    start: IntArray,
-    grain: Int32Array,
-    image: Int32Array,
-) -> None:
-    """
-    Count the entries of each cell or, if ``grain`` has room for them, list them.
-
-    ``low`` and ``high`` are the first and last cells that each grain reaches, shape (N, 3), also
-    beyond the periods. ``start``, shape (cells + 1,), holds the counts, or where the next entry of
-    each cell goes.
-    """
-    counts = grain.size == 0
-    for g in range(low.shape[0]):
-        for k in range(low[g, 2], high[g, 2] + 1):
-            for j in range(low[g, 1], high[g, 1] + 1):
-                for i in range(low[g, 0], high[g, 0] + 1):
-                    cell = cell_of(parts, i % parts[0], j % parts[1], k % parts[2])
-                    if counts:
-                        start[cell + 1] += 1
-                        continue
-                    entry = start[cell]
-                    grain[entry] = g
-                    image[entry, 0] = -(i // parts[0])
-                    image[entry, 1] = -(j // parts[1])
-                    image[entry, 2] = -(k // parts[2])
-                    start[cell] += 1
 
 
 class Ray(NamedTuple):
