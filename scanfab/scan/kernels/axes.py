@@ -13,7 +13,6 @@ from scanfab.scan.kernels.cells import Beyond, Cells, follow_beyond, follow_meas
 from scanfab.scan.kernels.grid import (
     Bounds,
     CellGrains,
-    Grid,
     Spheres,
     open_grid,
     project,
@@ -40,6 +39,7 @@ from scanfab.scan.kernels.strips import (
     Clip,
     Counts,
     Section,
+    Strip,
     Task,
     begin,
     section_along,
@@ -107,7 +107,7 @@ def sweep_strip(
 def scan_strips(
     lines: FloatArray,
     spheres: Spheres,
-    grid: Grid,
+    grid: Strip,
     section: Section,
     reach: float,
     tally: FloatArray,

@@ -19,24 +19,10 @@ from scanfab.scan.kernels.strips import FAR, Sphere, Strip, span
 FEW = 16
 
 
-class Grid(NamedTuple):
-    """Lines at (first_u + column * spacing, first_v + row * spacing), low <= column < high."""
-
-    spacing: float
-    first_u: float
-    first_v: float
-    columns: int
-    rows: int
-    low: IntArray
-    """First column of each row, from 0."""
-    high: IntArray
-    """End of the columns of each row, up to ``columns``."""
-
-
 @part()
 def cover(
     low_u: float, high_u: float, low_v: float, high_v: float, offset: FloatArray, spacing: float
-) -> Grid:
+) -> Strip:
     """The lines ((i + offset_u) * spacing, (j + offset_v) * spacing) that meet a rectangle."""
     column = int(np.ceil(low_u / spacing - offset[0]))
     columns = max(int(np.floor(high_u / spacing - offset[0])) - column + 1, 0)
@@ -49,11 +35,12 @@ def cover(
     low, high = np.zeros(rows, np.int64), np.empty(rows, np.int64)
     for k in range(rows):
         high[k] = columns
-    return Grid(spacing, first_u, first_v, columns, rows, low, high)
+    pitch = columns + LANES
+    return Strip(spacing, 1.0 / spacing, first_u, first_v, columns, rows, pitch, low, high)
 
 
 @part()
-def limit_row(grid: Grid, row: int, low_u: float, high_u: float) -> None:
+def limit_row(grid: Strip, row: int, low_u: float, high_u: float) -> None:
     """Keep only the lines of a row from low_u to high_u."""
     low = int(np.ceil((low_u - grid.first_u) / grid.spacing))
     high = int(np.floor((high_u - grid.first_u) / grid.spacing)) + 1
@@ -88,7 +75,7 @@ def open_grid(
     spacing: float,
     reach: float,
     whole: bool,
-) -> Grid:
+) -> Strip:
     """
     The lines that meet the window or, for the whole, any sphere.
 
@@ -120,7 +107,7 @@ def sheared_grid(
     skew: float,
     offset: FloatArray,
     spacing: float,
-) -> Grid:
+) -> Strip:
     """The lines in a parallelogram, which is given by the ranges of u - skew * v and of v."""
     aside_u, aside_v = skew * low_v, skew * high_v
     low, high = low_u + min(aside_u, aside_v), high_u + max(aside_u, aside_v)
@@ -132,7 +119,7 @@ def sheared_grid(
 
 
 @part()
-def strip_of(grid: Grid, row: int, rows: int, column: int, columns: int) -> Strip:
+def strip_of(grid: Strip, row: int, rows: int, column: int, columns: int) -> Strip:
     """The strip that starts at a row and a column, with at most so many rows and columns."""
     rows, columns = min(rows, grid.rows - row), min(columns, grid.columns - column)
     low, high = np.empty(rows, np.int64), np.empty(rows, np.int64)
@@ -141,7 +128,7 @@ def strip_of(grid: Grid, row: int, rows: int, column: int, columns: int) -> Stri
         high[k] = min(max(grid.high[row + k] - column, 0), columns)
     return Strip(
         grid.spacing,
-        1.0 / grid.spacing,
+        grid.per_spacing,
         grid.first_u + column * grid.spacing,
         grid.first_v + row * grid.spacing,
         columns,
@@ -210,7 +197,7 @@ def room_to_project(count: int) -> Room:
 def project(
     grains: CellGrains,
     triad: FloatArray,
-    grid: Grid,
+    grid: Strip,
     reach: float,
     margin: float,
     room: Room,
@@ -225,7 +212,7 @@ def project(
     u_x, u_y, u_z = triad[0, 0], triad[0, 1], triad[0, 2]
     v_x, v_y, v_z = triad[1, 0], triad[1, 1], triad[1, 2]
     n_x, n_y, n_z = triad[2, 0], triad[2, 1], triad[2, 2]
-    found, count, per_spacing = room.found, np.uint64(0), 1.0 / grid.spacing
+    found, count, per_spacing = room.found, np.uint64(0), grid.per_spacing
     for k in range(np.uint64(radius.size)):
         x, y, z = position[k, 0], position[k, 1], position[k, 2]
         found.u[count] = u = u_x * x + u_y * y + u_z * z
@@ -319,7 +306,7 @@ def insert(values: FloatArray, members: IntArray, gap: int) -> None:
 
 
 @part()
-def sort_into_strips(spheres: Spheres, grid: Grid, rows: int) -> tuple[IntArray, IntArray]:
+def sort_into_strips(spheres: Spheres, grid: Strip, rows: int) -> tuple[IntArray, IntArray]:
     """
     List the spheres that each strip of so many rows meets, in their order.
 
@@ -337,7 +324,7 @@ def sort_into_strips(spheres: Spheres, grid: Grid, rows: int) -> tuple[IntArray,
     for fill in range(2):
         for k in range(spheres.u.size):
             v, radius = spheres.v[k], spheres.radius[k]
-            first, last = span(v, radius, grid.first_v, 1.0 / grid.spacing, 0, grid.rows)
+            first, last = span(v, radius, grid.first_v, grid.per_spacing, 0, grid.rows)
             if first < last:
                 for strip in range(first // rows, (last - 1) // rows + 1):
                     if fill:

@@ -16,15 +16,8 @@ import numpy as np
 
 from scanfab.base.jit import ZERO, inner, part
 from scanfab.base.typing import BoolArray, FloatArray
-from scanfab.scan.kernels.grid import (
-    CellGrains,
-    Grid,
-    Spheres,
-    in_order,
-    room_to_project,
-    sheared_grid,
-)
-from scanfab.scan.kernels.strips import FAR, Measured, Section, dot
+from scanfab.scan.kernels.grid import CellGrains, Spheres, in_order, room_to_project, sheared_grid
+from scanfab.scan.kernels.strips import FAR, Measured, Section, Strip, dot
 
 # solids are listed up to so many mean radii beyond the prism; longer gaps are followed one by one
 BEYOND = 16.0
@@ -171,7 +164,7 @@ def fill_images(
 @part()
 def cell_grid(
     grains: CellGrains, normal: FloatArray, offset: FloatArray, spacing: float
-) -> tuple[Prism, Spheres, Grid, Measured]:
+) -> tuple[Prism, Spheres, Strip, Measured]:
     """The lines along a direction through a periodic medium, and the images that they may meet."""
     prism = prism_along(normal, grains.vectors, grains.periodic, offset.size == 1)
     mean = grains.radius.mean()

@@ -115,7 +115,8 @@ class Strip(NamedTuple):
     """
     Lines at (first_u + column * spacing, first_v + row * spacing) with low <= column < high.
 
-    Each row takes ``pitch`` places of a plane, at least LANES more than there are columns.
+    Each row takes ``pitch`` places of a plane, LANES more than there are columns. All lines of an
+    axis together, its grid, are a strip as well, but only smaller strips fit the planes.
     """
 
     spacing: float
@@ -126,7 +127,9 @@ class Strip(NamedTuple):
     rows: int
     pitch: int
     low: IntArray
+    """First column of each row, from 0."""
     high: IntArray
+    """End of the columns of each row, up to ``columns``."""
 
 
 class Partition(NamedTuple):
