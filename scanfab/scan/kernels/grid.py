@@ -39,15 +39,6 @@ def cover(
     return Strip(spacing, 1.0 / spacing, first_u, first_v, columns, rows, pitch, low, high)
 
 
-@part()
-def limit_row(grid: Strip, row: int, low_u: float, high_u: float) -> None:
-    """Keep only the lines of a row from low_u to high_u."""
-    low = int(np.ceil((low_u - grid.first_u) / grid.spacing))
-    high = int(np.floor((high_u - grid.first_u) / grid.spacing)) + 1
-    grid.low[row] = min(max(low, 0), grid.columns)
-    grid.high[row] = max(min(high, grid.columns), grid.low[row])
-
-
 class Bounds(NamedTuple):
     """A box and a ball about the origin that hold all spheres."""
 
@@ -79,23 +70,15 @@ def open_grid(
     """
     The lines that meet the window or, for the whole, any sphere.
 
-    ``reach`` is the radius of the ball that holds the window; lines that meet only the ball are
-    included. Every line meets a window without an end.
+    ``reach`` is the radius of the ball that holds the window; lines beside it are included in the
+    square around it. Every line meets a window without an end.
     """
     high_u = high_v = reach if reach < FAR else 0.0
     low_u = low_v = -high_u
-    whole = whole or reach > FAR
-    if whole and extent.reach > 0.0:
+    if (whole or reach > FAR) and extent.reach > 0.0:
         low_u, high_u = shadow(extent, triad[0], low_u, high_u)
         low_v, high_v = shadow(extent, triad[1], low_v, high_v)
-    grid = cover(low_u, high_u, low_v, high_v, offset, spacing)
-    if not whole:
-        for row in range(grid.rows):
-            v = grid.first_v + row * spacing
-            # one more line on either side, because of rounding
-            half = np.sqrt(max(reach * reach - v * v, 0.0)) + spacing
-            limit_row(grid, row, -half, half)
-    return grid
+    return cover(low_u, high_u, low_v, high_v, offset, spacing)
 
 
 @part()
@@ -114,7 +97,10 @@ def sheared_grid(
     grid = cover(low, high, low_v, high_v, offset, spacing)
     for row in range(grid.rows):
         aside = skew * (grid.first_v + row * spacing)
-        limit_row(grid, row, low_u + aside, high_u + aside)
+        first = int(np.ceil((low_u + aside - grid.first_u) / spacing))
+        stop = int(np.floor((high_u + aside - grid.first_u) / spacing)) + 1
+        grid.low[row] = min(max(first, 0), grid.columns)
+        grid.high[row] = max(min(stop, grid.columns), grid.low[row])
     return grid
 
 

@@ -261,8 +261,8 @@ def begin(lines: FloatArray, strip: Strip, section: Section, counts: Counts) -> 
     """
     Start the lines of a strip, which have met nothing yet, and find where they cross the window.
 
-    Rows that serve only the window lose lines at their ends that miss its planes. Places of a row
-    without a line hold NaN, which is neither larger nor smaller than any number.
+    Rows that serve only the window lose lines at their ends that miss it. Places of a row without a
+    line hold NaN, which is neither larger nor smaller than any number.
     """
     a, rise_u = section.a, section.rise_u
     for row in range(strip.rows):
@@ -278,7 +278,7 @@ def begin(lines: FloatArray, strip: Strip, section: Section, counts: Counts) -> 
         for k in range(section.planes.shape[0]):
             cut_row(lines, strip, section.planes, np.uint64(k), v, at)
         low, high = np.uint64(strip.low[row]), np.uint64(strip.high[row])
-        if counts.whole is None and section.planes.shape[0] > 0:
+        if counts.whole is None:
             # lines at either end of the row that miss the window need no visit
             while low < high and not lines[at + low + ENTRY] < lines[at + low + EXIT]:
                 low += ONE
