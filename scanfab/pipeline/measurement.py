@@ -22,9 +22,8 @@ from scanfab.pipeline.tolerance import scan_to_tolerance
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import design_of, usual_rule
 from scanfab.scan.edges import CLIP, ENDS, START
-from scanfab.scan.gaps import GapSums, scan_gaps
 from scanfab.scan.kernels.grid import CellGrains
-from scanfab.scan.scan import ScanSums
+from scanfab.scan.scan import GapSums, ScanSums, scan_gaps
 from scanfab.scan.solids import Inner, Solids, margin_of, most_lines
 from scanfab.scan.tallies import FollowedTooFarError
 

@@ -14,7 +14,7 @@ from scanfab.fabric.errors import (
 from scanfab.fabric.measured import Measured, void_scatter
 from scanfab.fabric.registry import OWN_FABRICS
 from scanfab.scan.blocks import Blocks
-from scanfab.scan.gaps import GapSums, scan_gaps
+from scanfab.scan.scan import GapSums, scan_gaps
 from tests.helpers import naive
 from tests.helpers.lattices import Spheres, poisson_spheres, unit_vectors
 from tests.helpers.scanning import solids_of

@@ -9,8 +9,8 @@ from scanfab import Cell, direction_rule, scan_lines
 from scanfab.base.shapes import sphere
 from scanfab.scan.blocks import Blocks, partition_of
 from scanfab.scan.edges import START
-from scanfab.scan.gaps import scan_gaps
 from scanfab.scan.kernels.strips import Bins
+from scanfab.scan.scan import scan_gaps
 from scanfab.scan.solids import Solids
 from scanfab.scan.tallies import tally_triads
 from tests.helpers import naive

@@ -10,9 +10,9 @@ from scanfab import Cell, Solids, direction_rule, scan_lines, sphere
 from scanfab.base.convex import Convex
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.edges import EDGES
-from scanfab.scan.gaps import scan_gaps
 from scanfab.scan.kernels.grid import CellGrains
 from scanfab.scan.lines import line_triads
+from scanfab.scan.scan import scan_gaps
 from scanfab.scan.solids import shortest_gap
 from tests.helpers import naive
 from tests.helpers.lattices import ball_points, rotation

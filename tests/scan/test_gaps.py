@@ -5,8 +5,8 @@ import pytest
 
 from scanfab import direction_rule
 from scanfab.scan.blocks import Blocks
-from scanfab.scan.gaps import scan_gaps
 from scanfab.scan.lines import line_triads, turned_triads
+from scanfab.scan.scan import scan_gaps
 from tests.helpers import naive
 from tests.helpers.lattices import poisson_spheres
 from tests.helpers.scanning import solids_of

@@ -6,9 +6,9 @@ import pytest
 from scanfab import box, cylinder, direction_rule, scan_lines, sphere
 from scanfab.base.jit import kernel
 from scanfab.scan.blocks import Blocks
-from scanfab.scan.gaps import scan_gaps
 from scanfab.scan.kernels.strips import section_along
 from scanfab.scan.lines import line_triads
+from scanfab.scan.scan import scan_gaps
 from scanfab.scan.solids import clip_of
 from tests.helpers import naive
 from tests.helpers.lattices import Spheres, poisson_spheres, rotation

@@ -201,7 +201,7 @@ def void_ring(frame: ScannedFrame, phi: float) -> Ring:
     """Mean void lengths of a frame around a polar angle in degrees; the first one is repeated."""
     # loaded here, as other figures do without compiled kernels
     from scanfab.scan.directions import DirectionRule
-    from scanfab.scan.gaps import scan_gaps
+    from scanfab.scan.scan import scan_gaps
 
     measured, plan = frame.measurement, frame.measurement.plan
     around = np.arange(0.0, 361.0, THETA_STEP)
