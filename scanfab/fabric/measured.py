@@ -15,7 +15,7 @@ from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.errors import Jackknife, jackknife
 from scanfab.fabric.tensor import FabricTensor, axial, contact_fabric
 from scanfab.fabric.void import VoidFabric, void_fabric
-from scanfab.scan.gaps import GapSums
+from scanfab.scan.scan import GapSums
 
 # A stress with √(3/2 s:s) below this fraction of p, s its deviator, counts as isotropic.
 LEAST_RATIO = 0.02
