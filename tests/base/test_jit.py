@@ -153,7 +153,7 @@ def test_no_kernel_is_left_out_of_the_name_of_the_folder():
     """Else a kernel that has changed would be served as it was."""
     texts = {path: path.read_text() for path in (ROOT / "scanfab").rglob("*.py")}
     compiled = {path for path, text in texts.items() if "@kernel" in text or "@inner" in text}
-    assert len(compiled) >= 10
+    assert len(compiled) > 5
     assert compiled <= set(jit.kernel_files())
 
 
