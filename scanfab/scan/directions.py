@@ -85,7 +85,7 @@ class DirectionRule:
 
     def __repr__(self) -> str:
         degree = "of no degree" if self.degree is None else f"exact to degree {self.degree}"
-        bias = f", bias {self.bias:.2g}" if self.bias > 1e-9 else ""
+        bias = f", bias {self.bias:.2g}" if self.bias else ""
         return f"DirectionRule {self.name}: {counted(len(self), 'axis', 'axes')}, {degree}{bias}"
 
     @property
@@ -101,9 +101,9 @@ class DirectionRule:
 
     @property
     def bias(self) -> float:
-        """Anisotropy α of the isotropic tensor, which is 0 for a good rule."""
+        """Anisotropy α of the isotropic tensor to 12 decimal places, which is 0 for a good rule."""
         values = np.linalg.eigvalsh(self.isotropic_tensor)
-        return float(values[-1] - values[-self.space.dimension])
+        return round(float(values[-1] - values[-self.space.dimension]), 12)
 
     @property
     def is_flat(self) -> bool:
