@@ -59,7 +59,7 @@ def merge_tables(
     --------
     >>> import scanfab, tempfile
     >>> series = scanfab.read_series("sample_data/liggghts_periodic")
-    >>> words = {"variants": "a", "tolerance": 0.01}
+    >>> words = {"variants": "c", "tolerance": 0.01}
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     for job in (0, 1):
     ...         part = f"{folder}/part_{job}.csv"
