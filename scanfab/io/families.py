@@ -27,7 +27,7 @@ Numbered = list[tuple[int | None, Path]]
 
 SETTINGS_FILE = "scanfab.toml"
 # endings of files that editors and interrupted programs leave behind, and of companion files
-LEFTOVERS = ("~", ".part", ".tmp", ".bak", ".contacts.csv", ".frame.csv", ".columns.csv")
+LEFTOVERS = ("~", ".part", ".tmp", ".bak", ".contacts.csv")
 NUMBER = re.compile(r"\d+")
 
 

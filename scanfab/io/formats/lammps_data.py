@@ -90,7 +90,7 @@ class DataFile(GrainsOnly):
                 problem = f"expected diameters (atom_style sphere), found {', '.join(others)}"
                 advice = '`columns="id=1,radius=3,x=5,y=6,z=7"` names the columns'
                 raise ReadError(f"{path}: {problem}: {advice}")
-            columns = _named(path, style, columns)
+            columns = _named(path, style, columns, cell)
         return grains_of(snapshot, columns, cell, options)
 
 
@@ -117,12 +117,14 @@ def _cell(path: Path, header: dict[bytes, bytes]) -> Cell | None:
     return box_cell(path, bounds, (False, False, False), is_around=False)
 
 
-def _named(path: Path, style: str, columns: Columns) -> Columns:
+@np.errstate(invalid="ignore")
+def _named(path: Path, style: str, columns: Columns, cell: Cell | None) -> Columns:
     """
     Name the columns as in atom_style sphere, or as in a hybrid style with sphere.
 
     If the file does not name its style, it is a hybrid if it has more columns than the seven of
-    atom_style sphere and three image flags; ReadError if a diameter or density is not positive.
+    atom_style sphere and three image flags. This guess is checked: ReadError if diameters or
+    densities are not positive, types are not whole, or centres are outside the box.
     """
     values = list(columns.values())
     more = len(values) - len(PLAIN)
@@ -134,11 +136,19 @@ def _named(path: Path, style: str, columns: Columns) -> Columns:
     problem = f"are not {' '.join(PLAIN)} (or a hybrid's {' '.join(HYBRID)})"
     fits = more >= 0 if is_hybrid else more == 0
     if fits and not style:
-        is_sound = (named["diameter"] > 0) & (named["density"] > 0)
-        if not is_sound.all():
-            fits, found = False, " ".join(f"{column[np.argmin(is_sound)]:g}" for column in values)
-            expected = "expected a positive diameter and density"
-            problem = f"do not read as {' '.join(order)}: {expected}, found '{found}'"
+        # centres may lie a little outside the box, as LAMMPS wraps periodic boxes only now and then
+        centres = np.column_stack([named[axis] for axis in "xyz"])
+        place = np.full_like(centres, np.nan) if cell is None else cell.fractional(centres)
+        expected = {
+            "a positive diameter and density": (named["diameter"] > 0) & (named["density"] > 0),
+            "a whole type": named["type"] % 1 == 0,
+            "the centre in the box": np.all((place > -0.5) & (place < 1.5), axis=1),
+        }
+        for what, holds in expected.items():
+            if fits and not holds.all():
+                fits, atom = False, int(np.argmin(holds))
+                found = " ".join(f"{column[atom]:g}" for column in values)
+                problem = f"do not read as {' '.join(order)}: expected {what}, found '{found}'"
     if not fits:
         advice = '`columns="id=1,diameter=3,x=5,y=6,z=7"` names them'
         raise ReadError(f"{path}: the {len(columns)} columns below 'Atoms' {problem}: {advice}")

@@ -7,6 +7,8 @@ Companion files hold the data of a packing for which the format of its grain fil
 whatever its ending. :func:`scanfab.convert` writes them, and reading the grain file reads them too.
 """
 
+from __future__ import annotations
+
 import io
 import re
 from contextlib import suppress
@@ -23,7 +25,7 @@ from scanfab.io.families import numbers_in
 from scanfab.io.files import bare_name, first_bytes
 from scanfab.io.formats.shared import GrainsOnly
 from scanfab.io.formats.table import TableReader
-from scanfab.io.reader import GrainTable, JoinedContacts, ReadOptions, Snapshot
+from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.io.text import Layout, read_rows, text_of, words_of
 from scanfab.io.writer import Left, as_arrays, contacts_of, csv_bytes, more_columns, stated_cell
 from scanfab.packing.cell import Cell
@@ -197,17 +199,27 @@ class NpzFormat(GrainsOnly):
     """Reader and writer plugin for arrays named as a :class:`scanfab.Packing` names them."""
 
     name = "npz"
-    description = "packings as arrays of NumPy, with contacts and cell"
+    description = "packings as arrays of NumPy; .contacts.csv, .frame.csv and .columns.csv"
     extensions: tuple[str, ...] = (".npz",)
 
     def recognises(self, path: Path) -> bool:
-        """Recognised by the array `MARK`."""
+        """Recognised by the array `MARK`, or by the first line of a companion file."""
+        if first_bytes(path, 2) != IS_NPZ:
+            return companion_kind(path) in ("frame", "columns")
         with suppress(ReadError):
-            return first_bytes(path, 2) == IS_NPZ and MARK in read_npz(path, MARK)
+            return MARK in read_npz(path, MARK)
         return False
+
+    def kind(self, path: Path) -> FileKind:
+        """Grains, or for companion files contacts or ``cell``."""
+        if first_bytes(path, 2) == IS_NPZ:
+            return "grains"
+        return "cell" if companion_kind(path) in ("frame", "columns") else "other"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """The only snapshot, with the step and time of the packing."""
+        if self.kind(path) != "grains":
+            return [Snapshot(path)]
         moment = read_npz(path, "step", "time")
         try:
             step = int(moment["step"].item()) if "step" in moment else None

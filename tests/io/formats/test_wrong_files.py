@@ -21,7 +21,8 @@ WRONG = {
         ("snap_t=30_2.txt", "1\n3.75", "x\n3.75", "30_2.txt: expected the number of particles"),
     ],
     "kratos": [
-        ("a.mdpa", "7  1 0.2\n", "8  1 0.2\n", "1 radii are of no node, such as of 8"),
+        ("a.mdpa", "7  1 0.2\n", "", "no place or RADIUS for 1 nodes, such as 7"),
+        ("a.mdpa", "SphericParticle3D", "Cluster3D", "elements that are spheres"),
         ("a.mdpa", "End Nodes", "", "incomplete"),
         ("a.mdpa", "End SubModelPart\n", "", "incomplete"),
         ("a.mdpa", "RADIUS", "MASS", "no grains: expected points with a radius"),
@@ -58,6 +59,7 @@ WRONG = {
         ("plain.data", "data file", "Description", "expected diameters.*YADE's radii"),
         ("plain.data", " 1.0 2500 0", " 1.0 0 2500", "density, found '1 1 1 0 2500.*names them"),
         ("plain.data", " 1.0 2500", " 0 2500", "expected a positive diameter"),
+        ("plain.data", "-1 3 xlo", "90 94 xlo", "the centre in the box, found '1 1 1 2500"),
         ("plain.data", "types", "types\n3 ellipsoids", "expected diameters.*found ellipsoids"),
         ("plain.data", "Atoms\n", "Atoms # atomic\n", "found 'Atoms # atomic'"),
         ("plain.data", "Atoms\n", "Masses\n", "expected .* a section Atoms"),
