@@ -90,11 +90,10 @@ class SourceCommand(Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Join the numbers that follow an option into one word: click allows no variable count."""
         args = list(args)
-        for flag in COUNTS.keys() & {*args}:
-            first = args.index(flag) + 1
-            found = len(list(takewhile(NUMBER.fullmatch, args[first:])))
-            count = max((known for known in COUNTS[flag] if known <= found), default=found)
-            if count:
+        for first in range(len(args), 0, -1):
+            counts = COUNTS.get(args[first - 1], ())
+            found = len(list(takewhile(NUMBER.fullmatch, args[first:]))) if counts else 0
+            if count := max((known for known in counts if known <= found), default=found):
                 args[first : first + count] = [" ".join(args[first : first + count])]
         return super().parse_args(ctx, args)
 

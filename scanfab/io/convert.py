@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, suppress
+from glob import escape
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from scanfab.base.errors import SettingsError, note
 from scanfab.base.files import check_folder, refuse_inputs, whole_file
 from scanfab.base.option import refuse_unknown
 from scanfab.io.families import PathLike
+from scanfab.io.files import bare_name
 from scanfab.io.formats.own import HEADS, companion_kind, companion_there, companions_of
 from scanfab.io.options import parse_frames
 from scanfab.io.series import Series, counts_from_end
@@ -143,9 +145,11 @@ def save_packing(packing: Packing, path: Path, writer: Writer) -> None:
     Write one packing to a grain file and its companion files; each is complete or untouched.
     """
     companions = [file for kind in HEADS if (file := companion_there(path, kind))]
-    if companions and not path.exists():
+    stem = Path(bare_name(path)).stem
+    others = {*path.parent.glob(f"{escape(stem)}.*")} - {*companions}
+    if companions and others and path not in others:
         theirs = " and ".join(file.name for file in companions)
-        problem = f"{theirs} belong to another file of this name"
+        problem = f"{theirs} may belong to {min(others).name}"
         raise SettingsError(f"{path}: {problem}: choose another name, or remove them")
     with ExitStack() as files:
         # the stack is unwound in reverse: the grain file appears last, after its companion files

@@ -82,9 +82,10 @@ def test_json_is_an_object_a_line_with_what_the_reader_sees(tmp_path, frames):
 
 def test_it_takes_the_options_of_compute(tmp_path, frames):
     file = write(tmp_path / "dump.txt", dump_text(names="id type x y z mass"))
-    words = ("--radius", "0.2", "--cell", "1", "1", "1", "--periodic", "z")
+    words = ("--cell", "2", "2", "2", "--radius", "0.2", "--cell", "1", "1", "1", "--periodic", "z")
     (frame,) = frames(file, *words, "--rv-shape", "cylinder")
     assert frame["radius_max"] == 0.2
+    assert frame["cell"] == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
     assert frame["periodic"] == [False, False, True]
     assert frame["rv_shape"].startswith("cylinder of radius ")
 

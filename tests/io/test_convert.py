@@ -121,9 +121,11 @@ def test_companions_of_an_earlier_packing_go_and_those_of_other_files_stay(tmp_p
     written(EVERYTHING, tmp_path, "csv")
     before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
     for name in ("npz", "xyz", "tsv"):
-        with pytest.raises(scanfab.SettingsError, match=r"contacts\.csv .* belong to another"):
+        with pytest.raises(scanfab.SettingsError, match=r"contacts\.csv .* may belong to a\.csv"):
             written(PLAIN, tmp_path, name)
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
+    # a file that is removed leaves its companions to the next one
+    (tmp_path / "a.csv").unlink()
     written(PLAIN, tmp_path, "csv")
     assert {file.name for file in tmp_path.iterdir()} == {"a.csv", "a.frame.csv"}
     (tmp_path / "a.contacts.csv").write_text("mine\n1\n")

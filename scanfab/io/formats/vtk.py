@@ -223,6 +223,10 @@ class VtkReader(GrainsOnly):
             if kinds[family] in ("grains", "points") and frames.setdefault(word, path) != path:
                 both = f"{frames[word].name} and {path.name}"
                 raise ReadError(f"{index}: lists {both} for one time: name the files of one series")
+        names = {kind: name for (name, _), kind in kinds.items()}
+        if {"grains", "points"} <= names.keys():
+            points = f"points without a radius ({names['points']}) beside {names['grains']}"
+            raise ReadError(f"{index}: lists {points}: take them out, or name the files")
         found = []
         for word, path in frames.items():
             time = None if word is None else numbers(f"{index}: timestep", word.encode(), 1)[0]

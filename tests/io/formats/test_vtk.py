@@ -196,12 +196,17 @@ def test_a_collection_is_a_series_with_times(tmp_path):
     refuses(index, "cannot be read as a list of VTK files")
 
 
-def test_two_files_of_grains_for_one_time_are_an_error_that_names_them(tmp_path):
+def test_files_of_a_list_that_are_no_series_are_an_error_that_names_them(tmp_path):
     for name in "ab":
         cloud(tmp_path / f"{name}.vtp", [0, 1])
-    entries = [(f"{name}.vtp", f'timestep="5" part="{k}"') for k, name in enumerate("ab")]
-    told = r"lists a\.vtp and b\.vtp for one time: name the files of one series"
-    refuses(listing(tmp_path / "run.pvd", "Collection", *entries), told)
+    pyvista.PolyData(POSITION).save(tmp_path / "c.vtp")
+    both = [(f"{name}.vtp", f'timestep="5" part="{k}"') for k, name in enumerate("ab")]
+    wall = [("a.vtp", 'timestep="5"'), ("c.vtp", 'timestep="6"')]
+    for entries, told in (
+        (both, r"lists a\.vtp and b\.vtp for one time: name the files of one series"),
+        (wall, r"lists points without a radius \(c\.vtp\) beside a\.vtp: take them out"),
+    ):
+        refuses(listing(tmp_path / "run.pvd", "Collection", *entries), told)
 
 
 @pytest.mark.parametrize("more", ["", 'group="" part="0" timestep="7"'])
