@@ -141,7 +141,9 @@ def restored_settings(asked: Mapping[str, Any], path: Path) -> Settings:
     """Make the settings of a table's manifest; SettingsError if any cannot be used any more."""
     kind = MapSettings if is_map(asked) else Settings
     try:
-        return kind(**{name: asked[name] for name in kind.__dataclass_fields__ if name in asked})
+        # null and [] stand for options that were not given
+        given = {name: value for name, value in asked.items() if value not in (None, [])}
+        return kind(**{name: given[name] for name in kind.__dataclass_fields__ if name in given})
     except (AttributeError, TypeError, ValueError, SettingsError) as error:
         what = f"the settings of the manifest cannot be used: {error}"
         raise SettingsError(f"{path}: {what}") from None
