@@ -17,8 +17,6 @@ from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
 
-# SciPy's Lebedev rules of these degrees have negative weights: they would amplify noise
-NEGATIVE_LEBEDEV = (13, 25, 27)
 LARGEST_PRODUCT = 999
 # equal steps of a plane
 MOST_STEPS = 100_000
@@ -27,7 +25,8 @@ FINEST = 21
 # Directions of an auto scan: nearly equal weights and few axes, since the random turns of the
 # replicates do the rest; in a plane, the number of equal steps.
 AUTO_RULE, AUTO_STEPS = "icosahedral:9", 16
-LEBEDEV_DEGREES = (*range(3, 32, 2), *range(35, 132, 6))
+# SciPy has rules of degree 13, 25 and 27, too. Their negative weights would amplify noise.
+LEBEDEV_DEGREES = (*range(3, 12, 2), *range(15, 24, 2), 29, 31, *range(35, 132, 6))
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,10 +233,9 @@ def _at_least(count: int) -> DirectionRule:
     if count < 1:
         raise SettingsError("directions: at least one axis is needed, found 0")
     for degree in LEBEDEV_DEGREES:
-        if degree not in NEGATIVE_LEBEDEV:
-            rule = lebedev(degree)
-            if len(rule) >= count:
-                return rule
+        rule = lebedev(degree)
+        if len(rule) >= count:
+            return rule
     # a product rule of odd degree t has ((t + 1) / 2)(t + 1) / 2 axes
     degree = 2 * math.ceil(math.sqrt(count)) - 1
     if degree > LARGEST_PRODUCT:
@@ -251,7 +249,7 @@ def lebedev(degree: float) -> DirectionRule:
     """Lebedev's rule of this degree, or of the next degree with positive weights in SciPy."""
     from scipy.integrate import lebedev_rule
 
-    found = next(d for d in LEBEDEV_DEGREES if d >= degree and d not in NEGATIVE_LEBEDEV)
+    found = next(d for d in LEBEDEV_DEGREES if d >= degree)
     points, weights = lebedev_rule(found)
     half = _upper_half(points.T)
     return _normalised(f"lebedev:{found}", points.T[half], weights[half], found)

@@ -5,10 +5,10 @@ import pytest
 from scipy.special import eval_legendre
 
 from scanfab import SettingsError, direction_rule
-from scanfab.scan.directions import AUTO_RULE, LEBEDEV_DEGREES, NEGATIVE_LEBEDEV
+from scanfab.scan.directions import AUTO_RULE, LEBEDEV_DEGREES
 from tests.helpers.naive import axial
 
-LEBEDEV = [f"lebedev:{degree}" for degree in LEBEDEV_DEGREES if degree not in NEGATIVE_LEBEDEV]
+LEBEDEV = [f"lebedev:{degree}" for degree in LEBEDEV_DEGREES]
 DESIGNS = [*(f"design:{degree}" for degree in range(3, 22, 2)), "icosahedral:9"]
 PRODUCTS = [f"product:{degree}" for degree in (2, 3, 4, 5, 8, 9, 16, 17, 40)]
 
