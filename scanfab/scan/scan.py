@@ -193,11 +193,10 @@ def scan_lines(
     """
     check_lines(solids, rule, spacing)
     triads, offsets = drawn_lines(rule, seed, replicates)
-    following = Following(most_steps)
 
     some = partial(
         tally_triads, solids,
-        spacing=spacing, cutoff=cutoff, variants=variants, following=following,
+        spacing=spacing, cutoff=cutoff, variants=variants, following=Following(most_steps),
     )  # fmt: skip
     return sums_of(triads, in_parts(some, triads, offsets, workers), variants, solids.edge)
 
@@ -348,11 +347,11 @@ def scan_gaps(
     check_lines(solids, rule, spacing)
     triads, offsets = drawn_lines(rule, seed, replicates)
     least = np.maximum(np.array(cutoffs, dtype=np.float64), shortest_gap(solids))
-    following = Following(most_steps)
 
     some = partial(
         _binned, solids,
-        spacing=spacing, least=least, blocks=blocks, variants=variants, following=following,
+        spacing=spacing, least=least, blocks=blocks, variants=variants,
+        following=Following(most_steps),
     )  # fmt: skip
     found = in_parts(some, triads, offsets, workers)
     tallies = found[:, :, -2 * sweep.TALLY_SIZE :].reshape(*offsets.shape[:2], 2, sweep.TALLY_SIZE)

@@ -18,7 +18,7 @@ from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import CLIP
 from scanfab.scan.kernels.cells import Cells
 from scanfab.scan.kernels.grid import Bounds, CellGrains
-from scanfab.scan.kernels.strips import FAR, Clip
+from scanfab.scan.kernels.strips import FAR
 
 Int32Array = npt.NDArray[np.int32]
 
@@ -97,7 +97,7 @@ class Solids:
     around: CellGrains | None = None
     inner: Inner | None = None
     space: Space = SPACE
-    _near: dict[float, BoolArray] = field(default_factory=dict, init=False)
+    _near: dict[tuple[Any, ...], BoolArray] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
         """Cast without a copy; PackingError if the shapes do not fit."""
@@ -146,29 +146,13 @@ class Solids:
         assert self.medium is not None
         return cells_of(self.medium, 3.0)
 
-    def near_window(self, margin: float) -> BoolArray:
-        """
-        Which spheres lie within a margin of the window.
-
-        Parameters
-        ----------
-        margin : float
-            Distance from the window's surface, dump's length unit.
-
-        Returns
-        -------
-        ndarray of bool, shape (N,)
-        """
-        assert self.window is not None
-        if margin not in self._near:
-            self._near[margin] = self.window.may_meet(self.position, self.radius + margin)
-        return self._near[margin]
-
-    @cached_property
-    def near_inner(self) -> BoolArray:
-        """Which spheres reach into the whole's own window, shape (N,)."""
-        assert self.inner is not None
-        return self.inner.shape.may_meet(self.position - self.inner.center, self.radius)
+    def near(self, window: Convex, center: FloatArray | float, margin: float) -> BoolArray:
+        """Which spheres lie within a margin of a window about a centre, shape (N,)."""
+        # kept for the other jobs of a scan
+        key = window, margin, *np.ravel(center)
+        if key not in self._near:
+            self._near[key] = window.may_meet(self.position - center, self.radius + margin)
+        return self._near[key]
 
     @property
     def margin(self) -> float:
@@ -209,13 +193,6 @@ class Solids:
         float
         """
         return self.space.lines(self.shadow, spacing)
-
-
-def clip_of(window: Convex | None) -> Clip:
-    """The numbers of a window for kernels; without a window, nothing clips the lines."""
-    if window is None:
-        return Clip(np.zeros((0, 4)), np.eye(3), np.inf, np.inf)
-    return Clip(window.planes, *window.quadric, window.reach)
 
 
 def margin_of(grains: CellGrains) -> float:

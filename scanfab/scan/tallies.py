@@ -10,14 +10,16 @@ import numpy as np
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.jit import Flag
-from scanfab.base.typing import BoolArray, FloatArray
+from scanfab.base.typing import FloatArray
 from scanfab.scan.edges import CLIP, ENDS
 from scanfab.scan.kernels import sweep
-from scanfab.scan.kernels.axes import Axes, Followed, scan_axes
+from scanfab.scan.kernels.axes import Axes, scan_axes
 from scanfab.scan.kernels.bins import OF_WHOLE, OF_WINDOW, no_bins
+from scanfab.scan.kernels.cells import Beyond
 from scanfab.scan.kernels.grid import CellGrains
-from scanfab.scan.kernels.strips import Bins, Counts, Edge
-from scanfab.scan.solids import Solids, clip_of, shortest_gap
+from scanfab.scan.kernels.periodic import prism_along
+from scanfab.scan.kernels.strips import Bins, Counts, Edge, section_along
+from scanfab.scan.solids import Solids, shortest_gap
 
 # Spheres whose radius is this fraction of the spacing, for each variant, are scanned as fast row by
 # row as over lists of chords. Lists pay off sooner if they serve more variants.
@@ -154,44 +156,45 @@ class _Lines(NamedTuple):
         whole: Flag,
         edge: Edge | None,
         window: Convex | None,
-        center: FloatArray | None = None,
-        near: BoolArray | None = None,
+        center: FloatArray | float = 0.0,
         medium: CellGrains | None = None,
     ) -> None:
-        """
-        Sweep the lines through a window about a centre once; without a window all lines.
-
-        If some spheres are ``near``, only these are scanned.
-        """
+        """Sweep the lines through a window about a centre once; without a window all lines."""
         solids, both = self.solids, bool(self.both)
         grains = medium or CellGrains(solids.position, solids.radius, solids.removed, *NO_CELL)
         # a mask of all spheres would copy them
         solid = slice(None) if self.first else ~grains.removed
-        if near is not None:
-            solid = near & (self.first | ~grains.removed)
+        if window is not None and edge is not None and edge is not CLIPPED:
+            solid = solids.near(window, center, edge.margin) & (self.first | ~grains.removed)
         grains = grains._replace(
-            position=np.ascontiguousarray(grains.position[solid]),
+            position=np.ascontiguousarray(grains.position[solid] - center),
             radius=np.ascontiguousarray(grains.radius[solid]),
             removed=grains.removed[solid],
         )
         if medium is not None and not len(grains.radius):
             return
-        if center is not None:
-            grains = grains._replace(position=grains.position - center)
         cells = None
         if medium is not None:
             cells = solids.medium_cells
         elif edge is not None and edge.start is not None:
             cells = solids.cells
+        axes, prisms = self.axes, None
+        if medium is None:
+            sections = section_along(axes.triads, window)
+        else:
+            in_plane = solids.space.is_plane
+            triads, sections, prisms = prism_along(axes.triads, medium, in_plane)
+            axes = axes._replace(triads=triads)
         scan_axes(
             grains,
-            solids.bounds if medium is None else None,
-            self.axes,
-            clip_of(window),
+            solids.bounds,
+            axes,
+            sections,
+            prisms,
             Counts(self.cutoff, self.both, whole, edge, None),
             self.listed(grains.radius, (1 + both) * ((whole is not None) + (edge is not None))),
             self.bins,
-            None if cells is None else Followed(cells, not self.first, self.following.left),
+            None if cells is None else Beyond(cells, not self.first, self.following.left),
             self.tallies,
         )
 
@@ -207,7 +210,7 @@ class _Lines(NamedTuple):
             if inner is None:
                 return
             alone = self._replace(bins=self.bins.of_whole(inner.center))
-            alone.scan(None, WEIGHED, inner.shape, inner.center, self.solids.near_inner)
+            alone.scan(None, WEIGHED, inner.shape, inner.center)
         else:
             alone = self._replace(bins=self.bins.of_whole(np.zeros(3)))
             alone.scan(None, CLIPPED, None)
@@ -221,14 +224,11 @@ class _Lines(NamedTuple):
     def scan_window(self) -> None:
         """Scan the window alone."""
         solids = self.solids
-        if solids.edge == CLIP:
-            self.scan(None, CLIPPED, solids.window)
-        elif solids.edge == ENDS:
-            self.scan(None, WEIGHED, solids.window, near=solids.near_window(0.0))
+        if solids.edge in (CLIP, ENDS):
+            self.scan(None, CLIPPED if solids.edge == CLIP else WEIGHED, solids.window)
         elif len(solids.grain_radius):
             margin = solids.margin
             if self.bins.cutoffs.size or self.listed(solids.radius, 1 + bool(self.both)):
                 # not below the cut-off: segments that reach it are known to count
                 margin = min(margin, max(NARROW * margin, 1.01 * self.cutoff))
-            near = solids.near_window(margin)
-            self.scan(None, Edge(None, True, margin), solids.window, near=near)
+            self.scan(None, Edge(None, True, margin), solids.window)

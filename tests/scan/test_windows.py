@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 
 from scanfab import box, cylinder, direction_rule, scan_lines, sphere
-from scanfab.base.jit import kernel
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.kernels.strips import section_along
 from scanfab.scan.lines import line_triads
 from scanfab.scan.scan import scan_gaps
-from scanfab.scan.solids import clip_of
 from tests.helpers import naive
 from tests.helpers.lattices import Spheres, poisson_spheres, rotation
 from tests.helpers.scanning import solids_of
@@ -42,17 +40,10 @@ def test_lines_measure_the_volume_along_every_axis_and_the_surface_over_all(name
     assert rule.weights @ sums.lines[0, 2] * 0.02**2 == pytest.approx(surface / 4, rel=2e-3)
 
 
-# kept on disk with the package's kernels, so that another body needs another name
-@kernel
-def quadric_along(clip, triad):
-    section = section_along(clip, triad)
-    return section.level, section.a, section.b, section.c, section.rise_u, section.rise_v
-
-
 def test_a_sphere_has_the_same_numbers_along_all_axes():
-    for triad in line_triads(direction_rule("lebedev:11").axes):
-        section = quadric_along(clip_of(sphere(1.7)), triad)
-        assert section == pytest.approx((1.7 * 1.7, 1.0, 0.0, 1.0, 0.0, 0.0), abs=1e-14)
+    section = section_along(line_triads(direction_rule("lebedev:11").axes), sphere(1.7))
+    for numbers in section.quadric:
+        assert numbers == pytest.approx((1.7 * 1.7, 1.0, 0.0, 1.0, 0.0, 0.0), abs=1e-14)
 
 
 def test_spans_are_those_of_the_naive_twin():

@@ -9,7 +9,7 @@ import numpy as np
 from scanfab.base.jit import LANES, ZERO, Flag, kernel, part
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.bins import bins_along
-from scanfab.scan.kernels.cells import Beyond, Cells, follow_beyond, follow_measured
+from scanfab.scan.kernels.cells import Beyond, follow_beyond, follow_measured
 from scanfab.scan.kernels.grid import (
     Bounds,
     CellGrains,
@@ -30,19 +30,17 @@ from scanfab.scan.kernels.lists import (
     solve_closed,
     sweep_lists,
 )
-from scanfab.scan.kernels.periodic import cell_grid, foot_of
+from scanfab.scan.kernels.periodic import Prism, cell_grid
 from scanfab.scan.kernels.strips import (
     FAR,
     MOST_LINES,
     STATE_SIZE,
     Bins,
-    Clip,
     Counts,
     Section,
     Strip,
     Task,
     begin,
-    section_along,
 )
 from scanfab.scan.kernels.sweep import LINE_LENGTH, NOTHING, STEPS, VOID, settle, visit
 
@@ -55,20 +53,6 @@ class Axes(NamedTuple):
     offsets: FloatArray
     """Shift of each axis' grid, in units of the spacing, shape (D, 2), or (D, 1) in a plane."""
     spacing: float
-
-
-class Followed(NamedTuple):
-    """What lines are followed through where solids are not listed."""
-
-    cells: Cells
-    without_removed: bool
-    """Whether the first set of solids lacks the removed grains, too."""
-    most_steps: float
-    """
-    Most steps of following, all directions together.
-
-    A scan that needs more ends early, and its tallies mean nothing.
-    """
 
 
 @part()
@@ -109,7 +93,6 @@ def scan_strips(
     spheres: Spheres,
     grid: Strip,
     section: Section,
-    reach: float,
     tally: FloatArray,
     counts: Counts,
     listed: Flag,
@@ -129,7 +112,7 @@ def scan_strips(
             task = Task(lines, strip, counts, tally, bins)
             begin(lines, strip, section, counts)
             met = chosen[start[number] : start[number + 1]]
-            sweep_strip(task, spheres, met, reach, listed, lists)
+            sweep_strip(task, spheres, met, section.reach, listed, lists)
             for which in range(1 if counts.second is None else 2):
                 solve_closed(task, spheres, met, which)
                 if in_bins:
@@ -145,13 +128,14 @@ def scan_strips(
 @kernel
 def scan_axes(
     grains: CellGrains,
-    extent: Bounds | None,
+    extent: Bounds,
     axes: Axes,
-    clip: Clip,
+    sections: Section,
+    prisms: Prism | None,
     counts: Counts,
     listed: Flag,
     bins: Bins,
-    followed: Followed | None,
+    beyond: Beyond | None,
     tallies: FloatArray,
 ) -> None:
     """
@@ -161,13 +145,14 @@ def scan_axes(
     ----------
     grains : CellGrains
         Spheres; the window's centre is the origin.
-    extent : Bounds or None
-        Bounds of the spheres; None for the whole of a periodic medium, which has no edge.
+    extent : Bounds
+        Bounds of the spheres of an open sample.
     axes : Axes
-        The axes and the lines along them; in a periodic medium only the last row of each triad
-        counts.
-    clip : Clip
-        The window.
+        The axes and the lines along them.
+    sections : Section
+        The window along each axis or, in a periodic medium, where the lines begin.
+    prisms : Prism or None
+        For the whole of a periodic medium, which has no edge: where the lines run along each axis.
     counts : Counts
         What is counted.
     listed : Flag
@@ -175,41 +160,33 @@ def scan_axes(
         where a sphere meets few lines. For bins they are listed anyhow.
     bins : Bins
         If there are any cut-offs, every gap is added here and not to the tallies.
-    followed : Followed or None
-        What lies beyond the window, for a rule that follows segments there.
+    beyond : Beyond or None
+        What lies beyond the listed solids, if segments are followed there.
     tallies : shape (D, 2, TALLY_SIZE)
         Zeros; the results for each axis and set of solids.
     """
     lines = np.empty(STATE_SIZE)
     lists = room_for_lists(listed is not None or bins.cutoffs.size > 0)
     # kept from axis to axis: to get the pages of large arrays anew takes long
-    room = room_to_project(ZERO if extent is None else grains.radius.size)
-    left = np.inf if followed is None else followed.most_steps
+    room = room_to_project(ZERO if prisms is not None else grains.radius.size)
     for axis in range(axes.triads.shape[0]):
-        if left <= 0.0:
+        if beyond is not None and tallies[:, 0, STEPS].sum() >= beyond.most_steps:
             return
         triad, offset, tally = axes.triads[axis], axes.offsets[axis], tallies[axis]
-        if extent is not None:
-            counted, endless, reach, margin = counts, False, np.inf, 0.0
-            whole = counts.whole is not None
-            grid = open_grid(extent, triad, offset, axes.spacing, clip.reach, whole)
+        section = Section(sections.planes[axis], sections.quadric[axis], sections.reach)
+        if prisms is None:
+            counted, reach, margin = counts, np.inf, 0.0
+            grid = open_grid(extent, triad, offset, axes.spacing, section.reach, counts)
             if counts.window is not None and counts.window.start is not None:
                 # other spheres change no line
-                reach, margin = clip.reach, counts.window.margin
+                reach, margin = section.reach, counts.window.margin
             spheres = project(grains, triad, grid, reach, margin, room)
-            section = section_along(clip, triad)
         else:
-            prism, spheres, grid, measured = cell_grid(grains, triad[2], offset, axes.spacing)
-            section, triad, endless = foot_of(prism, measured), prism.triad, prism.endless
+            prism = Prism(prisms.edges[axis], prisms.repeats[axis], prisms.climb[axis])
+            spheres, grid, measured = cell_grid(grains, triad, prism, offset, axes.spacing)
             counted = Counts(counts.least, counts.second, True, None, measured)
-        beyond = None
-        if followed is not None:
-            beyond = Beyond(followed.cells, triad, followed.without_removed, left, endless)
         here = bins_along(bins, triad, axis)
-        scan_strips(
-            lines, spheres, grid, section, clip.reach, tally, counted, listed, lists, here, beyond
-        )
-        if extent is None and measured.length == FAR:
+        scan_strips(lines, spheres, grid, section, tally, counted, listed, lists, here, beyond)
+        if prisms is not None and measured.length == FAR:
             # the void and the length of a line from the first solid to the last mean nothing
             tally[:, VOID] = tally[:, LINE_LENGTH] = 0.0
-        left -= tally[0, STEPS]

@@ -28,6 +28,7 @@ from scanfab.scan.kernels.strips import (
     Edge,
     Line,
     Measured,
+    Strip,
     Task,
 )
 from scanfab.scan.kernels.sweep import (
@@ -228,24 +229,21 @@ def next_solid(
 
 
 class Beyond(NamedTuple):
-    """All grains, for following lines along one axis."""
+    """All grains, for following lines where solids are not listed."""
 
     cells: Cells
-    triad: FloatArray
     without_removed: bool
     """Whether the first set of solids lacks the removed grains, too."""
     most_steps: float
     """Most steps of following; a scan that needs more ends early, and its sums mean nothing."""
-    endless: bool
-    """Whether a line that meets no further solid stays in a channel of a periodic medium."""
 
 
 @inner(forceinline=True, error_model="numpy")
 def followed(
-    line: Line, beyond: Beyond, which: int, ray: Ray, depth: float, sign: float
+    strip: Strip, line: Line, beyond: Beyond, which: int, ray: Ray, depth: float, sign: float
 ) -> tuple[float, float]:
     """Distance from a place on a line to the next solid, ahead or back; FAR if there is none."""
-    triad = beyond.triad
+    triad = strip.triad
     for i in range(3):
         ray.place[i] = line[0] * triad[0, i] + line[1] * triad[1, i] + depth * triad[2, i]
         ray.along[i] = sign * triad[2, i]
@@ -289,9 +287,9 @@ def follow_measured(task: Task, which: int, measured: Measured, beyond: Beyond) 
             if tally[0, STEPS] >= beyond.most_steps:
                 return
             line = u, v, enters, enters
-            far, steps = followed(line, beyond, which, ray, end, 1.0)
+            far, steps = followed(strip, line, beyond, which, ray, end, 1.0)
             tally[0, STEPS] += steps
-            if far == FAR and beyond.endless:
+            if far == FAR and measured.endless:
                 tally[which, WHOLE + ASTRAY] += 1.0
                 tally[which, WHOLE + VOID] += enters + measured.length - end
             elif far < FAR and not is_empty:
@@ -329,17 +327,17 @@ def follow_beyond(task: Task, which: int, edge: Edge, beyond: Beyond) -> None:
             u = strip.first_u + column * strip.spacing
             line = u, v, enters, leaves
             if begins_before:
-                far, steps = followed(line, beyond, which, ray, enters - margin, -1.0)
+                far, steps = followed(strip, line, beyond, which, ray, enters - margin, -1.0)
                 tally[0, STEPS] += steps
                 begins = enters - margin - far
                 if adds_on and far < FAR:
                     tally[which, WINDOW + LENGTH] += 0.5 * (-lines[state + BEFORE] - begins)
                 else:
-                    first, steps = followed(line, beyond, which, ray, enters, 1.0)
+                    first, steps = followed(strip, line, beyond, which, ray, enters, 1.0)
                     tally[0, STEPS] += steps
                     add_followed(known, which, line, -lines[state + BEFORE], enters + first, -1.0)
                     add_followed(known, which, line, begins, enters + first, 1.0)
             if goes_on:
-                far, steps = followed(line, beyond, which, ray, leaves + margin, 1.0)
+                far, steps = followed(strip, line, beyond, which, ray, leaves + margin, 1.0)
                 tally[0, STEPS] += steps
                 add_followed(known, which, line, end, leaves + margin + far, 1.0)

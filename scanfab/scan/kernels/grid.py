@@ -13,7 +13,7 @@ import numpy as np
 
 from scanfab.base.jit import LANES, ONE, inner, part
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
-from scanfab.scan.kernels.strips import FAR, Sphere, Strip, span
+from scanfab.scan.kernels.strips import FAR, Counts, Sphere, Strip, span
 
 # a bucket with more indices is sorted on its own first
 FEW = 16
@@ -21,22 +21,36 @@ FEW = 16
 
 @part()
 def cover(
-    low_u: float, high_u: float, low_v: float, high_v: float, offset: FloatArray, spacing: float
+    triad: FloatArray,
+    bounds: FloatArray,
+    skew: float,
+    offset: FloatArray,
+    spacing: float,
 ) -> Strip:
-    """The lines ((i + offset_u) * spacing, (j + offset_v) * spacing) that meet a rectangle."""
-    column = int(np.ceil(low_u / spacing - offset[0]))
-    columns = max(int(np.floor(high_u / spacing - offset[0])) - column + 1, 0)
+    """
+    The lines ((i + offset_u) * spacing, (j + offset_v) * spacing) that meet a parallelogram.
+
+    Its ``bounds`` are the smallest and largest u - skew * v, and the smallest and largest v.
+    """
+    low_u, high_u, low_v, high_v = bounds[0], bounds[1], bounds[2], bounds[3]
+    aside_u, aside_v = skew * low_v, skew * high_v
+    column = int(np.ceil((low_u + min(aside_u, aside_v)) / spacing - offset[0]))
+    end = int(np.floor((high_u + max(aside_u, aside_v)) / spacing - offset[0])) + 1
+    columns = max(end - column, 0)
     row, rows, offset_v = 0, 1, 0.0
     if offset.size > 1:
         offset_v = offset[1]
         row = int(np.ceil(low_v / spacing - offset_v))
         rows = max(int(np.floor(high_v / spacing - offset_v)) - row + 1, 0)
     first_u, first_v = (column + offset[0]) * spacing, (row + offset_v) * spacing
-    low, high = np.zeros(rows, np.int64), np.empty(rows, np.int64)
+    low, high = np.empty(rows, np.int64), np.empty(rows, np.int64)
     for k in range(rows):
-        high[k] = columns
+        aside = skew * (first_v + k * spacing) - first_u
+        low[k] = min(max(int(np.ceil((low_u + aside) / spacing)), 0), columns)
+        stop = int(np.floor((high_u + aside) / spacing)) + 1
+        high[k] = max(min(stop, columns), low[k])
     pitch = columns + LANES
-    return Strip(spacing, 1.0 / spacing, first_u, first_v, columns, rows, pitch, low, high)
+    return Strip(triad, spacing, 1.0 / spacing, first_u, first_v, columns, rows, pitch, low, high)
 
 
 class Bounds(NamedTuple):
@@ -65,7 +79,7 @@ def open_grid(
     offset: FloatArray,
     spacing: float,
     reach: float,
-    whole: bool,
+    counts: Counts,
 ) -> Strip:
     """
     The lines that meet the window or, for the whole, any sphere.
@@ -75,33 +89,10 @@ def open_grid(
     """
     high_u = high_v = reach if reach < FAR else 0.0
     low_u = low_v = -high_u
-    if (whole or reach > FAR) and extent.reach > 0.0:
+    if (counts.whole is not None or reach > FAR) and extent.reach > 0.0:
         low_u, high_u = shadow(extent, triad[0], low_u, high_u)
         low_v, high_v = shadow(extent, triad[1], low_v, high_v)
-    return cover(low_u, high_u, low_v, high_v, offset, spacing)
-
-
-@part()
-def sheared_grid(
-    low_u: float,
-    high_u: float,
-    low_v: float,
-    high_v: float,
-    skew: float,
-    offset: FloatArray,
-    spacing: float,
-) -> Strip:
-    """The lines in a parallelogram, which is given by the ranges of u - skew * v and of v."""
-    aside_u, aside_v = skew * low_v, skew * high_v
-    low, high = low_u + min(aside_u, aside_v), high_u + max(aside_u, aside_v)
-    grid = cover(low, high, low_v, high_v, offset, spacing)
-    for row in range(grid.rows):
-        aside = skew * (grid.first_v + row * spacing)
-        first = int(np.ceil((low_u + aside - grid.first_u) / spacing))
-        stop = int(np.floor((high_u + aside - grid.first_u) / spacing)) + 1
-        grid.low[row] = min(max(first, 0), grid.columns)
-        grid.high[row] = max(min(stop, grid.columns), grid.low[row])
-    return grid
+    return cover(triad, np.array([low_u, high_u, low_v, high_v]), 0.0, offset, spacing)
 
 
 @part()
@@ -113,6 +104,7 @@ def strip_of(grid: Strip, row: int, rows: int, column: int, columns: int) -> Str
         low[k] = min(max(grid.low[row + k] - column, 0), columns)
         high[k] = min(max(grid.high[row + k] - column, 0), columns)
     return Strip(
+        grid.triad,
         grid.spacing,
         grid.per_spacing,
         grid.first_u + column * grid.spacing,

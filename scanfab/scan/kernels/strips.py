@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scanfab.base.convex import Convex
 from scanfab.base.jit import Flag, inner, part
 from scanfab.base.typing import FloatArray, IntArray
 
@@ -61,6 +62,8 @@ class Measured(NamedTuple):
     """Gaps that begin within this length count."""
     known: float
     """Chords that begin further than this behind its beginning may not be listed: left out."""
+    endless: bool
+    """Whether a line that meets no further solid stays in a channel; otherwise it may have left."""
 
 
 class Counts(NamedTuple):
@@ -79,19 +82,9 @@ class Counts(NamedTuple):
     measured: Measured | None
 
 
-class Clip(NamedTuple):
-    """What lines are clipped to: the data of a :class:`scanfab.base.convex.Convex`."""
-
-    planes: FloatArray
-    """Shape (P, 4)."""
-    form: FloatArray
-    level: float
-    reach: float
-
-
 class Section(NamedTuple):
     """
-    A window as the lines along one axis meet it.
+    A window as lines meet it; for several axes, each array has one more axis, the first.
 
     A line through (u, v) is inside at depths within √(level - a u² - 2 b u v - c v²) of
     rise_u u + rise_v v that lie on the inner side of all planes.
@@ -103,12 +96,10 @@ class Section(NamedTuple):
 
     If side is 1, a line leaves the window there; if it is -1, it enters.
     """
-    level: float
-    a: float
-    b: float
-    c: float
-    rise_u: float
-    rise_v: float
+    quadric: FloatArray
+    """level, a, b, c, rise_u, rise_v, shape (6,)."""
+    reach: float
+    """Radius of a ball about the origin that holds the window."""
 
 
 class Strip(NamedTuple):
@@ -119,6 +110,8 @@ class Strip(NamedTuple):
     axis together, its grid, are a strip as well, but only smaller strips fit the planes.
     """
 
+    triad: FloatArray
+    """Orthonormal rows u, v, n: the lines run along n."""
     spacing: float
     per_spacing: float
     first_u: float
@@ -203,57 +196,36 @@ class Sphere(NamedTuple):
     radius: float
 
 
-@part()
-def form(matrix: FloatArray, one: FloatArray, two: FloatArray) -> float:
-    """The bilinear form of a matrix."""
-    total = 0.0
-    for i in range(3):
-        for j in range(3):
-            total += one[i] * matrix[i, j] * two[j]
-    return total
-
-
-@part()
-def dot(a: FloatArray, b: FloatArray) -> float:
-    """Scalar product."""
-    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-
-
-@part()
-def section_along(clip: Clip, triad: FloatArray) -> Section:
+def section_along(triads: FloatArray, window: Convex | None) -> Section:
     """
-    The section of a window for lines along the third row of a triad (rows u, v, n).
+    The section of a window for lines along the third row of each triad, shape (D, 3, 3).
 
-    On a line the quadric x·Q x = L is a quadratic equation in the depth t. With q the matrix Q in
-    the triad,
+    Nothing clips lines without a window. On a line the quadric x·Q x = L is a quadratic equation
+    in the depth t. With q the matrix Q in the triad,
 
         t = -(q_un u + q_vn v) / q_nn ± √(L / q_nn - a u² - 2 b u v - c v²),
 
     where a = q_uu / q_nn - (q_un / q_nn)², and b, c likewise.
     """
-    u, v, n = triad[0], triad[1], triad[2]
-    q = clip.form
-    along, lean_u, lean_v = form(q, n, n), form(q, u, n), form(q, v, n)
-    flat = FLAT * (q[0, 0] + q[1, 1] + q[2, 2]) + LEAST
-    if along < flat:
-        along, lean_u, lean_v = flat, 0.0, 0.0
-    lean_u, lean_v = lean_u / along, lean_v / along
-    planes = np.empty_like(clip.planes)
-    for k in range(planes.shape[0]):
-        normal = clip.planes[k]
-        # a line parallel to a plane meets it far beyond all other planes, in front or behind
-        steep = max(abs(dot(n, normal)), GRAZING)
-        planes[k, 0], planes[k, 1] = normal[3] / steep, dot(u, normal) / steep
-        planes[k, 2], planes[k, 3] = dot(v, normal) / steep, -1.0 if dot(n, normal) < 0.0 else 1.0
-    return Section(
-        planes,
-        clip.level / along,
-        form(q, u, u) / along - lean_u * lean_u,
-        form(q, u, v) / along - lean_u * lean_v,
-        form(q, v, v) / along - lean_v * lean_v,
-        -lean_u,
-        -lean_v,
-    )
+    planes, form, level, reach = np.zeros((0, 4)), np.eye(3), np.inf, np.inf
+    if window is not None:
+        planes, (form, level), reach = window.planes, window.quadric, window.reach
+    # the operator @ would wake the threads of BLAS, in each job of a scan
+    q = np.einsum("dil,djl->dij", np.einsum("dik,kl->dil", triads, form), triads)
+    along, flat = q[:, 2, 2:], FLAT * np.trace(form) + LEAST
+    lean = np.where(along < flat, 0.0, q[:, 2, :2])
+    along = np.maximum(along, flat)
+    lean /= along
+    quadric = np.empty((len(triads), 6))
+    quadric[:, :1], quadric[:, 4:] = level / along, -lean
+    quadric[:, 1:4] = q[:, [0, 0, 1], [0, 1, 1]] / along - lean[:, [0, 0, 1]] * lean[:, [0, 1, 1]]
+    normals = np.einsum("pk,djk->dpj", planes[:, :3], triads)
+    cuts = np.empty((*normals.shape[:2], 4))
+    cuts[..., 0], cuts[..., 1:3] = planes[:, 3], normals[..., :2]
+    # a line parallel to a plane meets it far beyond all other planes, in front or behind
+    cuts[..., :3] /= np.maximum(np.abs(normals[..., 2:]), GRAZING)
+    cuts[..., 3] = np.where(normals[..., 2] < 0.0, -1.0, 1.0)
+    return Section(cuts, quadric, reach)
 
 
 @inner(fastmath={"contract"}, error_model="numpy")
@@ -264,11 +236,11 @@ def begin(lines: FloatArray, strip: Strip, section: Section, counts: Counts) -> 
     Rows that serve only the window lose lines at their ends that miss it. Places of a row without a
     line hold NaN, which is neither larger nor smaller than any number.
     """
-    a, rise_u = section.a, section.rise_u
+    level, a, b, c = section.quadric[0], section.quadric[1], section.quadric[2], section.quadric[3]
+    rise_u, rise_v = section.quadric[4], section.quadric[5]
     for row in range(strip.rows):
         v = strip.first_v + row * strip.spacing
-        rest, aslant = section.level - section.c * v * v, 2.0 * section.b * v
-        aside = section.rise_v * v
+        rest, aslant, aside = level - c * v * v, 2.0 * b * v, rise_v * v
         at = np.uint64(row * strip.pitch)
         for j in range(np.uint64(strip.pitch)):
             u = strip.first_u + strip.spacing * np.int32(j)

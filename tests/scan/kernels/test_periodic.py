@@ -7,6 +7,7 @@ from scanfab import Solids
 from scanfab.base.jit import kernel
 from scanfab.scan.kernels import periodic, sweep
 from scanfab.scan.kernels.grid import CellGrains
+from scanfab.scan.lines import line_triads
 from scanfab.scan.tallies import FollowedTooFarError, Following, tally_triads
 from tests.helpers import naive
 from tests.helpers.lattices import simple_cubic, unit_vectors
@@ -49,22 +50,23 @@ def sparse_medium(random, periods=(1, 1, 1)):
 
 # kept on disk with the package's kernels, so that another body needs another name
 @kernel
-def prism_and_grid(medium, normal, offset, spacing):
-    prism, _, grid, _ = periodic.cell_grid(medium, normal, offset, spacing)
-    return prism, grid
+def grid_of(medium, triad, prism, offset, spacing):
+    return periodic.cell_grid(medium, triad, prism, offset, spacing)[1]
 
 
 def lines_of(medium, normal, offset, spacing):
     """Where the kernel's lines start, and how long they are measured (0: from end to end)."""
-    prism, grid = prism_and_grid(medium, normal, offset, spacing)
+    triads = np.stack([*np.zeros((2, 3)), normal])[None]
+    (triad,), section, prisms = periodic.prism_along(triads, medium, len(offset) == 1)
+    prism = periodic.Prism(*(numbers[0] for numbers in prisms))
+    grid = grid_of(medium, triad, prism, offset, spacing)
     feet = []
     for row in range(grid.rows):
         for column in range(grid.low[row], grid.high[row]):
             u = grid.first_u + column * grid.spacing
             v = grid.first_v + row * grid.spacing
-            depth = prism.rise_u * u + prism.rise_v * v
-            feet.append(u * prism.triad[0] + v * prism.triad[1] + depth * prism.triad[2])
-    measured = prism.length if medium.periodic[prism.third] else 0.0
+            feet.append(np.array([u, v, section.quadric[0, 4:] @ [u, v]]) @ triad)
+    measured = 1.0 / prism.climb[2] if prism.repeats[2] else 0.0
     return np.array(feet), measured
 
 
@@ -137,11 +139,14 @@ def test_every_direction_crosses_its_face_steeply():
     """So that a line leaves the cell after little more than its height."""
     random = np.random.default_rng(2)
     medium = medium_of(np.zeros((1, 3)), 1.0, np.diag([1.0, 2.0, 3.0]))
-    for _ in range(50):
-        prism, _ = prism_and_grid(medium, unit_vectors(random), np.zeros(2), 1.0)
-        assert prism.length <= np.sqrt(3) * 3.0 + 1e-9
-        assert prism.triad @ prism.triad.T == pytest.approx(np.eye(3), abs=1e-12)
-        assert prism.base_v > 0
+    triads = line_triads(unit_vectors(random, 50))
+    turned, _, prisms = periodic.prism_along(triads, medium, in_plane=False)
+    assert (1.0 / prisms.climb[:, 2] <= np.sqrt(3) * 3.0 + 1e-9).all()
+    for triad, edges in zip(turned, prisms.edges, strict=True):
+        assert triad @ triad.T == pytest.approx(np.eye(3), abs=1e-12)
+        assert edges[0, 0] > 0
+        assert edges[0, 1] == pytest.approx(0.0, abs=1e-12)
+        assert edges[1, 1] > 0
 
 
 def test_simple_cubic_along_an_edge():
