@@ -1,5 +1,7 @@
 """Binary files of arrays: Parquet, NPZ, ``.xyzd`` and HDF5. Reading them never runs code."""
 
+from __future__ import annotations
+
 import re
 from contextlib import suppress
 from pathlib import Path

@@ -1,5 +1,7 @@
 """Find positions, radii and ids among the columns of a dump, by the names of the columns."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path

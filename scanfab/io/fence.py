@@ -6,6 +6,8 @@ One worker process reads the files of these libraries. It is started when it is 
 again after a file that ended it. Its memory and its time for each file are limited.
 """
 
+from __future__ import annotations
+
 import faulthandler
 import os
 import pickle

@@ -1,5 +1,7 @@
 """Tables of text from any program: find the layout from the first rows, and read the columns."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Sequence
 from contextlib import suppress

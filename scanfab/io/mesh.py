@@ -8,6 +8,8 @@ therefore an extra array is appended to the content, and must be found last. And
 values of an XML array; therefore the values are counted before VTK reads the file.
 """
 
+from __future__ import annotations
+
 import base64
 import re
 import xml.etree.ElementTree as ElementTree

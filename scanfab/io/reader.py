@@ -1,5 +1,7 @@
 """The interface of readers, the installed readers, and the choice of a reader for a file."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache

@@ -1,5 +1,7 @@
 """Read triangulated surfaces of windows: .vtp by VTK, other formats by meshio, in the worker."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import numpy as np

@@ -6,6 +6,8 @@ A format reads its own header, describes the rows below it (:class:`Layout`) and
 exact.
 """
 
+from __future__ import annotations
+
 import csv
 import os
 import re

@@ -5,6 +5,8 @@ The new layout has names of columns, the old layout has none. All numbers are li
 netcdf`` follows AMBER's convention and is read by netCDF4; all its frames have as many atoms.
 """
 
+from __future__ import annotations
+
 import re
 import struct
 from collections.abc import Iterator

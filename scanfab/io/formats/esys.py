@@ -1,5 +1,7 @@
 """ESyS-Particle: a snapshot is a header file (``snap_t=K_0.txt``) and a file for each worker."""
 
+from __future__ import annotations
+
 import re
 from itertools import takewhile
 from pathlib import Path

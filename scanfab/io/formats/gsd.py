@@ -5,6 +5,8 @@ A property that was never written has HOOMD's default value. The default diamete
 hardly ever meant; therefore a file without diameters counts as having no radii.
 """
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Kratos' DEM application: ``.mdpa`` input, and HDF5 files with a group for each time."""
 
+from __future__ import annotations
+
 import re
 from functools import lru_cache
 from pathlib import Path

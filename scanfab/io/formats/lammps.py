@@ -6,6 +6,8 @@ neighbouring columns of ids in LAMMPS' lists of pairs. LIGGGHTS' ``compute pair/
 ``wall/gran/local`` write their values in a fixed order, whatever the order of the keywords.
 """
 
+from __future__ import annotations
+
 import re
 from itertools import accumulate
 from pathlib import Path

@@ -1,5 +1,7 @@
 """Data files of LAMMPS and LIGGGHTS (``write_data``): the section Atoms is read."""
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """LF_DEM: ``par_*.dat`` with grains and ``int_*.dat`` with pairs, in a Lees-Edwards cell."""
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
 

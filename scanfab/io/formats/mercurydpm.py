@@ -6,6 +6,8 @@ pair is listed from both sides, unless one grain is fixed or a periodic image. A
 grains by ids, in rows of words and numbers.
 """
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
 

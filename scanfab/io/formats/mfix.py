@@ -1,5 +1,7 @@
 """MFiX: ``particle_input.dat``, either rows only (version 1) or with a header (version 2)."""
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
 

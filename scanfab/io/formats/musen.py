@@ -1,5 +1,7 @@
 """MUSEN's "Export as text": each row is an object, a list of property numbers and values."""
 
+from __future__ import annotations
+
 import re
 from functools import lru_cache
 from pathlib import Path

@@ -5,6 +5,8 @@ Drafts 0.1 and 0.2 are read, and draft 0.1 is written. They differ in names and
 in the sign of the normal force: compression is positive in 0.1 and negative in 0.2.
 """
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Any
 

@@ -4,6 +4,8 @@ Write packings with a row for each sphere: CSV, TSV, Parquet, and LAMMPS.
 LAMMPS reads text dumps and data files.
 """
 
+from __future__ import annotations
+
 import io
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """Code that readers share: a base class, files with several frames, numbers in headers, cells."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path

@@ -5,12 +5,14 @@ The meaning of a column follows from its name, or from the user's options. Witho
 columns are taken as ``x y z r``, and five as ``id x y z r`` or ``x y z r clump``; a note says so.
 """
 
+from __future__ import annotations
+
 import re
 import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
@@ -101,7 +103,7 @@ class TableReader:
     marks: ClassVar[tuple[str, ...]] = ("",)
     """Prefixes of names of columns by which tables of a program are recognised."""
 
-    def told(self, options: ReadOptions) -> Self:
+    def told(self, options: ReadOptions) -> TableReader:
         """The reader with the user's options, which may name the columns."""
         return replace(self, options=options)
 

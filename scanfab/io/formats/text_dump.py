@@ -5,6 +5,8 @@ A snapshot is a header and a table. The last ``ITEM:`` line has the names of the
 ``ITEM: ATOMS id type x y z radius``. A header in YAML is translated into the same sections.
 """
 
+from __future__ import annotations
+
 import re
 from collections.abc import Sequence
 from pathlib import Path

@@ -4,6 +4,8 @@ VTK files: grains as points with a radius, contacts as lines; and lists of VTK f
 scanfab writes PolyData (``.vtp``). Data without a usual name (cell, images) get names of scanfab.
 """
 
+from __future__ import annotations
+
 import glob
 import re
 from contextlib import suppress

@@ -1,5 +1,7 @@
 """Extended XYZ: a row for each grain, and a line above that names columns and cell."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,5 +1,7 @@
 """YADE: text exports, ``SpherePack.save``, ``VTKExporter``, ``VTKRecorder`` and ``O.save``."""
 
+from __future__ import annotations
+
 import re
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
