@@ -95,8 +95,7 @@ class DirectionRule:
     @cached_property
     def isotropic_tensor(self) -> FloatArray:
         """The fabric tensor that the rule gives for a mean length equal in all directions."""
-        tensor: FloatArray = np.einsum("d,di,dj->ij", self.weights, self.axes, self.axes)
-        return tensor
+        return np.asarray(np.einsum("d,di,dj->ij", self.weights, self.axes, self.axes))
 
     @property
     def bias(self) -> float:

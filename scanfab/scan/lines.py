@@ -102,8 +102,7 @@ class Segments:
     @property
     def length(self) -> FloatArray:
         """Length of each piece, shape (K,)."""
-        length: FloatArray = np.linalg.norm(self.ends[:, 1] - self.ends[:, 0], axis=1)
-        return length
+        return np.asarray(np.linalg.norm(self.ends[:, 1] - self.ends[:, 0], axis=1))
 
 
 def cut_lines(
@@ -209,8 +208,7 @@ def grid_points(reach: float, lines: int, space: Space = SPACE) -> FloatArray:
     spacing = reach * np.sqrt(np.pi / lines)
     steps = np.arange(-np.floor(reach / spacing), np.floor(reach / spacing) + 1) * spacing
     points = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
-    inside: FloatArray = points[np.linalg.norm(points, axis=1) < reach]
-    return inside
+    return np.asarray(points[np.linalg.norm(points, axis=1) < reach])
 
 
 def sample_segments(

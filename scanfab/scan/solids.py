@@ -155,11 +155,6 @@ class Solids:
         return self._near[key]
 
     @property
-    def margin(self) -> float:
-        """For the rule ``start``: how far beyond the window solids are listed."""
-        return 0.0 if self.around is None else margin_of(self.around)
-
-    @property
     def reach(self) -> float:
         """Radius of the ball about the origin that holds the window; 0 without one."""
         return 0.0 if self.window is None else self.window.reach
@@ -172,12 +167,6 @@ class Solids:
         In a periodic packing without a window, ``radius`` holds hardly any.
         """
         return self.radius if self.medium is None else self.medium.radius
-
-    @property
-    def shadow(self) -> float:
-        """Projected area of all spheres: Σ π r², or Σ 2 r for discs."""
-        of_medium = 0.0 if self.medium is None else self.space.shadow(self.medium.radius)
-        return self.space.shadow(self.radius) + of_medium
 
     def chords(self, spacing: float) -> float:
         """
@@ -192,7 +181,8 @@ class Solids:
         -------
         float
         """
-        return self.space.lines(self.shadow, spacing)
+        of_medium = 0.0 if self.medium is None else self.space.shadow(self.medium.radius)
+        return self.space.lines(self.space.shadow(self.radius) + of_medium, spacing)
 
 
 def margin_of(grains: CellGrains) -> float:

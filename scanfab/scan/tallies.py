@@ -19,7 +19,7 @@ from scanfab.scan.kernels.cells import Beyond
 from scanfab.scan.kernels.grid import CellGrains
 from scanfab.scan.kernels.periodic import prism_along
 from scanfab.scan.kernels.strips import Bins, Counts, Edge, section_along
-from scanfab.scan.solids import Solids, shortest_gap
+from scanfab.scan.solids import Solids, margin_of, shortest_gap
 
 # Spheres whose radius is this fraction of the spacing, for each variant, are scanned as fast row by
 # row as over lists of chords. Lists pay off sooner if they serve more variants.
@@ -148,7 +148,7 @@ class _Lines(NamedTuple):
         """Whether to list chords, as most are of spheres that meet few lines; bins do so anyhow."""
         # the operator @ would wake the threads of BLAS, in each job of a scan
         squares = np.einsum("i,i", radius, radius)
-        few = squares < FEW_LINES * variants * self.axes.spacing * np.sum(radius)
+        few = squares < FEW_LINES * variants * self.axes.spacing * float(np.sum(radius))
         return True if few and not self.bins.cutoffs.size else None
 
     def scan(
@@ -173,18 +173,14 @@ class _Lines(NamedTuple):
         )
         if medium is not None and not len(grains.radius):
             return
-        cells = None
+        axes, prisms, cells = self.axes, None, None
         if medium is not None:
-            cells = solids.medium_cells
-        elif edge is not None and edge.start is not None:
-            cells = solids.cells
-        axes, prisms = self.axes, None
-        if medium is None:
-            sections = section_along(axes.triads, window)
+            triads, sections, prisms = prism_along(axes.triads, medium, solids.space.is_plane)
+            axes, cells = axes._replace(triads=triads), solids.medium_cells
         else:
-            in_plane = solids.space.is_plane
-            triads, sections, prisms = prism_along(axes.triads, medium, in_plane)
-            axes = axes._replace(triads=triads)
+            sections = section_along(axes.triads, window)
+            if edge is not None and edge.start is not None:
+                cells = solids.cells
         scan_axes(
             grains,
             solids.bounds,
@@ -226,8 +222,8 @@ class _Lines(NamedTuple):
         solids = self.solids
         if solids.edge in (CLIP, ENDS):
             self.scan(None, CLIPPED if solids.edge == CLIP else WEIGHED, solids.window)
-        elif len(solids.grain_radius):
-            margin = solids.margin
+        elif solids.around is not None and len(solids.around.radius):
+            margin = margin_of(solids.around)
             if self.bins.cutoffs.size or self.listed(solids.radius, 1 + bool(self.both)):
                 # not below the cut-off: segments that reach it are known to count
                 margin = min(margin, max(NARROW * margin, 1.01 * self.cutoff))

@@ -13,7 +13,7 @@ from scanfab.scan.edges import EDGES
 from scanfab.scan.kernels.grid import CellGrains
 from scanfab.scan.lines import line_triads
 from scanfab.scan.scan import scan_gaps
-from scanfab.scan.solids import shortest_gap
+from scanfab.scan.solids import margin_of, shortest_gap
 from tests.helpers import naive
 from tests.helpers.lattices import ball_points, rotation
 from tests.helpers.scanning import ratio, scan_triads
@@ -39,8 +39,8 @@ def open_solids(position, radius, removed, window, edge):
 def periodic_solids(cell, position, radius, removed, window, edge):
     """Images of grains about a window, and the grains, each once."""
     around = CellGrains(position, radius, removed, cell.vectors, np.array(cell.periodic))
-    empty = Solids(position, radius, removed, window, edge=edge, around=around)
-    images, row = cell.images_near_origin(position, radius + window.reach + empty.margin)
+    reach = radius + window.reach + margin_of(around)
+    images, row = cell.images_near_origin(position, reach)
     return Solids(images, radius[row], removed[row], window, edge=edge, around=around)
 
 
