@@ -7,13 +7,13 @@ import inspect
 import math
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from functools import cache, partial, wraps
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar, get_type_hints
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.spelling import meant
@@ -27,7 +27,9 @@ R = TypeVar("R")
 # groups of options, in the order of the help
 GROUPS = ("reading", "sample", "window", "scan", "fabric", "output")
 # What the command line turns a text into, by the type of the field. Other types stay texts.
-KINDS: dict[str, type] = {"int": int, "float": float, "bool": bool, "Path": Path}
+KINDS: dict[Any, type] = {
+    hint: kind for kind in (int, float, bool, Path) for hint in (kind, kind | None)
+}
 
 
 def unusable(name: str, expected: str, found: object) -> SettingsError:
@@ -104,13 +106,13 @@ def flag_of(name: str) -> str:
     return f"--{name.rstrip('_').replace('_', '-')}"
 
 
-def option(parse: Parse | None = None, **declaration: Any) -> Any:
+def option(parse: Parse | None = None, *, default: Any = None, **declaration: Any) -> Any:
     """Declare an option as a field of a dataclass, with attributes of :class:`Option`."""
     if parse is None and "|" in declaration.get("form", ""):
         parse = one_of(*declaration["form"].split("|"))
     if parse is not None:
         declaration["parse"] = parse
-    return field(default=declaration.get("default"), metadata=declaration)
+    return field(default=default, metadata={"default": default, **declaration})
 
 
 # these declare an option in one group of the help
@@ -120,15 +122,25 @@ running = partial(option, decides=False)
 
 
 def options_of(holder: type) -> tuple[Option, ...]:
-    """All options that the fields of a dataclass declare."""
+    """All options that the fields of a dataclass declare; other fields have no metadata."""
     helps: dict[str, str] = {}
     for base in reversed(holder.__mro__[:-1]):
         helps |= _docstrings(base.__module__).get(base.__name__, {})
-    kinds = [KINDS.get(str(field.type).removesuffix(" | None"), str) for field in fields(holder)]
+    kinds = {name: KINDS.get(hint, str) for name, hint in get_type_hints(holder).items()}
     return tuple(
-        Option(**{"name": field.name, "kind": kind, "help": helps[field.name], **field.metadata})
-        for field, kind in zip(fields(holder), kinds, strict=True)
+        Option(name=name, **{"kind": kinds[name], "help": helps[name], **declaration})
+        for name, declaration in ((one.name, one.metadata) for one in fields(holder))
+        if declaration
     )
+
+
+def fill(holder: Any, options: Mapping[str, Any], elsewhere: Sequence[Option] = ()) -> None:
+    """Check options as users write them, and keep what they mean in the fields of a dataclass."""
+    declared = options_of(type(holder))
+    refuse_unknown(type(holder).__name__, options, [one.name for one in declared], elsewhere)
+    for option in declared:
+        value = option.parse(option.name, options.get(option.name, option.default))
+        object.__setattr__(holder, option.name, value)
 
 
 @cache
@@ -250,3 +262,33 @@ def optional(parse: Parse, word: str | None = None) -> Parse:
     return lambda name, value: (
         None if isinstance(value, str | None) and value in words else parse(name, value)
     )
+
+
+def parse_frames(name: str, value: str | int | slice | None) -> slice:
+    """A slice from ``A:B:C`` or a single number; None gives all frames."""
+    if value is None or (isinstance(value, slice) and value.step != 0):
+        return value or slice(None)
+    words = str(value).split(":")
+    with suppress(ValueError):
+        if len(words) == 1:
+            first = int(words[0])
+            # -1 is the last frame: the slice -1:0 would be empty, so the end is None
+            return slice(first, first + 1 or None)
+        parts = [int(word) if word.strip() else None for word in words]
+        if len(parts) <= 3 and parts[2:] != [0]:
+            return slice(*parts)
+    raise unusable(name, "a slice such as 0:10:2, :5 or -1:", value)
+
+
+def parse_columns(name: str, value: Any) -> dict[str, str]:
+    """A dict of standard name to column, from a mapping or from ``NAME=COLUMN,NAME=COLUMN``."""
+    if value is None:
+        return {}
+    parts: Any = [part.partition("=")[::2] for part in str(value).split(",")]
+    if isinstance(value, Mapping):
+        parts = value.items()
+    names = {f"{standard}".strip(): f"{column}".strip() for standard, column in parts}
+    if not all([*names, *names.values()]) or len({*names.values()}) < len(parts):
+        expected = 'NAME=COLUMN such as "radius=c_rad,x=px", each name and each column once'
+        raise unusable(name, expected, value)
+    return names

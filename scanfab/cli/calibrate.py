@@ -88,7 +88,7 @@ def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
     rows = [scanfab.Row(**{**row, "note": as_options(row.note)}) for row in result.rows]
     usual = scanfab.Settings()
     best: Any = {"max_chords": usual.max_chords, "tolerance": usual.tolerance, **result.options}
-    command = repeat_command(asked_for(sources, reading, replace(settings, **best)))
+    command = repeat_command(asked_for(sources, series.options, replace(settings, **best)))
     if outputs.output is not None:
         write_rows(outputs.output, rows, STEP_COLUMNS, excerpt)
     draw(outputs, rows, "calibration")

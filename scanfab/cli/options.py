@@ -19,7 +19,7 @@ from scanfab.base.files import kind_of
 from scanfab.base.option import GROUPS, Option
 from scanfab.cli.console import AS_CSV, Command
 from scanfab.cli.settings_file import as_listed, take_settings_file
-from scanfab.io.options import READING_OPTIONS, take_reading
+from scanfab.io.reader import READING, ReadOptions
 from scanfab.pipeline.options import DECLARED, OPTIONS, Output, as_options
 from scanfab.pipeline.settings import Settings
 
@@ -33,7 +33,7 @@ S = TypeVar("S", bound=Settings)
 
 # groups of options that several commands share
 SETS: dict[str, Sequence[str]] = {
-    "READING": [option.name for option in READING_OPTIONS],
+    "READING": READING,
     "SAMPLE": ("boundary", "min_contacts", "rattlers", "min_force", "contact_tolerance"),
     "WINDOW": ["reference", *(name for name in OPTIONS if name.startswith("rv"))],
     "EXCERPT": ("fields", "digits"),
@@ -222,8 +222,10 @@ def checked(chosen: dict[str, Any], kind: type[S]) -> tuple[dict[str, Any], S]:
     file = as_listed(click.get_current_context())
     if file and file["used"]:
         note(f"options from {file['path']}: {', '.join(file['used'])}")
+    reading = {name: chosen.pop(name) for name in READING}
     with usage_errors():
-        return take_reading(chosen), kind(**chosen)
+        ReadOptions(**reading)
+        return reading, kind(**chosen)
 
 
 def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Series]:

@@ -17,9 +17,9 @@ from scanfab.base.spelling import counted
 from scanfab.io.families import Family, PathLike, expanded, files_of
 from scanfab.io.files import Stamp, growing, stamp_of
 from scanfab.io.frame import Frame
-from scanfab.io.options import take_reading
+from scanfab.io.reader import READING, ReadOptions
 from scanfab.io.series import ENDLESS, Series
-from scanfab.io.sources import READING, as_text, read_series
+from scanfab.io.sources import as_text, series_of
 
 # seconds between two looks at the files, or PAUSES times the duration of the last look
 PAUSE, PAUSES = 0.2, 3.0
@@ -74,7 +74,7 @@ def follow_series(
         raise ReadError(f"{source}: expected a folder or a file to follow, found nothing")
     if seconds is not None and not (isinstance(seconds, int | float) and seconds >= 0):
         raise unusable("seconds", "0 or more", seconds)
-    return FollowedSeries(os.fspath(source), seconds, take_reading(dict(options)))
+    return FollowedSeries(os.fspath(source), seconds, ReadOptions(**options))
 
 
 State = tuple[Path, int, int, list[Path]]
@@ -85,9 +85,9 @@ after the frame was taken."""
 class FollowedSeries(Series):
     """A series that waits for its frames; its files are those of the frames taken so far."""
 
-    def __init__(self, source: str, seconds: float | None, reading: dict[str, Any]) -> None:
+    def __init__(self, source: str, seconds: float | None, options: ReadOptions) -> None:
         nothing = Family(source, {}, None, "grains")
-        super().__init__(as_text(source), nothing, sources=(source,), reading=reading)
+        super().__init__(as_text(source), nothing, options=options, sources=(source,))
         self.idle: Callable[[], object] = lambda: None
         """Called each time there is no new frame, before waiting."""
         self._seconds = math.inf if seconds is None else seconds
@@ -186,7 +186,7 @@ class FollowedSeries(Series):
             problem = f"has vanished while it was followed, after {len(self._taken)} frames of it"
             raise ReadError(f"{source}: {problem}: bring it back and go on with `resume`")
         names = files_of(source)
-        if (contacts := self.reading.get("contacts", "auto")) not in ("auto", "file", "geometric"):
+        if (contacts := self.options.contacts) not in ("auto", "file", "geometric"):
             with suppress(ReadError):  # there may be none yet
                 names += [file for path in expanded(contacts) for file in files_of(Path(path))]
         quiet = [self._quiet(path) for path in names]
@@ -195,15 +195,14 @@ class FollowedSeries(Series):
             return
         with collected() as self._told, growing():
             try:
-                series = read_series(source, **self.reading)
+                series = series_of(source, self.options)
             except (ReadError, OSError) as error:
                 self._problem, series = error, None
         if series is not None:
             series.known = self.known
             self._check_taken(series)
             self.grains, self.contacts, self.cells = series.grains, series.contacts, series.cells
-            self.contacts_from, self.options = series.contacts_from, series.options
-            self.dim = series.dim
+            self.contacts_from = series.contacts_from
             self._looked, self._problem = looked, None
         elif self._taken and min(quiet, default=QUIET) >= QUIET:
             raise ReadError(str(self._problem))

@@ -75,7 +75,7 @@ class Frame:
         series, snapshot = self.series, self.snapshot
         known = replace(series.known, snapshots={})
         # while the space is not known, it is looked for in the frames before, so keep their files
-        is_known = series.dim == 3 or known.space is not None
+        is_known = series.options.dim == 3 or known.space is not None
         steps = {None, self.name_step, self.step} | (set() if is_known else {*series.grains.files})
         families = []
         for family in (series.grains, *series.contacts):
@@ -237,15 +237,14 @@ class Frame:
         """How much of a cell the dump, its frame file or the user give."""
         ask = getattr(self.reader, "carries", None)
         options = self.series.options
-        is_given = self.told or self.series.cells or options.cell or options.periodic is not None
+        is_given = self.told or options.cell or options.periodic is not None
         with unpacking_up_to(options.max_unpacked):
             return "cell" if is_given or ask is None else ask(self.snapshot.path)
 
     @property
     def cell_is_named(self) -> bool:
         """Whether the user names a cell, or along which axes it repeats."""
-        options = self.series.options
-        return bool(self.series.cells or options.cell or options.periodic)
+        return bool(self.series.options.cell or self.series.options.periodic)
 
     def _options(self) -> ReadOptions:
         """The options for this frame, with its own cell if a file lists a cell for each frame."""

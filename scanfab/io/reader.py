@@ -1,15 +1,28 @@
-"""The interface of readers, the installed readers, and the choice of a reader for a file."""
+"""Readers: their interface and options, and the choice of an installed reader for a file."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
+from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Protocol
 
 from scanfab.base.errors import ReadError, UnknownFormatError
+from scanfab.base.option import (
+    accepted,
+    fill,
+    number,
+    numbers,
+    optional,
+    options_of,
+    parse_columns,
+    reading,
+    unusable,
+)
 from scanfab.base.plugins import Offer, having, load_plugins
 from scanfab.base.typing import AnyArray, FloatArray, IntArray
 from scanfab.packing.cell import Cell
@@ -36,30 +49,127 @@ is periodic; ``nothing``.
 """
 
 
-@dataclass(frozen=True)
-class ReadOptions:
-    """Information about a dump that the user adds because the dump lacks it."""
+@cache
+def installed_readers() -> dict[str, Offer]:
+    """
+    All readers by name, with the package that offers each.
 
-    format: str | None = None
-    """Name of the reader; None: the reader that recognises the content."""
-    columns: Mapping[str, str] = field(default_factory=dict)
-    """Standard name of a column to its name in the file, for instance ``{"radius": "c_rad"}``."""
-    contact_columns: str | None = None
-    """Meaning of the columns of a contact file, in the terms of the reader."""
-    radius: float | None = None
-    """Radius of all grains, for dumps without one; dump's length unit."""
-    cell: tuple[float, ...] | None = None
-    """LX LY LZ, or LX LY LZ XY XZ YZ; dump's length unit."""
-    periodic: str | None = None
-    """The periodic directions, some of the letters x, y and z."""
-    bodies: str | None = None
-    """Column that numbers the clump of each sphere; None: the usual columns, if there are any."""
-    skip: int = 0
-    """Number of lines before a text table."""
-    max_unpacked: float | None = None
-    """How many times its compressed size a file may grow to; None: the usual limit."""
+    A warning names each plugin that cannot be loaded.
+
+    Raises
+    ------
+    ScanfabError
+        If two packages offer a reader of the same name.
+    """
+    return installed(GROUP, "reader", "recognises", "kind", "snapshots", "read_grains")
+
+
+parse_positive = optional(number("a number above 0", lambda value: 0 < value < math.inf))
+parse_skip = number("how many lines to skip, 0 or more", lambda value: 0 <= value < 2**31, int)
+# texts and paths are checked further where they are used
+parse_text = optional(accepted("text", lambda value: isinstance(value, str)))
+parse_contacts = accepted(
+    "auto, file, geometric or a path", lambda value: isinstance(value, str | PathLike)
+)
+parse_periodic = optional(
+    accepted(
+        "letters out of xyz",
+        lambda value: isinstance(value, str) and len(value) <= 3 and set(value) <= set("xyz"),
+    )
+)
+
+
+def parse_format(name: str, value: Any) -> Any:
+    """The name of an installed reader."""
+    if value is not None:
+        reader_named(parse_text(name, value))
+    return value
+
+
+def parse_cell(name: str, value: Any) -> tuple[float, ...] | str | PathLike[str] | None:
+    """Three or six numbers, or the path of a file with the numbers of each frame."""
+    if value is None or (isinstance(value, str | PathLike) and Path(value).is_file()):
+        return value
+    expected = (
+        "three lengths LX LY LZ above 0, or six numbers LX LY LZ XY XZ YZ, or a CSV file with the "
+        "cell of each frame"
+    )
+    return numbers(expected, lambda cell: len(cell) in (3, 6) and min(cell[:3]) > 0)(name, value)
+
+
+def parse_dim(name: str, value: Any) -> str | int:
+    """``auto``, 2 or 3."""
+    if str(value) not in ("auto", "2", "3"):
+        raise unusable(name, "auto, 2 or 3", value)
+    return "auto" if value == "auto" else int(value)
+
+
+@dataclass(frozen=True, init=False)
+class ReadOptions:
+    """
+    The options of ``read_series``: what users add to the information in the files.
+
+    Parameters
+    ----------
+    beside : Cell or "none", optional
+        The cell that a companion file of the dump states, or ``none`` if it states there is none.
+    **options
+        Options of :func:`scanfab.read_series`.
+    """
+
+    format: str | None = reading(parse_format, form="NAME", words=installed_readers)
+    """Reader to use (default: chosen by the content of the file)."""
+    columns: Mapping[str, str] = reading(parse_columns, form="NAMES")
+    """
+    Names of columns that differ from the usual names: "radius=c_rad,x=px". In a table without names
+    use the numbers of the columns, from 1: "x=1,y=2,z=3,diameter=4".
+    """
+    contact_columns: str | None = reading(parse_text, form="KEYWORDS")
+    """
+    Meaning of the columns of a dump local: LIGGGHTS keywords "pos id force", or names of columns
+    "id1=NAME,id2=NAME", which also work for tables of contacts.
+    """
+    skip: int = reading(parse_skip, default=0)
+    """Number of lines to skip at the top of a text table."""
+    radius: float | None = reading(parse_positive, form="L")
+    """Radius of all grains in the dump's units, for dumps without radii."""
+    cell: tuple[float, ...] | None = reading(parse_cell, form="LX LY LZ [XY XZ YZ]|FILE.csv")
+    """
+    Periodic cell, for formats that do not store it. It repeats along x, y and z unless `periodic`
+    says otherwise. FILE.csv lists the cell of each step or frame: columns step lx ly lz, and
+    xy xz yz if it is tilted.
+    """
+    periodic: str | None = reading(parse_periodic, form="xyz")
+    """Periodic directions (default: from the dump)."""
+    bodies: str | None = reading(parse_text, form="COLUMN")
+    """
+    Column that numbers the clump of each sphere; a negative number is a grain of its own (default:
+    id_multisphere, clumpId, clump_id or clump, if there is one); id: each sphere is a grain.
+    """
+    max_unpacked: float | None = reading(parse_positive, form="TIMES")
+    """How many times its compressed size a file may grow to (default: 1000)."""
+    contacts: str | PathLike[str] = reading(
+        parse_contacts, default="auto", form="file|geometric|PATH"
+    )
+    """
+    Source of the contacts. PATH: a file, folder or glob, matched by step; file: the contact files
+    of the dump; geometric: positions and radii (default: file if there is one, else geometric).
+    """
+    dim: str | int = reading(parse_dim, default="auto", form="auto|2|3")
+    """
+    2: discs in a coordinate plane; 3: spheres; auto: 2 if the first frame with grains has at least
+    ten grains and all centres share exactly one coordinate. The first frame decides for all.
+    """
     beside: Cell | Literal["none"] | None = None
-    """The cell that a companion file of the dump states, or ``none`` if it states there is none."""
+
+    def __init__(self, beside: Cell | Literal["none"] | None = None, **options: Any) -> None:
+        object.__setattr__(self, "beside", beside)
+        fill(self, options)
+
+
+READING_OPTIONS = options_of(ReadOptions)
+READING = tuple(option.name for option in READING_OPTIONS)
+"""The names of the options of :func:`read_series`, also used by commands and manifests."""
 
 
 @dataclass(frozen=True)
@@ -158,21 +268,6 @@ class Reader(Protocol):
     ) -> JoinedContacts:
         """The contacts of a frame."""
         ...
-
-
-@cache
-def installed_readers() -> dict[str, Offer]:
-    """
-    All readers by name, with the package that offers each.
-
-    A warning names each plugin that cannot be loaded.
-
-    Raises
-    ------
-    ScanfabError
-        If two packages offer a reader of the same name.
-    """
-    return installed(GROUP, "reader", "recognises", "kind", "snapshots", "read_grains")
 
 
 def installed(group: str, what: str, *methods: str) -> dict[str, Offer]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
 from itertools import chain, islice
 from operator import index
 from pathlib import Path
-from typing import Any, Literal, SupportsIndex, overload
+from typing import Literal, SupportsIndex, overload
 
 from scanfab.base.errors import NoFrameError, PackingError, ReadError, SettingsError, note
 from scanfab.base.space import SPACE, Space
@@ -67,17 +67,13 @@ class Series:
     contacts_from : str
         Where contacts come from.
     options : ReadOptions
-        The user's options for reading the dumps.
+        The options of :func:`scanfab.read_series`.
     cells : FrameFile or None
         A file with the cell of each frame, if the user named one.
     sources : tuple of str
         The sources that were passed to :func:`scanfab.read_series`.
-    reading : mapping
-        The options of :func:`scanfab.read_series`, as manifests list them.
     numbers : range
         The numbers of the frames in the whole series; it may end behind the last frame.
-    dim : str or int
-        2 for discs, 3 for spheres, or ``auto``: the first frame with particles decides.
     known : Known
         What is known about the files; shared with all slices of the series.
 
@@ -98,9 +94,7 @@ class Series:
     options: ReadOptions = field(default_factory=ReadOptions)
     cells: FrameFile | None = None
     sources: tuple[str, ...] = field(default=(), repr=False, compare=False)
-    reading: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     numbers: range = range(ENDLESS)
-    dim: str | int = "auto"
     known: Known = field(default_factory=Known, repr=False, compare=False)
 
     def __repr__(self) -> str:
@@ -190,7 +184,8 @@ class Series:
             If ``dim`` is 2 and the centres do not lie in a plane, or if they do and those of the
             first frame do not.
         """
-        if self.dim == 3:
+        dim = self.options.dim
+        if dim == 3:
             return SPACE
         if self.known.space is None:
             before = self._centres_before(0 if number == self.known.reference else number)
@@ -198,8 +193,8 @@ class Series:
             if not len(first):
                 return SPACE
             own_id = id if first is position else None
-            first_space = flat_space(first, own_id) if self.dim == 2 else space_of(first)
-            if first_space.is_plane and self.dim == "auto":
+            first_space = flat_space(first, own_id) if dim == 2 else space_of(first)
+            if first_space.is_plane and dim == "auto":
                 advice = "they are read as discs, in 2D; `dim=3` reads them as spheres"
                 where = spelt_plane(first, first_space)
                 note(f"{self.name}: all centres lie in {first_space} ({where}): {advice}")

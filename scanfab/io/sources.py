@@ -17,13 +17,10 @@ from scanfab.io.families import Family, Numbered, PathLike, named_once, some
 from scanfab.io.files import first_bytes, unpacking_up_to
 from scanfab.io.formats.own import companion_file
 from scanfab.io.layout import FrameFile
-from scanfab.io.options import READING_OPTIONS, take_reading
-from scanfab.io.reader import FileKind, ReadOptions, why_no_table
+from scanfab.io.reader import READING, READING_OPTIONS, FileKind, ReadOptions, why_no_table
 from scanfab.io.series import ContactsFrom, Series
 from scanfab.packing.packing import Packing
 
-READING = tuple(option.name for option in READING_OPTIONS)
-"""The names of the options of :func:`read_series`, also used by commands and manifests."""
 # words near the beginning of every fabric table, in any format
 TABLE_WORDS = (b"source", b"frame", b"variant", b"alpha_vs")
 GRAINS: tuple[FileKind, ...] = ("grains", "index", "start", "points")
@@ -124,22 +121,7 @@ def read_series(
     [30000, 60000]
     """
     arguments = locals()
-    reading = {name: arguments[name] for name in READING}
-    values = take_reading(dict(reading))
-    contacts, dim, frame_cell = values.pop("contacts"), values.pop("dim"), values["cell"]
-    cells = None
-    if isinstance(frame_cell, str | os.PathLike):
-        cells = FrameFile(Path(frame_cell), ["lx", "ly", "lz"], ["xy", "xz", "yz"], positive=3)
-    values |= {"columns": values["columns"] or {}, "cell": None if cells else frame_cell}
-    options = ReadOptions(**values)
-    if isinstance(source, str | os.PathLike) or not isinstance(source, Iterable):
-        source = [source]
-    given = list(source)
-    if not given or not all(isinstance(path, str | os.PathLike) for path in given):
-        raise unusable("source", "the path of a folder or file, or files", arguments["source"])
-    with unpacking_up_to(options.max_unpacked):
-        series = _series(named_once(given), contacts, options)
-    return replace(series, cells=cells, reading=reading, dim=dim)
+    return series_of(source, ReadOptions(**{name: arguments[name] for name in READING}))
 
 
 def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
@@ -150,8 +132,18 @@ def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
     return [read_series(group, **options) for group in groups.values()]
 
 
-def _series(given: Sequence[PathLike], contacts: PathLike, options: ReadOptions) -> Series:
-    """Sort the files of the sources, and make a series of their grains and contacts."""
+def series_of(source: Any, options: ReadOptions) -> Series:
+    """Sort the files of a source, and make a series of their grains and contacts."""
+    is_one = isinstance(source, str | os.PathLike) or not isinstance(source, Iterable)
+    given = [source] if is_one else list(source)
+    if not given or not all(isinstance(path, str | os.PathLike) for path in given):
+        raise unusable("source", "the path of a folder or file, or files", source)
+    with unpacking_up_to(options.max_unpacked):
+        return _series(named_once(given), options)
+
+
+def _series(given: Sequence[PathLike], options: ReadOptions) -> Series:
+    """The series of sources that are paths."""
     paths = [Path(path) for path in given]
     files = [file for path in paths for file in sorting.files_of(path)]
     around: list[Path] = []
@@ -168,7 +160,7 @@ def _series(given: Sequence[PathLike], contacts: PathLike, options: ReadOptions)
     taken = set(grains.files.values())
     others = [one for one in families if taken.isdisjoint(one.files.values())]
     _tell_skipped([one for one in others if one.kind != "contacts"])
-    chosen, origin = _choose_contacts(grains, families, groups if around else [], contacts, options)
+    chosen, origin = _choose_contacts(grains, families, groups if around else [], options)
     for family in (grains, *chosen):
         if family.clash is not None:
             raise ReadError(family.clash)
@@ -178,7 +170,10 @@ def _series(given: Sequence[PathLike], contacts: PathLike, options: ReadOptions)
         are_alike = len({path.is_absolute() for path in paths}) == 1
         folders = [str(path.parent if are_alike else path.parent.absolute()) for path in paths]
         name = os.path.commonpath(folders) or "."
-    return Series(as_text(name), grains, tuple(chosen), origin, options, sources=sources)
+    cells = None
+    if isinstance(options.cell, str | os.PathLike):
+        cells = FrameFile(Path(options.cell), ["lx", "ly", "lz"], ["xy", "xz", "yz"], positive=3)
+    return Series(as_text(name), grains, tuple(chosen), origin, options, cells, sources)
 
 
 def _choose_grains(
@@ -257,14 +252,14 @@ def _choose_contacts(
     grains: Family,
     families: Sequence[Family],
     around: Sequence[Numbered],
-    contacts: PathLike,
     options: ReadOptions,
 ) -> tuple[Sequence[Family], ContactsFrom]:
     """The families of contact files, and how they were chosen."""
+    contacts = options.contacts
     if contacts == "geometric":
         return [], "geometric"
     if contacts not in ("auto", "file"):
-        return _named_contacts(contacts, options), "path"
+        return _named_contacts(options), "path"
     own = [family for family in families if family.kind == "contacts"]
     has_own = any(companion_file(path, "contacts").is_file() for path in grains.files.values())
     is_beside = bool(around) and not own and not has_own
@@ -285,15 +280,16 @@ def _choose_contacts(
     return damaged, "beside"
 
 
-def _named_contacts(contacts: PathLike, options: ReadOptions) -> list[Family]:
+def _named_contacts(options: ReadOptions) -> list[Family]:
     """The families of contact files that a file, folder or glob names."""
-    files = [file for path in sorting.expanded(contacts) for file in sorting.files_of(Path(path))]
+    named = sorting.expanded(options.contacts)
+    files = [file for path in named for file in sorting.files_of(Path(path))]
     families = sorting.sort_into_families(files, options, sorting.group_by_name(files))
     contact_families = [family for family in families if family.kind == "contacts"]
     if not contact_families:
         problem = next((family.problem for family in families if family.problem), None)
         held = " and ".join(sorted({HOLDS[family.kind] for family in families})) or "no files"
-        lack = f"{contacts}: expected contacts, found {held}"
+        lack = f"{options.contacts}: expected contacts, found {held}"
         if any(family.kind == "other" for family in families):
             lack += ': name columns by `contact_columns="id1=1,id2=2"`, whose numbers count from 1'
         raise ReadError(problem or lack)

@@ -22,7 +22,7 @@ from scanfab.base.errors import (
 from scanfab.base.option import options_of, takes_options, unusable
 from scanfab.base.spelling import spelt_time
 from scanfab.io.frame import Frame
-from scanfab.io.options import READING_OPTIONS
+from scanfab.io.reader import READING_OPTIONS
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.cluster import DaskExecutor, DeadWorkersError
 from scanfab.pipeline.frame import FrameResult, compute_frame

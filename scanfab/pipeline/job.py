@@ -15,7 +15,6 @@ from typing import Any
 from scanfab.base.errors import SettingsError, note
 from scanfab.base.files import check_folder, refuse_inputs
 from scanfab.io.follow import FollowedSeries
-from scanfab.io.options import take_reading
 from scanfab.io.series import Series
 from scanfab.pipeline.compute import Observer, compute_frames
 from scanfab.pipeline.frames import NoChosenFrameError, number_of_reference, of_whole
@@ -93,15 +92,15 @@ class Job:
     def __post_init__(self) -> None:
         parts = [of_whole(one, self.settings) for one in self.series]
         self.series, self.settings = [one for one, _ in parts], parts[0][1]
-        same = parts[0][0].reading, self.settings
-        if any((one.reading, settings) != same for one, settings in parts):
+        same = parts[0][0].options, self.settings
+        if any((one.options, settings) != same for one, settings in parts):
             must = "must be read with the same options, and be parts of the same frames"
             raise SettingsError(f"the series of one table {must}: make a table of each")
         names = [one.name for one in self.series]
         if twice := {name for name in names if names.count(name) > 1}:
             raise SettingsError(f"{min(twice)}: named twice among the series of one table")
         sources = [source for one in self.series for source in one.sources or (one.name,)]
-        reading = take_reading(dict(self.series[0].reading))
+        reading = self.series[0].options
         self.asked = asked_for(sources, reading, self.settings, self.excerpt)
         # counted from the start, so that a longer series has another reference
         references = [number_of_reference(one, self.settings) for one in self.series]

@@ -14,7 +14,7 @@ from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.errors import ScanfabNote, ScanfabWarning, SettingsError, SkippedFrameWarning
 from scanfab.base.option import option, options_of, reading, running
 from scanfab.io.files import without_temporary
-from scanfab.io.options import READING_OPTIONS
+from scanfab.io.reader import READING_OPTIONS
 from scanfab.io.writer import installed_writers
 from scanfab.pipeline.map_settings import MapSettings
 from scanfab.pipeline.settings import Settings

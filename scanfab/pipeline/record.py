@@ -35,9 +35,9 @@ from scanfab.base.files import locked, named_errors, undone_at_end, whole_file
 from scanfab.base.option import flag_of, options_of
 from scanfab.base.spelling import shortest
 from scanfab.io.files import without_temporary
-from scanfab.io.options import READING_OPTIONS
+from scanfab.io.reader import READING, ReadOptions
 from scanfab.io.series import Series
-from scanfab.io.sources import READING, open_sources
+from scanfab.io.sources import open_sources
 from scanfab.pipeline.map_settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import SHAPES, STRAIN_MODES, as_written
@@ -114,7 +114,7 @@ class Record(NamedTuple):
 
 
 def asked_for(
-    sources: Sequence[str], reading: Mapping[str, Any], settings: Settings, excerpt: Excerpt = ALL
+    sources: Sequence[str], reading: ReadOptions, settings: Settings, excerpt: Excerpt = ALL
 ) -> dict[str, Any]:
     """
     The settings that decide the bytes of a result, as users write them, in the types of JSON.
@@ -123,18 +123,18 @@ def asked_for(
     ----------
     sources : sequence of str
         The sources as given.
-    reading : mapping
-        The options of ``read_series``.
+    reading : ReadOptions
+        The options of the series.
     settings : Settings
         The settings of the computation. The number of workers is left out: it changes no result.
     excerpt : Excerpt, optional
         Columns and digits of the result.
     """
-    names = [option.name for option in options_of(type(settings)) if option.decides]
-    written = {name: as_written(getattr(settings, name)) for name in names}
-    named = {"scanfab": version("scanfab"), "sources": list(sources)}
-    found = {**named, **reading, **written, **excerpt.asked()}
-    return dict(json.loads(json.dumps(found, default=os.fspath)))
+    found = {"scanfab": version("scanfab"), "sources": list(sources)}
+    for part in (reading, settings):
+        names = [option.name for option in options_of(type(part)) if option.decides]
+        found |= {name: as_written(getattr(part, name)) for name in names}
+    return dict(json.loads(json.dumps({**found, **excerpt.asked()}, default=os.fspath)))
 
 
 def restored_settings(asked: Mapping[str, Any], path: Path) -> Settings:
@@ -167,14 +167,14 @@ def repeat_command(
 
     Examples
     --------
+    >>> from scanfab.io import ReadOptions
     >>> from scanfab.pipeline.record import asked_for, repeat_command
     >>> from scanfab.pipeline.settings import Settings
-    >>> repeat_command(asked_for(["dumps"], {}, Settings(boundary="type=2", seed=3)))
+    >>> repeat_command(asked_for(["dumps"], ReadOptions(), Settings(boundary="type=2", seed=3)))
     'scanfab compute dumps --boundary type=2 --seed 3'
     """
     of_map = is_map(asked)
-    reading = {option.name: option.default for option in READING_OPTIONS}
-    usual = asked_for((), reading, MapSettings(slices=1) if of_map else Settings())
+    usual = asked_for((), ReadOptions(), MapSettings(slices=1) if of_map else Settings())
     # the options that make a table a map have no default
     usual |= dict.fromkeys(BLOCK_OPTIONS)
     words = ["scanfab", "map" if of_map else "compute", *map(str, asked["sources"])]

@@ -10,10 +10,11 @@ from scanfab.base.column import Column
 from scanfab.base.errors import DimensionError, SettingsError
 from scanfab.base.option import (
     fabric,
+    fill,
     optional,
     options_of,
+    parse_frames,
     reading,
-    refuse_unknown,
     sample,
     scan,
     whole,
@@ -21,7 +22,7 @@ from scanfab.base.option import (
 )
 from scanfab.base.space import Space
 from scanfab.base.spelling import spelt_place
-from scanfab.io.options import READING_OPTIONS, parse_frames
+from scanfab.io.reader import READING_OPTIONS
 from scanfab.packing.boundary import BoundaryRule
 from scanfab.packing.rattlers import installed_rules
 from scanfab.pipeline import values
@@ -223,11 +224,7 @@ class Settings:
 
     def __init__(self, **options: Any) -> None:
         """Check the options as users write them, and keep what they mean."""
-        declared = options_of(type(self))
-        refuse_unknown("Settings", options, [one.name for one in declared], READING_OPTIONS)
-        for option in declared:
-            value = option.parse(option.name, options.get(option.name, option.default))
-            object.__setattr__(self, option.name, value)
+        fill(self, options, READING_OPTIONS)
         for problem in self._clashes():
             raise SettingsError(problem)
         # Only a cylinder is checked here: other shapes may be those of discs, which a frame tells.

@@ -16,9 +16,9 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder, whole_file
 from scanfab.base.option import options_of, refuse_unknown
 from scanfab.io.families import PathLike, expanded
-from scanfab.io.options import take_reading
+from scanfab.io.reader import READING
 from scanfab.io.series import Series
-from scanfab.io.sources import READING, open_sources
+from scanfab.io.sources import open_sources
 from scanfab.pipeline.frame import FrameResult
 from scanfab.pipeline.job import Job
 from scanfab.pipeline.map_settings import BLOCK_OPTIONS, MapSettings, is_map
@@ -169,7 +169,7 @@ def _opened(source: Source | Sequence[Source], options: dict[str, Any]) -> Seque
             f"for packings call compute(), and save() of its table"
         )
     paths = [os.fspath(path) for one in given for path in expanded(one)]
-    return open_sources(paths, **take_reading(options))
+    return open_sources(paths, **{name: options.pop(name) for name in {*READING} & {*options}})
 
 
 def vtk_folders(

@@ -9,6 +9,7 @@ import pytest
 from scanfab.base.column import NoColumnError
 from scanfab.base.errors import Note, SettingsError, SkippedFrameWarning, joined, tell
 from scanfab.base.option import number, one_of, option, optional, options_of, takes_options, whole
+from scanfab.io import ReadOptions
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,13 @@ def test_a_function_says_what_its_options_mean_and_refuses_others():
         forecast(rian=2)
     with pytest.raises(TypeError, match=r"'z': the options are wind_speed, rain$"):
         forecast(z=2)
+
+
+def test_types_of_options_may_be_evaluated_in_their_module_or_not():
+    """The reader's are objects, because its module has no future import; those above are texts."""
+    numbers = {one.name: one.kind for one in options_of(ReadOptions) if one.kind is not str}
+    assert numbers == {"skip": int, "radius": float, "max_unpacked": float}
+    assert "beside" not in {one.name for one in options_of(ReadOptions)}
 
 
 SPEED, DAYS = number("a speed", lambda speed: speed > 0), whole("0 or more", lambda days: days >= 0)

@@ -12,6 +12,7 @@ from scanfab.base.option import GROUPS, option, options_of, takes_options, whole
 from scanfab.cli import options as cli_options
 from scanfab.cli.compute import compute
 from scanfab.cli.options import SourceCommand
+from scanfab.io import ReadOptions
 from scanfab.pipeline.options import OPTIONS
 from scanfab.pipeline.record import asked_for
 from scanfab.pipeline.settings import Settings
@@ -68,7 +69,7 @@ def test_a_made_up_option_takes_one_declaration(monkeypatch):
     refused = pytest.raises(click.UsageError, match=r"stray_light: expected a number below 9, fou")
     with refused, cli_options.usage_errors():
         Wider(stray_light=12)
-    assert asked_for([], {}, made)["stray_light"] == 5
+    assert asked_for([], ReadOptions(), made)["stray_light"] == 5
 
     @takes_options(options_of(Wider))
     def function(*, stray_light: int = 7) -> None:

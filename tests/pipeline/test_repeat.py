@@ -12,6 +12,7 @@ import pytest
 
 from scanfab.base.errors import ReadError
 from scanfab.cli.main import run
+from scanfab.io import ReadOptions
 from scanfab.pipeline import record
 from scanfab.pipeline.record import asked_for, read_manifest, repeat_command, restored_settings
 from scanfab.pipeline.settings import Settings
@@ -92,7 +93,7 @@ def test_the_command_asks_for_the_same(command, asked_by):
 def test_all_settings_but_the_workers_are_named_and_come_back():
     chosen = {"boundary": ["type=2", "id>=9"], "cutoff": "0.3rmax", "frames": "1:9:2", "axis": "x"}
     settings = Settings(**chosen, workers=1)
-    asked = asked_for(["d"], {"radius": 0.1}, settings)
+    asked = asked_for(["d"], ReadOptions(radius=0.1), settings)
     assert (asked["sources"], asked["radius"], asked["cutoff"]) == (["d"], 0.1, "0.3rmax")
     assert set(Settings.__dataclass_fields__) - set(asked) == {"workers"}
     restored = restored_settings(json.loads(json.dumps(asked)), Path("table.csv"))
@@ -102,17 +103,17 @@ def test_all_settings_but_the_workers_are_named_and_come_back():
 
 def test_the_source_is_opened_as_it_was(monkeypatch):
     monkeypatch.chdir(ROOT)
-    reading = {"contacts": "geometric", "columns": None, "format": "yade"}
+    reading = ReadOptions(contacts="geometric", format="yade")
     asked = json.loads(json.dumps(asked_for([SAMPLE], reading, Settings())))
     with pytest.warns(match="skipped"):
         series = record.reopen(asked)
     assert (series.name, series.contacts_from) == (SAMPLE, "geometric")
     # what is usual is not repeated
-    usual = {**asked, **asked_for(["dumps"], {"contacts": "auto", "format": None}, Settings())}
+    usual = {**asked, **asked_for(["dumps"], ReadOptions(), Settings())}
     assert repeat_command(json.loads(json.dumps(usual))) == "scanfab compute dumps"
     for source, told in (("-", "standard input"), ("gone/away", "gone/away: there is no such")):
         with pytest.raises(ReadError, match=told):
-            record.reopen(asked_for([source], {}, Settings()))
+            record.reopen(asked_for([source], ReadOptions(), Settings()))
 
 
 ROWS = ("--directions", "9", "--spacing", "1rmin", "--cutoff", "0.2rmin", "--frames", "0")

@@ -18,12 +18,12 @@ import numpy as np
 
 from scanfab.base.arrays import MOST, doubles
 from scanfab.base.errors import ReadError, SettingsError, note
+from scanfab.base.option import parse_columns
 from scanfab.base.typing import Columns
 from scanfab.io.binary_files import binary_names, is_xyzd, packing_info, read_binary
 from scanfab.io.columns import DIAMETER_NAMES, ID_NAMES, RADIUS_NAMES, grain_table
 from scanfab.io.contacts import join_table
 from scanfab.io.layout import TextTable, read_text, text_table
-from scanfab.io.options import parse_columns
 from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.io.text import Layout
 
@@ -186,7 +186,7 @@ class TableReader:
     def _pairs(self, path: Path, head: TextTable) -> dict[str, str]:
         """The columns of contacts by quantity."""
         try:
-            named = parse_columns("contact_columns", self.options.contact_columns) or {}
+            named = parse_columns("contact_columns", self.options.contact_columns)
         except SettingsError as error:  # the option may be meant for another format
             raise ReadError(f"{path}: {error}") from None
         return find_columns(path, head, self.names, named, "contact_columns")

@@ -5,7 +5,8 @@ from dataclasses import fields
 
 import pytest
 
-from scanfab.io.sources import READING, read_series
+from scanfab.io.reader import READING
+from scanfab.io.sources import read_series
 from scanfab.pipeline.map_settings import MapSettings
 from scanfab.pipeline.options import MEANINGS
 from scanfab.table.compare import compare_tables
