@@ -43,6 +43,8 @@ SHOWN = (
     "seconds", "rule", "segments", "rule_bias", "note",
 )  # fmt: skip
 STAY = 6
+# whether a step is steady; None where this has no meaning
+WORDS = {1: "yes", 0: "no"}
 
 
 @click.command(cls=SourceCommand)
@@ -99,8 +101,9 @@ def calibrate(sources: tuple[str, ...], frame: int, **chosen: Any) -> int:
         print_rows(rows, excerpt.fields, len(excerpt.fields), digits_of(excerpt))
     elif outputs.output is None:
         for ladder, steps in groupby(rows, key=lambda row: row.ladder):
-            shown = [{**row, CHANGED[ladder]: row.value} for row in steps]
-            print_rows(shown, (CHANGED[ladder], *SHOWN), STAY, digits_of(excerpt))
+            title = CHANGED[ladder]
+            shown = [{**row, title: row.value, "steady": WORDS.get(row.steady)} for row in steps]
+            print_rows(shown, (title, *SHOWN), STAY, digits_of(excerpt))
             click.echo()
     # if CSV goes to standard output, the findings must not mix with it
     for sentence in (*result.findings, command):

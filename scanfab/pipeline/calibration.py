@@ -256,7 +256,7 @@ class _OneFrame:
             raise SettingsError(f"it would cut {chords:.2g} chords from grains, {allowed}")
         result = compute_frame(sample, plan, number=self.number, source=self.name)
         seconds = time.perf_counter() - begun
-        LOGGER.info("%s %s: %.2g s", ladder, "" if value is None else f"{value:g}", seconds)
+        LOGGER.info("%s: %.2g s", ladder if value is None else f"{ladder} {value:g}", seconds)
         r_min = float(self.first.packing.radius[self.first.grains].min())
         rows = []
         for row in result.rows:
