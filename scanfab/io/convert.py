@@ -12,11 +12,11 @@ from typing import Any
 
 from scanfab.base.errors import SettingsError, note
 from scanfab.base.files import check_folder, refuse_inputs, whole_file
-from scanfab.base.option import parse_frames, refuse_unknown
+from scanfab.base.option import refuse_unknown
 from scanfab.io.families import PathLike
 from scanfab.io.files import bare_name
 from scanfab.io.formats.own import HEADS, companion_kind, companion_there, companions_of
-from scanfab.io.reader import READING
+from scanfab.io.reader import READING, parse_frames
 from scanfab.io.series import Series, counts_from_end
 from scanfab.io.sources import read_series
 from scanfab.io.writer import Writer, writer_for, writer_named

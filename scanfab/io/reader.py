@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
@@ -19,7 +20,6 @@ from scanfab.base.option import (
     numbers,
     optional,
     options_of,
-    parse_columns,
     reading,
     unusable,
 )
@@ -77,6 +77,36 @@ parse_periodic = optional(
         lambda value: isinstance(value, str) and len(value) <= 3 and set(value) <= set("xyz"),
     )
 )
+
+
+def parse_frames(name: str, value: str | int | slice | None) -> slice:
+    """A slice from ``A:B:C`` or a single number; None gives all frames."""
+    if value is None or (isinstance(value, slice) and value.step != 0):
+        return value or slice(None)
+    words = str(value).split(":")
+    with suppress(ValueError):
+        if len(words) == 1:
+            first = int(words[0])
+            # -1 is the last frame: the slice -1:0 would be empty, so the end is None
+            return slice(first, first + 1 or None)
+        parts = [int(word) if word.strip() else None for word in words]
+        if len(parts) <= 3 and parts[2:] != [0]:
+            return slice(*parts)
+    raise unusable(name, "a slice such as 0:10:2, :5 or -1:", value)
+
+
+def parse_columns(name: str, value: Any) -> dict[str, str]:
+    """A dict of standard name to column, from a mapping or from ``NAME=COLUMN,NAME=COLUMN``."""
+    if value is None:
+        return {}
+    parts: Any = [part.partition("=")[::2] for part in str(value).split(",")]
+    if isinstance(value, Mapping):
+        parts = value.items()
+    names = {f"{standard}".strip(): f"{column}".strip() for standard, column in parts}
+    if not all([*names, *names.values()]) or len({*names.values()}) < len(parts):
+        expected = 'NAME=COLUMN such as "radius=c_rad,x=px", each name and each column once'
+        raise unusable(name, expected, value)
+    return names
 
 
 def parse_format(name: str, value: Any) -> Any:

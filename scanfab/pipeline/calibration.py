@@ -13,8 +13,8 @@ from typing import Any
 
 from scanfab.base.column import LENGTH, Column
 from scanfab.base.errors import Note, PackingError, SettingsError, tell
-from scanfab.base.option import parse_frames
 from scanfab.base.spelling import counted
+from scanfab.io.reader import parse_frames
 from scanfab.packing.sample import VARIANTS
 from scanfab.pipeline.frame import compute_frame
 from scanfab.pipeline.frames import Frames, Source, doubts_of_frame

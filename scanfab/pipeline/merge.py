@@ -10,8 +10,8 @@ from typing import Any
 
 from scanfab.base.errors import ReadError, SettingsError, warn
 from scanfab.base.files import refuse_inputs
-from scanfab.base.option import parse_frames
 from scanfab.io.families import PathLike
+from scanfab.io.reader import parse_frames
 from scanfab.pipeline.record import Record, part_of, read_table, write_manifest
 from scanfab.pipeline.values import as_written
 from scanfab.table.row import Row

@@ -13,7 +13,6 @@ from scanfab.base.option import (
     fill,
     optional,
     options_of,
-    parse_frames,
     reading,
     sample,
     scan,
@@ -22,7 +21,7 @@ from scanfab.base.option import (
 )
 from scanfab.base.space import Space
 from scanfab.base.spelling import spelt_place
-from scanfab.io.reader import READING_OPTIONS
+from scanfab.io.reader import READING_OPTIONS, parse_frames
 from scanfab.packing.boundary import BoundaryRule
 from scanfab.packing.rattlers import installed_rules
 from scanfab.pipeline import values

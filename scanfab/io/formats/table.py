@@ -18,13 +18,20 @@ import numpy as np
 
 from scanfab.base.arrays import MOST, doubles
 from scanfab.base.errors import ReadError, SettingsError, note
-from scanfab.base.option import parse_columns
 from scanfab.base.typing import Columns
 from scanfab.io.binary_files import binary_names, is_xyzd, packing_info, read_binary
 from scanfab.io.columns import DIAMETER_NAMES, ID_NAMES, RADIUS_NAMES, grain_table
 from scanfab.io.contacts import join_table
 from scanfab.io.layout import TextTable, read_text, text_table
-from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
+from scanfab.io.reader import (
+    Carries,
+    FileKind,
+    GrainTable,
+    JoinedContacts,
+    ReadOptions,
+    Snapshot,
+    parse_columns,
+)
 from scanfab.io.text import Layout
 
 Names = Mapping[str, tuple[str, ...]]
