@@ -147,7 +147,22 @@ class Solids:
         return cells_of(self.medium, 3.0)
 
     def near(self, window: Convex, center: FloatArray | float, margin: float) -> BoolArray:
-        """Which spheres lie within a margin of a window about a centre, shape (N,)."""
+        """
+        Which spheres may lie within a margin of a window.
+
+        Parameters
+        ----------
+        window : Convex
+            The window.
+        center : ndarray or float
+            Its centre, from the origin of the positions.
+        margin : float
+            How far beyond the window a sphere may lie, dump's length unit.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         # kept for the other jobs of a scan
         key = window, margin, *np.ravel(center)
         if key not in self._near:
