@@ -47,8 +47,13 @@ def assert_same_tables(one, other):
     "periodic", [(True, True, True), (True, True, False), (False, True, False)]
 )
 def test_periodic_rv_equals_the_rv_of_the_repeated_packing(spheres, periodic):
-    """Grains that reach in through a face are solids; rattlers and contacts are the same too."""
-    center = np.array([2.5, 2.3, 4.6])
+    """
+    Grains that reach in through faces are solids; rattlers and contacts are the same too.
+
+    The RV crosses two faces of the cell, and two images of the largest grain reach into it.
+    """
+    center = spheres.position[110] + [0.0, 0.5 * EDGES[1], 0.0]
+    assert spheres.radius[110] + RV["rv_radius"] > 0.5 * EDGES[1]
     here = table(spheres, center, periodic=periodic)
     there = compute(repeated(spheres, periodic), rv_center=tuple(center), **LOOK)
     assert here["rattlers"][1] > 0
