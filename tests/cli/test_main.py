@@ -1,5 +1,6 @@
 """The command line as a process: help, version, exit codes, streams, and signals at any moment."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -20,17 +21,27 @@ def test_version_is_the_package_s(ask) -> None:
     assert ask("--version").out == f"scanfab {version('scanfab')}\n"
 
 
-def test_help_lists_every_command_and_like_version_imports_no_heavy_package() -> None:
-    code = (
-        "import sys; from scanfab.cli.main import run; run(['--help']); run(['--version']); "
-        "heavy = {'numpy', 'numba', 'scipy', 'pyvista', 'meshio', 'rich', 'matplotlib', 'jinja2', "
-        "'polars', 'vtkmodules', 'PIL'} & set(sys.modules); "
-        "sys.exit(str(heavy) if heavy else 0)"
-    )
-    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+HEAVY = "numpy numba scipy pyvista meshio rich matplotlib jinja2 polars vtkmodules PIL"
+FIRST = "click numpy typing re contextlib importlib"
+IMPORTS = [
+    ((), "from scanfab.cli.main import run; run(['--help']); run(['--version'])", HEAVY),
+    # the process hears signals before anything large is imported
+    (("-S",), "import scanfab.cli.main", FIRST),
+]
+
+
+@pytest.mark.parametrize(("words", "code", "unwanted"), IMPORTS)
+def test_what_is_not_imported_before_it_is_needed(words, code, unwanted) -> None:
+    code = f"import sys; before = set(sys.modules); {code}; left = set(sys.modules) - before"
+    code += f"; sys.exit(' '.join(left & set('{unwanted}'.split())) or 0)"
+    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    answer = subprocess.run([sys.executable, *words, "-c", code], env=env, capture_output=True)
     assert answer.returncode == 0, answer.stderr
-    for command in group.COMMANDS:
-        assert f"\n  {command} " in answer.stdout
+
+
+def test_help_lists_every_command(ask) -> None:
+    shown = ask("--help").out
+    assert all(f"\n  {command} " in shown for command in group.COMMANDS)
 
 
 def test_debug_shows_why(tmp_path: Path) -> None:
@@ -129,15 +140,3 @@ def test_a_part_without_rows_and_half_a_file_are_removed(tmp_path, rows, left):
     answer = ended(tmp_path, PARTS.replace("ROWS", str(rows)))
     assert answer.returncode == 143, answer.stderr
     assert {path.name for path in tmp_path.iterdir()} == left
-
-
-def test_the_process_hears_signals_before_anything_large_is_imported():
-    code = (
-        "import sys; before = set(sys.modules); import scanfab.cli.main; "
-        "heavy = {'click', 'numpy', 'typing', 're', 'contextlib', 'importlib'}; "
-        "print(*sorted(heavy & (set(sys.modules) - before)))"
-    )
-    words = [sys.executable, "-S", "-c", code]
-    env = {"PYTHONPATH": str(Path(__file__).parents[2])}
-    answer = subprocess.run(words, env=env, capture_output=True, text=True, check=True)
-    assert answer.stdout == "\n"

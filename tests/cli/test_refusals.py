@@ -71,11 +71,7 @@ LINES = [
     ("compare row.csv --variants x", 2, "--variants: expected letters out of abcd, found 'x'"),
     ("report row.csv -o r.pdf", 2, "reports are HTML"),
     ("report row.csv -o nowhere/r.html", 2, "there is no folder"),
-    (
-        "report row.csv --label a --label b -o r.html",
-        2,
-        "--label: expected one per table: 1, found 2",
-    ),
+    ("report row.csv --label a --label b -o r.html", 2, "expected one per table: 1, found 2"),
     ("report row.csv", 2, "Missing option '-o'"),
     ("report head.csv -o old.html", 1, "nothing to report"),
     ("convert cube - --to csv", 2, "nothing is written to standard output"),
