@@ -78,15 +78,17 @@ def test_empty_first_frames_have_rows_without_values(tmp_path, strain):
         write(tmp_path / f"dump_{step}.txt", dump_text(rows, NAMES, step=step, box=BOX))
     series = scanfab.read_series(tmp_path)
     words = {"boundary": "id<=16", "strain": strain, "axis": "y", "variants": "ac", **SCAN}
+    words["rv"] = (0.5, 0.7)
     table = scanfab.compute(series, **words)
-    for row in table[:4]:
+    assert [(row.variant, row.rv) for row in table[:3]] == [("a", None), ("c", 0.5), ("c", 0.7)]
+    for row in table[:6]:
         assert (row.grains, row.contacts, row.segments, row.lines) == (0, 0, None, None)
         assert row.step == row.frame
         assert row.strain is row.alpha_vs is row.alpha_c is row.solid_fraction is None
     (tmp_path / "full").mkdir()
     expected = scanfab.compute(series_of(tmp_path / "full", SHRINKING), **words)
-    assert [numbers(row) for row in table[4:]] == [numbers(row) for row in expected]
-    for frames, rows in (("-1", table[-2:]), ("0", table[:2])):
+    assert [numbers(row) for row in table[6:]] == [numbers(row) for row in expected]
+    for frames, rows in (("-1", table[-3:]), ("0", table[:3])):
         assert scanfab.compute(series, frames=frames, **words) == rows
     with pytest.raises(PackingError, match="no frame has any grains"):
         scanfab.compute(series_of(tmp_path, [[], []]), **SCAN)

@@ -106,15 +106,6 @@ def test_the_whole_is_measured_beside_the_smallest(ball):
             assert own.alpha_vs_axial_se == pytest.approx(row.alpha_vs_axial_se, rel=1e-9)
 
 
-def test_frames_without_grains_have_a_row_for_each(ball):
-    nothing = Packing(np.zeros((0, 3)), np.zeros(0))
-    table = compute([nothing, ball], rv=FRACTIONS, variants="ac", **FIXED)
-    assert [(row.variant, row.rv) for row in table.select(frame=0)] == [
-        ("a", None), ("c", 0.4), ("c", 0.55), ("c", 0.7),
-    ]  # fmt: skip
-    assert table[0].mean_length is table[3].mean_length is None
-
-
 def test_lines_are_closer_only_for_the_smallest(ball):
     """Its error is the largest; lines that suffice for it suffice for all."""
     words = {"variants": "c", "tolerance": 2e-3, "seed": 3, "workers": 1}
