@@ -145,12 +145,12 @@ def save_packing(packing: Packing, path: Path, writer: Writer) -> None:
     Write one packing to a grain file and its companion files; each is complete or untouched.
     """
     companions = [file for kind in HEADS if (file := companion_there(path, kind))]
-    stem = Path(bare_name(path)).stem
-    others = {*path.parent.glob(f"{escape(stem)}.*")} - {*companions}
-    if companions and others and path not in others:
-        theirs = " and ".join(file.name for file in companions)
-        problem = f"{theirs} may belong to {min(others).name}"
-        raise SettingsError(f"{path}: {problem}: choose another name, or remove them")
+    if companions and not path.exists():
+        stem = escape(Path(bare_name(path)).stem)
+        if others := {*path.parent.glob(f"{stem}.*")} - {*companions}:
+            problem = f"{' and '.join(file.name for file in companions)} may belong to"
+            advice = "choose another name, or remove them"
+            raise SettingsError(f"{path}: {problem} {min(others).name}: {advice}")
     with ExitStack() as files:
         # the stack is unwound in reverse: the grain file appears last, after its companion files
         left = writer.write(packing, files.enter_context(whole_file(path)))
