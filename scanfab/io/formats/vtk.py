@@ -21,6 +21,7 @@ from scanfab.base.errors import ReadError, note
 from scanfab.base.typing import AnyArray, FloatArray
 from scanfab.io.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.contacts import join_ids, join_positions, proved_force
+from scanfab.io.families import numbers_in
 from scanfab.io.files import Stamp, bare_name, file_inside, first_bytes, plain, stamp_of
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
 from scanfab.io.mesh import Mesh, elements, form_of, holds_mesh, listed, read_mesh
@@ -232,8 +233,7 @@ class VtkReader(GrainsOnly):
         found = []
         for word, path in frames.items():
             time = None if word is None else numbers(f"{index}: timestep", word.encode(), 1)[0]
-            steps = re.findall(r"\d+", Path(bare_name(path)).stem)
-            found.append(Snapshot(path, int(steps[-1]) if steps else None, time))
+            found.append(Snapshot(path, (None, *numbers_in(path))[-1], time))
         return found
 
 
