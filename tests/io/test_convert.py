@@ -18,7 +18,6 @@ from hypothesis.extra.numpy import arrays
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, SettingsError, UnknownFormatError
-from scanfab.cli.main import run
 from scanfab.io.writer import installed_writers
 from scanfab.testing import differences, made_up_packings
 from tests.helpers.dumps import dump_text, holds, pairs_text, refuses, write
@@ -157,15 +156,6 @@ def test_each_file_finds_its_own_contacts_whatever_lies_beside(tmp_path, names, 
 
 
 @pytest.mark.parametrize("name", ENDINGS)
-def test_every_format_gives_the_same_packing_and_finds_its_companions(tmp_path, name):
-    path = written(EVERYTHING, tmp_path, name)
-    assert run(["convert", str(path), str(tmp_path / "again.npz")]) == 0
-    assert differences(EVERYTHING, scanfab.read(tmp_path / "again.npz")) == []
-    for contacts in ("auto", "file", *path.parent.glob("*.contacts.csv")):
-        assert differences(EVERYTHING, scanfab.read(path, contacts=contacts)) == []
-
-
-@pytest.mark.parametrize("name", ENDINGS)
 @settings(max_examples=8, deadline=None, suppress_health_check=[*HealthCheck])
 @given(data=st.data())
 def test_any_numbers_come_back(tmp_path, name, data):
@@ -252,12 +242,12 @@ def test_what_cannot_be_written_leaves_what_was_there(
     assert not list(tmp_path.glob("*.part*"))
 
 
-def test_a_name_that_means_something_else_is_told(tmp_path):
+@pytest.mark.parametrize("name", ENDINGS)
+def test_a_name_that_means_something_else_is_told(tmp_path, name):
     columns = {"Radius": [2.0], "x": [3.0], "diameter": [5.0]}
     packing = scanfab.Packing(np.zeros((1, 3)), 1.0, columns=columns)
     with pytest.warns(ScanfabNote, match="the column Radius is renamed to Radius_of_dump"):
-        scanfab.convert(packing, tmp_path / "a.npz")
-    again = scanfab.read(tmp_path / "a.npz")
+        again = scanfab.read(written(packing, tmp_path, name))
     holds(again, radius=[1.0], **{f"{name}_of_dump": values for name, values in columns.items()})
 
 
@@ -330,15 +320,16 @@ def test_a_column_that_few_formats_can_hold_is_left_out(tmp_path, values):
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
-def test_a_forked_process_reads_companion_files(tmp_path):
+def test_a_forked_process_reads_tables_and_has_a_worker_of_its_own(tmp_path):
     """Polars, which this process has used, would wait there for ever."""
-    path = written(EVERYTHING, tmp_path, "csv")
-    scanfab.read(path)
+    paths = [written(EVERYTHING, tmp_path, "csv"), written(PLAIN, tmp_path, "vtp", "b")]
+    expected = [len(scanfab.read(path)) for path in paths]
     child = os.fork()
     if child == 0:
         signal.alarm(60)
-        os._exit(len(scanfab.read(path).contacts) == 0)
+        os._exit([len(scanfab.read(path)) for path in paths] != expected)
     assert os.waitpid(child, 0)[1] == 0
+    assert len(scanfab.read(paths[1])) == expected[1]
 
 
 def test_that_columns_of_contacts_have_no_place_is_told_once(tmp_path):

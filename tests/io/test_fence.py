@@ -81,13 +81,3 @@ def test_no_file_of_the_working_folder_is_run(path, tmp_path, monkeypatch):
         fenced(crash, path)
     assert fenced(read, path) == [49, 50]
     assert not (tmp_path / "was run").exists()
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
-def test_a_forked_process_has_a_worker_of_its_own(path):
-    assert fenced(read, path) == [49, 50]
-    child = os.fork()
-    if child == 0:
-        os._exit(0 if fenced(read, path) == [49, 50] else 1)
-    assert os.waitpid(child, 0)[1] == 0
-    assert fenced(read, path) == [49, 50]

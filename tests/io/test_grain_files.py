@@ -79,7 +79,9 @@ def test_a_fabric_table_is_known(tmp_path, capsys):
         assert "not a dump: scanfab compare and scanfab report" in capsys.readouterr().err
 
 
-def test_folders_below_are_named_where_there_is_no_dump(folder):
+def test_folders_below_are_named_where_there_is_no_dump(folder, tmp_path):
+    (tmp_path / "empty").mkdir()
+    refuses(tmp_path / "empty", "the folder holds no files")
     for _ in range(2):
         refuses(folder.parent, r"holds no dumps, only folders: name .*dumps")
         write(folder.parent / "notes.txt", "hello\n")

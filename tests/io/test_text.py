@@ -164,17 +164,6 @@ def test_no_word_is_lost_or_moved(rows, separator, end, behind):
             assert same or np.array_equal(float(value), float(plain), equal_nan=True)
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
-@given(
-    rows=st.lists(st.lists(st.floats(allow_nan=False), min_size=3, max_size=3), min_size=1),
-    separator=st.sampled_from([",", ";", "\t", " ", "   "]),
-)
-def test_numbers_are_those_of_python(rows, separator):
-    found = rows_of(table(separator, None, rows), "abc", separator=separator.strip(" ") or " ")
-    for name, column in zip("abc", zip(*rows, strict=True), strict=True):
-        np.testing.assert_array_equal(found[name], column)
-
-
 def test_a_text_that_looks_compressed_is_not_unpacked():
     assert rows_of("1 2\n", "ab", text="a")["b"].tolist() == [2]
     with pytest.raises(ReadError, match="cannot be read as a table"):
