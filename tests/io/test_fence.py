@@ -45,17 +45,15 @@ def path(tmp_path):
     return tmp_path / "a.bin"
 
 
-@pytest.mark.parametrize(
-    ("function", "told"),
-    [(leave, "cannot read it"), (crash, "its library crashed, or took"), (hang, "its library")],
-)
-def test_a_file_that_ends_the_worker_is_an_error_and_the_next_is_read(
-    path, monkeypatch, function, told
-):
+ENDS = [(leave, "cannot read it"), (crash, "its library crashed, or took"), (hang, "its library")]
+
+
+@pytest.mark.parametrize(("end", "told"), ENDS)
+def test_a_file_that_ends_the_worker_is_an_error_and_the_next_is_read(path, monkeypatch, end, told):
     assert fenced(read, path) == [49, 50]
     monkeypatch.setattr(fence, "SECONDS", 0.5)
     with pytest.raises(ReadError, match=rf"a\.bin: cannot be read: {told}"):
-        fenced(function, path)
+        fenced(end, path)
     monkeypatch.undo()
     assert fenced(read, path) == [49, 50]
 

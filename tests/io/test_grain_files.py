@@ -179,7 +179,6 @@ def opened(tmp_path, names, text=None, **options):
 
 ORDERS = [
     (["dump_10.csv", "dump_9.csv", "dump_100.csv"], [9, 10, 100]),
-    (["dump_0010.csv", "dump_0009.csv"], [9, 10]),
     (["dump10.csv", "dump9.csv"], [9, 10]),
     (["dump.1000", "dump.900", "dump.10000"], [900, 1000, 10000]),
     (["run2_dump_10.csv", "run2_dump_9.csv"], [9, 10]),
@@ -191,7 +190,6 @@ ORDERS = [
     # of a single file nobody knows what number is the step
     (["111_10k.spheres"], [None]),
     (["hopper_3d_demo.csv"], [None]),
-    (["dump.csv"], [None]),
     (["dump.bz2"], [None]),
 ]
 

@@ -11,12 +11,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.base.errors import (
-    NoFrameError,
-    ScanfabNote,
-    ScanfabWarning,
-    SettingsError,
-)
+from scanfab.base.errors import NoFrameError, ScanfabWarning, SettingsError
 from scanfab.cli.main import run
 from scanfab.io import frame as frame_module
 from scanfab.io.formats.lammps import LiggghtsReader
@@ -86,14 +81,6 @@ def test_contacts_may_be_named_and_must_be_there(tmp_path):
         ("nowhere_*.txt", "matches nothing"),
     ):
         refuses(tmp_path / "g", said, contacts=tmp_path / named)
-
-
-def test_unknown_files_are_passed_over_with_one_note(folder):
-    for name in ("log.liggghts", "in.deck", "floor.stl", "README.md", "a.png", "b.pdf", "c.xyz"):
-        write(folder / name, "hello\n")
-    with pytest.warns(ScanfabNote, match=r"skipped .* and 2 more: they hold neither grains") as e:
-        assert len(scanfab.read_series(folder)) == 3
-    assert len(e) == 1
 
 
 def test_a_series_is_named_as_the_user_named_it(folder, monkeypatch):
@@ -189,15 +176,6 @@ def test_a_frame_that_goes_to_another_process_leaves_the_others_behind(series):
     assert (twin.number, twin.step, twin.read().step) == (3, 30, 30)
 
 
-def test_a_file_that_has_grown_is_looked_through_again(tmp_path):
-    path = write(tmp_path / "dump.txt", dump_text(step=0))
-    series = scanfab.read_series(path)
-    assert len(series) == 1
-    write(path, dump_text(step=0) + dump_text(step=1))
-    assert len(series) == 2
-    assert series[-1].read().step == 1
-
-
 @pytest.mark.parametrize("again", ["dumps", "./dumps/", "latest", "dum*"])
 def test_a_folder_that_is_named_twice_is_read_once(tmp_path, monkeypatch, capsys, again):
     monkeypatch.chdir(tmp_path)
@@ -216,10 +194,8 @@ OTHER_KINDS = [
         ("sample_data", {name: 3}, f"{name}: expected")
         for name in ("columns", "contacts", "contact_columns", "format")
     ),
-    *(
-        ("nowhere", {"max_unpacked": wrong}, "max_unpacked: expected a number above 0")
-        for wrong in (0, -1, "many")
-    ),
+    ("nowhere", {"max_unpacked": 0}, "max_unpacked: expected a number above 0"),
+    ("nowhere", {"max_unpacked": "many"}, "max_unpacked: expected a number above 0"),
     *((source, {}, "source: expected the path of a folder or file") for source in ([], 3, [3])),
 ]
 

@@ -209,7 +209,6 @@ def test_of_walls_whose_columns_are_not_proved_the_force_is_not_known(tmp_path):
 AT_REST = [
     (CELL / "dump_30000.txt.gz", {"contacts": CELL / "contacts_30000.txt.gz"}),
     (SHEAR / "shear.0.lammpstrj.gz", {"contacts": SHEAR_PAIRS, "contact_columns": OF_SHEAR}),
-    (YADE / "periodic.xml.bz2", {}),
 ]
 
 

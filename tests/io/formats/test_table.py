@@ -354,15 +354,13 @@ def test_xyzd(tmp_path):
     refuses(path, "expected the dimensions and both porosities")
 
 
-def put_npz(path, **columns):
-    np.savez_compressed(path, **columns)
-
-
 def put_parquet(path, **columns):
     parquet.write_table(pyarrow.table(columns), path)
 
 
-@pytest.mark.parametrize(("ending", "put"), [(".npz", put_npz), (".parquet", put_parquet)])
+@pytest.mark.parametrize(
+    ("ending", "put"), [(".npz", np.savez_compressed), (".parquet", put_parquet)]
+)
 def test_columns_that_are_no_text(tmp_path, ending, put):
     place = dict(zip("xyz", POSITION.T, strict=True))
     put(tmp_path / f"g{ending}", **place, r=RADIUS, id=ID)
@@ -375,7 +373,7 @@ def test_columns_that_are_no_text(tmp_path, ending, put):
 
 def test_arrays_of_positions(tmp_path):
     more = {"other": np.arange(3), "velocity": POSITION, "pairs": np.array([[0, 1]])}
-    put_npz(tmp_path / "a.npz", pos=POSITION, r=RADIUS, **more)
+    np.savez(tmp_path / "a.npz", pos=POSITION, r=RADIUS, **more)
     packing = read(tmp_path / "a.npz")
     assert_right(packing)
     assert set(packing.columns) == {"velocity_x", "velocity_y", "velocity_z"}

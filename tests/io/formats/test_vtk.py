@@ -7,7 +7,7 @@ import pyvista
 
 import scanfab
 from scanfab.base.errors import ScanfabNote
-from tests.helpers.dumps import holds, refuses, vtk_array, vtk_xml, write
+from tests.helpers.dumps import holds, refuses, write
 from tests.helpers.truth import FLOOR
 
 POSITION = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0.25], [5.6, 0.5, 0]])
@@ -18,13 +18,12 @@ FLAT = np.insert(LINES, 0, 2, axis=1).ravel()
 PUSH = (POSITION[1:] - POSITION[:-1]) * np.arange(1.0, 4)[:, None]
 
 
-def polydata(path, binary=False, cells=None, **arrays):
-    cloud = pyvista.PolyData(POSITION, lines=None if cells is None else FLAT)
-    for name, values in arrays.items():
-        cloud.point_data[name] = values
-    for name, values in (cells or {}).items():
-        cloud.cell_data[name] = values
-    cloud.save(path, binary=binary)
+def polydata(path, rows=(0, 1, 2, 3), cells=None, **arrays):
+    path.parent.mkdir(exist_ok=True)
+    mesh = pyvista.PolyData(POSITION[[*rows]], lines=None if cells is None else FLAT)
+    mesh.point_data.update(arrays)
+    mesh.cell_data.update(cells or {})
+    (mesh if path.suffix == ".vtp" else mesh.cast_to_unstructured_grid()).save(path)
     return path
 
 
@@ -66,22 +65,13 @@ def test_an_index_of_other_files_beside_the_grains_is_left_out(tmp_path, name):
     assert len(frame.read()) == 4
 
 
-def grid_without_cells(path, count, points="", radius=""):
-    """XML as MercuryDPM writes it: a grid of points without cells, or without anything."""
-    form = {"type": "Float32", "format": "ascii"}
-    names = {"connectivity": "Int32", "offsets": "Int32", "types": "UInt8"}
-    flat = {"NumberOfComponents": 1, **form}
-    cells = "".join(vtk_array(**{**flat, "type": names[name]}, Name=name) for name in names)
-    content = f"<PointData>{vtk_array(radius, **flat, Name='Radius')}</PointData>"
-    content += f"<Points>{vtk_array(points, **form)}</Points><Cells>{cells}</Cells>"
-    piece = f'NumberOfPoints="{count}" NumberOfCells="0"'
-    return vtk_xml(path, piece, content, "UnstructuredGrid")
-
-
 def test_a_grid_of_points_without_cells_is_a_cloud_and_may_be_empty(tmp_path, capfd):
-    path = grid_without_cells(tmp_path / "a.vtu", 2, "0 0 0 1 0 0", "0.5 0.5")
-    np.testing.assert_array_equal(scanfab.read(path).radius, [0.5, 0.5])
-    assert len(scanfab.read(grid_without_cells(path, 0))) == 0
+    """As MercuryDPM writes it."""
+    for count in (2, 0):
+        grid = pyvista.UnstructuredGrid(np.zeros(0, int), np.uint8([]), POSITION[:count])
+        grid["Radius"] = RADIUS[:count]
+        grid.save(tmp_path / "a.vtu", binary=False)
+        holds(scanfab.read(tmp_path / "a.vtu"), position=POSITION[:count], radius=RADIUS[:count])
     text = "# vtk DataFile Version 3.0\nframe\nASCII\nDATASET POLYDATA\nPOINTS 0 float\n"
     text += "POINT_DATA 0\nSCALARS Radius float 1\nLOOKUP_TABLE default\n"
     assert len(scanfab.read(write(tmp_path / "a.vtk", text))) == 0
@@ -108,14 +98,8 @@ def test_arrays_of_other_names_are_left_out_and_told(tmp_path):
         assert scanfab.read(spheres, contacts=contacts).contacts.force is None
 
 
-def cloud(path, rows, ghosts=None):
-    path.parent.mkdir(exist_ok=True)
-    mesh = pyvista.PolyData(POSITION[rows])
-    mesh["radius"], mesh["id"] = np.ones(len(rows)), np.array(rows)
-    if ghosts is not None:
-        mesh["vtkGhostType"] = np.array(ghosts, np.uint8)
-    (mesh if path.suffix == ".vtp" else mesh.cast_to_unstructured_grid()).save(path)
-    return path
+def cloud(path, rows, **arrays):
+    return polydata(path, rows, radius=np.ones(len(rows)), id=np.array(rows), **arrays)
 
 
 def listing(path, kind, *entries):
@@ -128,8 +112,8 @@ def listing(path, kind, *entries):
 
 @pytest.mark.parametrize(("kind", "ending"), [("PPolyData", ".vtp"), ("PUnstructuredGrid", ".vtu")])
 def test_pieces_make_one_frame_and_their_ghosts_count_once(tmp_path, kind, ending):
-    cloud(tmp_path / f"parts/0{ending}", [0, 1, 2], [0, 0, 1])
-    cloud(tmp_path / f"parts/1{ending}", [1, 2, 3], [1, 0, 0])
+    cloud(tmp_path / f"parts/0{ending}", [0, 1, 2], vtkGhostType=np.uint8([0, 0, 1]))
+    cloud(tmp_path / f"parts/1{ending}", [1, 2, 3], vtkGhostType=np.uint8([1, 0, 0]))
     names = [f"parts/{k}{ending}" for k in range(2)]
     packing = scanfab.read(listing(tmp_path / f"all.p{ending[1:]}", kind, *names))
     holds(packing, id=range(4), position=POSITION)

@@ -205,7 +205,6 @@ def normal_forces(packing):
 
 
 NORMAL_FORCES = [
-    ("zlib_spheres.30000.vtu", "ascii_intrs.30000.vtp", 1e-6),
     ("zlib_spheres.30000.vtu", "zlib_intrs.30000.vtp", 1e-6),
     ("id-spheres-00000000.vtk.gz", "id-intrs-00000000.vtk.gz", 1e-5),
 ]
