@@ -255,9 +255,9 @@ def test_clumps_that_were_left_apart_stay_apart(tmp_path, name):
 
 def test_vtk_reads_what_is_written(tmp_path):
     for name in ("vtp", "on-dem"):
-        mesh = pyvista.read(written(EVERYTHING, tmp_path, name))
+        mesh = pyvista.read(written(EVERYTHING, tmp_path, name, stem=name))
         holds(EVERYTHING, position=mesh.points, radius=mesh["radius"], velocity=mesh["velocity"])
-    mesh = pyvista.read(tmp_path / "a.vtp")
+    mesh = pyvista.read(tmp_path / "vtp.vtp")
     holds(EVERYTHING.contacts, pairs=mesh.lines.reshape(-1, 3)[:, 1:], force=mesh["force"])
     assert mesh.field_data["TimeValue"] == [EVERYTHING.time]
 

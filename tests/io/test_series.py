@@ -218,13 +218,13 @@ def long_series(tmp_path):
     return scanfab.read_series(tmp_path)
 
 
-def test_ten_thousand_files_open_within_seconds(tmp_path):
+def test_thousands_of_files_open_within_seconds(tmp_path):
     first = write(tmp_path / "dump_0.txt", dump_text())
-    for step in range(1, 10_000):
+    for step in range(1, 4_000):
         os.link(first, tmp_path / f"dump_{step}.txt")
     start = time.perf_counter()
     assert len(next(iter(scanfab.read_series(tmp_path))).read()) == 3
-    assert time.perf_counter() - start < 4
+    assert time.perf_counter() - start < 2
 
 
 def test_memory_holds_one_frame_a_worker_and_all_give_the_same_rows(long_series, monkeypatch):
