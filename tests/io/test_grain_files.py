@@ -80,10 +80,11 @@ def test_a_fabric_table_is_known(tmp_path, capsys):
 
 
 def test_folders_below_are_named_where_there_is_no_dump(folder, tmp_path):
-    (tmp_path / "empty").mkdir()
+    for name in ("a", "b", "c", "empty", "f", "g"):
+        (tmp_path / name).mkdir()
     refuses(tmp_path / "empty", "the folder holds no files")
     for _ in range(2):
-        refuses(folder.parent, r"holds no dumps, only folders: name .*dumps")
+        refuses(tmp_path, r"holds no dumps, only folders: name .*dumps, .*empty and 2 more")
         write(folder.parent / "notes.txt", "hello\n")
 
 

@@ -218,6 +218,15 @@ def long_series(tmp_path):
     return scanfab.read_series(tmp_path)
 
 
+@pytest.mark.filterwarnings("ignore:.*no contact at all by geometry")
+def test_a_series_may_start_with_frames_of_boundary_alone(tmp_path):
+    text = dump_text(cubic_rows()[:16]) + dump_text(cubic_rows(), step=1)
+    series = scanfab.read_series(write(tmp_path / "dump.txt", text))
+    table = scanfab.compute(series, boundary="id<=16", **SCAN)
+    assert table["grains"].tolist() == [0, 48]
+    assert np.isnan(table["alpha_vs"]).tolist() == [True, False]
+
+
 def test_thousands_of_files_open_within_seconds(tmp_path):
     first = write(tmp_path / "dump_0.txt", dump_text())
     for step in range(1, 4_000):

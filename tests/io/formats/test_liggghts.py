@@ -76,15 +76,6 @@ def test_every_contact_form_gives_the_same_contacts(grains, name):
     assert np.mean(push > 0) > 0.9
 
 
-@pytest.mark.parametrize("name", ["pairs.txt", "pairs_30000.vtk.gz"])
-def test_contacts_across_periodic_faces_are_true(name):
-    packing = scanfab.read(PERIODIC / "dump.txt", contacts=PERIODIC / name)
-    contacts = csv_rows(PERIODIC / "truth_contacts.csv")
-    assert_true_contacts(packing, contacts, normals=1e-4)
-    crossing = np.any(packing.contacts.image != 0, axis=1)
-    assert crossing.sum() == contacts["crossing"].sum() == 114
-
-
 @pytest.mark.parametrize("columns", [None, "pos id force", "id1=c_a[1],id2=c_a[2]"])
 @pytest.mark.parametrize("grains", ["tutorial.txt", "shuffled.txt", "precise.txt"])
 def test_wall_contacts_alone_leave_the_contacts_to_geometry(grains, columns):
