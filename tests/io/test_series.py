@@ -176,6 +176,14 @@ def test_a_frame_that_goes_to_another_process_leaves_the_others_behind(series):
     assert (twin.number, twin.step, twin.read().step) == (3, 30, 30)
 
 
+def test_a_file_that_has_grown_is_looked_through_again(tmp_path):
+    path = write(tmp_path / "dump.txt", dump_text(step=0))
+    series = scanfab.read_series(path)
+    assert len(series) == 1
+    write(path, dump_text(step=0) + dump_text(step=1))
+    assert len(series) == 2
+
+
 @pytest.mark.parametrize("again", ["dumps", "./dumps/", "latest", "dum*"])
 def test_a_folder_that_is_named_twice_is_read_once(tmp_path, monkeypatch, capsys, again):
     monkeypatch.chdir(tmp_path)

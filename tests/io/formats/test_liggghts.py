@@ -85,8 +85,7 @@ def test_wall_contacts_alone_leave_the_contacts_to_geometry(grains, columns):
     assert (packing.contacts, packing.wall_contacts.sum()) == (None, 25)
 
 
-NO_GRAINS = ["mesh_30000.vtk", "decomposition_30000.vtk", "grains_boundingBox_30000.vtk"]
-NO_GRAINS += ["grains_binary_boundingBox_30000.vtk", "grains_boundingBox_30000.vtr"]
+NO_GRAINS = ["mesh_30000.vtk", "grains_boundingBox_30000.vtk", "grains_boundingBox_30000.vtr"]
 
 
 WITHOUT_GRAINS = [

