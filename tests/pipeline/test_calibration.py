@@ -4,18 +4,12 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from scanfab import Packing, ScanfabWarning, SettingsError, calibrate, compute, find_contacts
+from scanfab import Packing, ScanfabWarning, SettingsError, calibrate, compute
 from scanfab.pipeline.calibration import STEP_COLUMNS, first_steady, judged
 from scanfab.table.columns import row_of
 from scanfab.table.row import Row
-from tests.helpers.lattices import shaken_cubic
 
 QUICK = {"tolerance": 2e-3, "variants": "cd", "rv": 0.6, "workers": 1}
-
-
-@pytest.fixture(scope="module")
-def packing():
-    return find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 7)))
 
 
 @pytest.fixture(scope="module")
@@ -94,18 +88,15 @@ def test_steady_is_what_differs_from_later_steps_by_no_more_than_chance():
 
 
 def test_an_rv_within_another_differs_from_it_by_less_than_two_samples_do():
-    """Means over the grains of nested RVs: called unsteady once in twenty, not next to never."""
-    random, unsteady = np.random.default_rng(0), 0
-    fractions = (0.4, 0.5, 0.6, 0.7, 0.8)
-    for _ in range(400):
-        values, steps = random.normal(0.01, 1.0, 4000), []
-        for fraction in fractions:
-            inside = values[: round(4000 * (fraction / 0.8) ** 3)]
-            error = 1.0 / np.sqrt(len(inside))
-            words = {"ladder": "rv", "rv_radius": fraction, "alpha_vs_axial_sample_se": error}
-            steps.append(step(fraction, inside.mean(), 1e-9, **words))
-        unsteady += first_steady(judged(steps)) != fractions[0]
-    assert 0.005 * 400 < unsteady < 0.08 * 400
+    """Means over n and N > n grains, of which n are the same: (N/n - 1) of the variance of N."""
+    for dimension, grains in ((3, 8), (2, 4)):
+        # Student's t for 0.05 and one pair is 2.042
+        for apart, is_steady in ((2.04, True), (2.05, False)):
+            words = {"ladder": "rv", "alpha_vs_axial_sample_se": 0.001}
+            alpha = 0.001 * apart * np.sqrt(grains - 1)
+            inner, outer = step(1, alpha, 1e-9, rv_radius=1.0), step(2, 0.0, 1e-9, rv_radius=2.0)
+            found = judged([Row(**{**one, **words}) for one in (inner, outer)], dimension)
+            assert found[0].steady == is_steady
 
 
 LEAVE_OUT = "leave out `cutoffs`, `moment`, `frames` and all but one `rv`"
@@ -130,14 +121,13 @@ def test_the_sentences_say_what_the_rows_show(found):
     """Of each ladder the first step that is steady in all variants; of cut-offs the largest."""
     said = dict(sentence.split(": ", 1) for sentence in found.findings)
     assert list(said) == ["spacing", "directions", "cut-off", "rv", "recommended"]
-    for name, paper in (("spacing", "0.1"), ("directions", ""), ("rv", "0.67 to 0.7")):
-        rows = [row for row in found.rows if row.ladder == name]
-        unsteady = {row.value for row in rows if not row.steady}
-        first = next(row.value for row in rows if row.value not in unsteady)
-        steady = f"from {first:g} on, nothing changes within the errors"
-        # the last one has nothing to agree with
-        expected = "no step agrees with all later ones" if first == rows[-1].value else steady
-        assert said[name] == expected + (f" (the paper: {paper})" if paper else "")
+    papers = {"spacing": " (the paper: 0.1)", "directions": "", "rv": " (the paper: 0.67 to 0.7)"}
+    for name, paper in papers.items():
+        steady = first_steady([row for row in found.rows if row.ladder == name])
+        text = "no step agrees with all later ones"
+        if steady is not None:
+            text = f"from {steady:g} on, nothing changes within the errors"
+        assert said[name] == text + paper
     alpha = {row.value: row.alpha_vs_axial for row in ladder(found, "cutoff") if row.alpha_vs_axial}
     best = max(alpha, key=lambda value: abs(alpha[value]))
     assert said["cut-off"] == (

@@ -1,15 +1,20 @@
-"""Clumps from the dump to the table, and the rule for rattlers by its name, also a made-up one."""
+"""Clumps from the dump to the table, of discs against a naive twin; and rules for rattlers."""
+
+from functools import partial
 
 import numpy as np
 import pytest
 
 import scanfab
-from scanfab import Packing, ScanfabWarning, Settings, SettingsError
+from scanfab import Cell, ContactList, Packing, ScanfabWarning, Settings, find_contacts
 from scanfab.packing import rattlers
+from scanfab.packing.bodies import own_shares
 from scanfab.pipeline.inspection import inspect_series
+from scanfab.pipeline.state import _rays
 from scanfab.viz.scene import look_at
 from tests.helpers.dumps import NAMES, dump_text, write
 from tests.helpers.lattices import shaken_cubic, simple_cubic
+from tests.helpers.naive_bodies import NaiveBodies
 from tests.helpers.plugins import offer
 
 SCAN = {"directions": 9, "spacing": "1rmin", "cutoff": "0.2rmin", "contact_tolerance": 0.02}
@@ -33,14 +38,6 @@ def series_of(tmp_path, *bodies, column="clump", leave=()):
         rows = [row for row in rows if step == 0 or row[0] not in leave]
         texts.append(dump_text(rows, f"{NAMES} {column}", step=step, box=BOX))
     return scanfab.read_series(write(tmp_path / "dump.txt", "".join(texts)))
-
-
-def test_the_lines_know_nothing_of_bodies():
-    """A union of spheres is a solid."""
-    words = {"rv": 0.6, "variants": "ac", **SCAN}
-    tables = (scanfab.compute(Packing(*SPHERES, bodies=one), **words) for one in (pillars(), None))
-    for one, two in zip(*tables, strict=True):
-        assert (one.mean_length, one.alpha_vs_axial) == (two.mean_length, two.alpha_vs_axial)
 
 
 def test_boundary_bodies_are_no_grains(tmp_path):
@@ -115,7 +112,73 @@ def test_tables_inspect_and_views_tell_the_rattlers_of_the_rule(series, rule, ex
     assert look_at(series, settings).scene.grains.rattler.sum() == expected
 
 
-@pytest.mark.usefixtures("made_up")
-def test_a_rule_that_there_is_not_is_told_with_those_that_there_are():
-    with pytest.raises(SettingsError, match="expected count, force, recursive or untouched, f"):
-        Settings(rattlers="pressed")
+# clumps of discs in a cell that leans, with all rules at once, against naive ways to count
+
+VECTORS = np.array([[11.0, 0, 0], [4.0, 10.0, 0], [0, 0, 50.0]])
+AREA = 11.0 * 10.0
+CLUMPS = 30
+
+
+def random_clumps(random):
+    """Bodies of one to four discs, with a force on each contact; and their twin."""
+    number = random.permutation(np.repeat(np.arange(CLUMPS), random.integers(1, 5, CLUMPS)))
+    centre = random.random((CLUMPS, 2)) @ VECTORS[:2, :2]
+    places = centre[number] + random.normal(0, 0.45, (len(number), 2))
+    radius = random.uniform(0.3, 0.7, len(number))
+    bare = find_contacts(Packing(places, radius, bodies=number, cell=Cell(VECTORS)))
+    pairs, image, normal = bare.contacts.pairs, bare.contacts.image, bare.contacts.normal
+    size = random.exponential(1.0, (len(pairs), 1)) - 0.1
+    across = np.cross(normal, [0, 0, 1.0]) * random.normal(0, 0.2, (len(pairs), 1))
+    packing = bare.with_contacts(ContactList(pairs, image, size * normal + across))
+    return packing, NaiveBodies(packing.position, radius, number, VECTORS, dimension=2)
+
+
+def branches_of(packing, twin):
+    """Of each contact, from body to body."""
+    contacts = packing.contacts
+    apart = [twin.place(two) - twin.place(one) for one, two in contacts.pairs]
+    return np.array(apart) + contacts.image @ VECTORS
+
+
+def pressing_neighbours(packing, twin, least):
+    """Of each body the number of neighbours that press on it, at however many points."""
+    contacts, met = packing.contacts, set()
+    presses = contacts.force_n > least * contacts.force_n.mean()
+    branches = branches_of(packing, twin)[presses]
+    for (one, two), apart in zip(contacts.pairs[presses], branches, strict=True):
+        one, two = twin.body[one], twin.body[two]
+        if one > two:
+            one, two, apart = two, one, -apart
+        met.add((one, two, *(np.round(apart, 6) + 0.0)))
+    return np.bincount([body for one in met for body in one[:2]], minlength=CLUMPS)
+
+
+# where so few clumps are left, lines stay in channels and densities of contacts fall below 0
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
+def test_counts_areas_and_stress_are_those_of_the_twin():
+    packing, twin = random_clumps(np.random.default_rng(1))
+    words = {"rattlers": "force", "min_force": 0.2, "with_": "state,forces", "workers": 1}
+    words |= {"spacing": 0.1, "directions": 12}
+    whole, without = (scanfab.compute(packing, variants=name, **words)[0] for name in "ab")
+    held = pressing_neighbours(packing, twin, 0.2) >= 2
+    numbers = np.array(twin.numbers(np.zeros(len(packing), int)))
+    assert whole.grains == CLUMPS
+    assert whole.rattlers == np.count_nonzero(~held) > 3
+    assert without.grains == np.count_nonzero(held)
+    assert whole.contacts == twin.contacts
+    assert whole.coordination == pytest.approx(numbers.mean())
+    assert whole.coordination_mechanical == pytest.approx(numbers[numbers >= 2].mean())
+    bodies = np.vectorize(twin.body.get)(packing.contacts.pairs)
+    normal = packing.contacts.normal[held[bodies].all(axis=1)]
+    assert without.contacts == len(normal)
+    assert without.gc_xy == pytest.approx(np.mean(normal[:, 0] * normal[:, 1]))
+
+    # what discs of one body share counts once
+    solid = np.pi * packing.radius**2 @ own_shares(packing, partial(_rays, space=packing.space))
+    assert whole.void_ratio == pytest.approx((AREA - solid) / solid)
+    product = packing.contacts.force.T @ branches_of(packing, twin) / AREA
+    stress = 0.5 * (product + product.T)
+    found = whole.stress_xx, whole.stress_yy, whole.stress_xy
+    np.testing.assert_allclose(found, (stress[0, 0], stress[1, 1], stress[0, 1]), rtol=1e-9)
+    assert whole.p == pytest.approx(0.5 * np.trace(stress))
+    assert whole.q == pytest.approx(stress[1, 1] - stress[0, 0])

@@ -8,7 +8,6 @@ import pytest
 import scanfab
 from scanfab import Packing, PackingError, ReadError, Settings, SettingsError
 from scanfab.base.errors import NoReferenceError, ScanfabNote
-from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.inspection import inspect_series
 from scanfab.viz.scene import look_at
 from tests.helpers.dumps import NAMES, cubic_rows, dump_text, write
@@ -60,9 +59,8 @@ def test_no_frames_at_all_are_an_error(shrinking):
 
 def test_a_part_looks_for_its_first_frame_with_grains_in_the_whole(shrinking):
     """As calibrate and view do, whose frame is one of the part."""
-    frames = Frames(shrinking[1:3], Settings(frames=slice(-1, None)))
-    assert [number for number, _ in frames.due()] == [2]
-    assert frames.reference()[0] == 0
+    part = scanfab.compute(shrinking[1:3], frames=-1, **SCAN)
+    assert part == scanfab.compute(shrinking, frames=2, **SCAN)
     look = look_at(shrinking[1:3], Settings(**SCAN), -1)
     whole = look_at(shrinking, Settings(**SCAN), 2)
     assert look.number == whole.number == 2
@@ -92,12 +90,6 @@ def test_empty_first_frames_have_rows_without_values(tmp_path, strain):
         assert scanfab.compute(series, frames=frames, **words) == rows
     with pytest.raises(PackingError, match="no frame has any grains"):
         scanfab.compute(series_of(tmp_path, [[], []]), **SCAN)
-
-
-def test_what_is_no_executor_is_named():
-    told = "executor: expected a concurrent.futures.Executor, found 4"
-    with pytest.raises(SettingsError, match=told):
-        scanfab.compute(Packing([[0, 0, 0]], 1.0), executor=4)
 
 
 LINES = {"directions": 9, "spacing": "0.5rmin", "variants": "ac"}

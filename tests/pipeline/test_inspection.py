@@ -14,7 +14,6 @@ from scanfab.pipeline.inspection import inspect_series
 from scanfab.pipeline.settings import Settings
 from tests.helpers.dumps import ROWS, dump_text, write, yade_spheres
 from tests.helpers.lattices import shaken_cubic
-from tests.helpers.truth import SAMPLE_DATA
 
 
 def reports(folder, texts, **options):
@@ -50,19 +49,6 @@ def test_a_format_without_a_cell_is_always_told(tmp_path):
     with pytest.warns(ScanfabNote, match=message):
         (report,) = inspect_series(scanfab.read_series(tmp_path), Settings())
     assert report.warnings == []
-    with_cell = scanfab.read_series(tmp_path, cell=(9.0, 9.0, 9.0))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", ScanfabNote)
-        assert next(inspect_series(with_cell, Settings())).warnings == []
-
-
-def test_a_sheet_of_discs_is_no_doubt():
-    sheet = SAMPLE_DATA / "lammps_discs" / "sheet.3000.lammpstrj"
-    with pytest.warns(scanfab.ScanfabNote, match="read as discs"):
-        (report,) = inspect_series(scanfab.read_series(sheet), Settings())
-    assert report.warnings == []
-    assert (report.periodic, report.low[2], report.high[2]) == ([True, True, False], 0.0, 0.0)
-    assert report.rv_center[2] == 0.0
 
 
 def test_options_that_do_not_exist_or_fit_are_refused_at_once(tmp_path):
@@ -180,9 +166,7 @@ def test_what_is_worth_a_note(packings, options, words, count):
 
 
 def test_grains_off_the_plane_of_all_others_are_named():
-    grid = np.stack(np.meshgrid(np.arange(20.0), np.arange(20.0)), -1).reshape(-1, 2)
-    position = np.column_stack([grid, np.zeros(len(grid))])
-    position[[7, 42], 2] = 0.1
+    position = np.array([(k % 20, k // 20, 0.1 * (k in (7, 42))) for k in range(400)])
     found = told([Packing(position, 0.5)], ScanfabWarning)
     assert any("but those of 2 grains (id 7, 42)" in one for one in found)
     with pytest.raises(scanfab.PackingError, match=r"2 grains \(id 7, 42\).*`dim=3`"):

@@ -6,7 +6,6 @@ import pytest
 import scanfab
 from scanfab import Cell, Packing, PackingError, SettingsError, compute
 from scanfab.base.space import SPACE, Space
-from scanfab.pipeline.settings import Settings
 from tests.helpers.dumps import dump_text
 from tests.helpers.truth import SAMPLE_DATA
 
@@ -140,8 +139,3 @@ def test_harmonics_need_more_directions_than_the_tensor(discs, steps, known):
     row = compute(Packing(position, radius, dim=2), **words)[0]
     assert row["alpha_vs_axial"] is not None
     assert [order for order in (2, 4) if row[f"vs_a{order}"] is not None] == known
-
-
-def test_an_axis_in_the_plane_keeps_its_last_digit():
-    settings = Settings(axis="1,7,0")
-    assert settings.in_space(XY).axis == settings.axis

@@ -11,7 +11,7 @@ import scanfab
 from scanfab import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.base.errors import SettingsError, SkippedFrameWarning
 from scanfab.base.option import options_of
-from scanfab.pipeline.options import DECLARED, MEANINGS, OPTIONS, as_options, listening
+from scanfab.pipeline.options import OPTIONS, as_options, listening
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import Length
 from scanfab.scan.directions import direction_rule
@@ -81,8 +81,6 @@ def test_values_are_kept_as_they_are_meant():
     assert Settings(variants="c", cutoffs="0:3rmin:0.1rmin").rows_per_frame == 31
     assert Settings(variants="acd", cutoffs="0,1", rv=[0.7, 0.4]).rows_per_frame == 10
     assert (Settings().lists_gaps, Settings(moment=2).lists_gaps) == (False, True)
-    # of discs in x-y the default is another
-    assert (repr(Settings(axis="z")), repr(Settings())) == ("Settings(axis='z')", "Settings()")
 
 
 UNUSABLE = [
@@ -144,11 +142,9 @@ def test_the_signature_and_the_help_of_compute_have_every_option():
     helps = {one.name: one.help[:20] for one in options_of(Settings)}
     for name, one in options.items():
         assert f"\n{name} : {one.annotation}, optional\n    {helps[name]}" in text
-    for form in ("stop|skip", "auto|cell|boundary|grains|FILE.csv", "A:B:C", "x|y|z|X,Y,Z"):
-        assert f"Written as ``{form}``." in " ".join(text.split())
 
 
-def test_settings_are_frozen_and_checked_again_where_they_are_replaced():
+def test_settings_are_checked_again_where_they_are_replaced():
     """Also the axis, which would lose its last digit if it were divided by its length again."""
     settings = Settings(axis="1,2,3", cutoffs="1,2rmin", boundary="type=2", directions=9)
     again = dataclasses.replace(settings, seed=1)
@@ -159,8 +155,6 @@ def test_settings_are_frozen_and_checked_again_where_they_are_replaced():
         assert Settings(axis=",".join(map(repr, axis))).axis == axis
     with pytest.raises(SettingsError, match=r"^cutoff: expected"):
         dataclasses.replace(settings, cutoff=Length(-1.0))
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        settings.rv = 0.5
 
 
 SAID = [
@@ -184,10 +178,7 @@ def test_arguments_become_options(said, told):
     assert as_options(said) == told
 
 
-def test_no_name_is_declared_twice_and_reading_takes_the_declared_defaults():
-    flags = [one.flag for one in DECLARED.values()]
-    assert len(set(flags)) == len(flags)
-    assert set(OPTIONS) < set(DECLARED) > set(MEANINGS)
+def test_reading_takes_the_declared_defaults():
     signature = inspect.signature(scanfab.read_series).parameters
     options = {name: one.default for name, one in signature.items() if name != "source"}
     assert options == {name: OPTIONS[name].default for name in options}
@@ -226,10 +217,3 @@ def test_each_text_is_kept_and_what_filters_leave_is_passed_on_once(hidden, show
     others = ["of others"] if "module" not in hidden else []
     assert [str(one.message) for one in caught] == [*others, *shown]
     assert all(one.filename == __file__ for one in caught)
-
-
-def test_filters_may_make_errors_of_them():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", ScanfabWarning)
-        with pytest.raises(ScanfabWarning, match="choose another"):
-            told_in_a_function()
