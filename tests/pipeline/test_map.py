@@ -16,7 +16,7 @@ def mapped(packing, **options):
     """A map, and what was told."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        table = fabric_map(packing, **{**LINES, **options})
+        table = fabric_map(packing, **{"max_chords": 2e6, **LINES, **options})
     return table, [str(one.message) for one in caught]
 
 
@@ -53,7 +53,7 @@ def test_the_ellipsoid_of_an_open_whole_has_more_blocks_at_its_surface(packing):
 
 @pytest.mark.parametrize("variants", ["a", "b"])
 def test_blocks_together_are_the_row_of_compute(packing, variants):
-    blocks, _ = mapped(packing, grid=(3, 2, 1), variants=variants)
+    blocks, _ = mapped(packing, grid=(3, 2, 1), variants=variants, max_chords=1e7)
     (whole,) = row = compute(packing, variants=variants, **LINES)
     for name in ("segments", "grains", "rattlers", "contacts"):
         assert blocks[name].sum() == whole[name]
@@ -144,7 +144,7 @@ def test_dilute_blocks_within_a_surface_have_no_solid_fraction():
 @pytest.mark.parametrize("edge", ["clip", "start", "ends"])
 def test_the_rv_and_its_rules(packing, edge):
     """The window's blocks hold what the window holds, by each rule at its surface."""
-    words = {"variants": "c", "edge": edge, "rv": 0.9}
+    words = {"variants": "c", "edge": edge, "rv": 0.9, "max_chords": 1e7}
     table, _ = mapped(packing, grid=(2, 2, 2), **words)
     row = compute(packing, **LINES, **words)[0]
     assert table["segments"].sum() == pytest.approx(row.segments, abs=4)
@@ -156,11 +156,11 @@ def test_the_rv_and_its_rules(packing, edge):
 
 
 def test_the_median_block_meets_the_tolerance(packing):
-    words = {"directions": "auto", "spacing": "auto", "tolerance": 4e-3}
+    words = {"directions": "auto", "spacing": "auto", "tolerance": 4e-3, "max_chords": None}
     table, _ = mapped(packing, grid=(3, 3, 3), **words)
     assert np.median(table["alpha_vs_axial_se"]) <= 4e-3
     assert table["alpha_vs_axial_se"].max() > 4e-3 / 3
-    _, told = mapped(packing, grid=(3, 3, 3), **{**words, "tolerance": 1e-5}, max_chords=1e6)
+    _, told = mapped(packing, grid=(3, 3, 3), **{**words, "tolerance": 1e-5, "max_chords": 1e6})
     assert any("the tolerance is 1e-05: the scan stopped" in one for one in told)
 
 

@@ -43,10 +43,10 @@ def test_contacts_are_left_out_by_the_octant_of_their_point(packing, axis):
 
 
 def test_the_scatter_of_a_large_sample_is_no_noise_of_the_scan():
-    """Of 4,096 grains over 12 seeds: hidden by noise in none, and the same within 15 %."""
+    """Of 4,096 grains over 8 seeds: hidden by noise in none, and the same within 15 %."""
     large = find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 16)))
     options = {"variants": "c", "tolerance": 1e-3}
-    found = [compute(large, **options, seed=seed)[0].alpha_vs_axial_sample_se for seed in range(12)]
+    found = [compute(large, **options, seed=seed)[0].alpha_vs_axial_sample_se for seed in range(8)]
     assert None not in found
     assert np.std(found, ddof=1) < 0.15 * np.mean(found)
 
