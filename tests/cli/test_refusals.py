@@ -2,11 +2,11 @@
 
 import errno
 import json
+import os
 import re
 import shlex
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -18,8 +18,8 @@ from tests.helpers.truth import SAMPLE_DATA
 
 FILES = {
     "out.csv": "precious",
-    "old.html": "precious",
     "notes": "-",
+    "g.csv": "x,y,z,radius\n1,1,1,1\n1,1,3,1\n",
     "head.csv": "source,frame\n",
     "row.csv": json.dumps(curve()[0]),
     "map.csv": json.dumps({**curve()[0], "block": 0}),
@@ -34,15 +34,16 @@ LINES = [
     ("compute cube --quiet --verbose", 2, "--quiet and --verbose contradict each other"),
     ("compute one none", 2, "the sources have several settings files"),
     ("computee", 2, "there is no command 'computee': did you mean 'compute'?"),
-    ("nonsense", 2, "there is no command 'nonsense': the commands are compute, merge"),
     ("compute nowhere", 2, "nowhere: there is no such file, folder or glob"),
     ("compute -", 2, "standard input needs --format"),
     ("compute - . --format table", 2, "cannot be combined with other sources"),
-    ("compute cube --tolerence 1", 2, "No such option '--tolerence'"),
     # values of options
     ("compute cube --format nonsense", 2, "there is no reader called 'nonsense', only edem"),
     ("compute cube --columns radius", 2, "--columns: expected NAME=COLUMN"),
     ("compute cube --follow-for -1", 2, "--follow-for"),
+    ("compute cube --follow-for 0 --frames -2:", 1, "counts from the end of the series"),
+    ("compute cube --follow-for 0 --frames :-1", 1, "counts from the end of the series"),
+    ("compute cube --follow-for 0 --frames ::-1", 1, "counts from the end of the series"),
     ("compute cube cube/dump_0.txt --follow", 2, "--follow takes one folder, or one file"),
     ("compute cube --rv -1 -o out.csv", 2, "--rv: expected a fraction above 0"),
     ("map cube --slices 2 --frame 1", 2, "--frame: there is no frame 1: cube has 1, counted"),
@@ -57,7 +58,6 @@ LINES = [
     ("compute cube --vtk out.csv/vtk", 2, "out.csv/vtk"),
     ("compute cube --figure rose", 2, "--figure goes with --plot FILE"),
     ("compute cube --plot x.docx", 2, "figures can be written as .png, .svg, .pdf, not as"),
-    ("compute cube --plot x", 2, "without a suffix"),
     ("compute cube --plot no/x.png", 2, "there is no folder"),
     ("compute cube --plot x.png --figure pie", 2, "--figure: expected evolution"),
     ("compute cube other --plot x.png --figure rose", 2, "draws one series"),
@@ -68,21 +68,30 @@ LINES = [
     ("compare row.csv --differences", 1, "hold no two variants of one frame"),
     ("compare map.csv", 1, "a table of scanfab map, which scanfab report shows"),
     ("compare row.csv --variants ab", 1, "expected variants of the tables, c, found 'ab'"),
-    ("compare row.csv --variants x", 2, "--variants: expected letters out of abcd, found 'x'"),
     ("report row.csv -o r.pdf", 2, "reports are HTML"),
     ("report row.csv -o nowhere/r.html", 2, "there is no folder"),
     ("report row.csv --label a --label b -o r.html", 2, "expected one per table: 1, found 2"),
-    ("report row.csv", 2, "Missing option '-o'"),
-    ("report head.csv -o old.html", 1, "nothing to report"),
+    ("report head.csv -o r.html", 1, "nothing to report"),
     ("convert cube - --to csv", 2, "nothing is written to standard output"),
     ("view cube --screenshot x.jpg", 2, "screenshots are PNG files"),
     ("view cube --screenshot absent/x.png", 2, "there is no folder absent to write to"),
     # what does not fit the sample
     ("compute notes", 1, "no reader knows this format"),
     ("compute cube --spacing 50 -o out.csv", 1, "spacing: expected a length from"),
-    ("calibrate one", 1, "variant c has no void fabric at any cut-off"),
+    ("calibrate one --tolerance 0.1 --max-chords 1e5", 1, "variant c has no void fabric at any"),
     ("calibrate none", 1, "no frame has any grains"),
     ("view cube --screenshot x.png --frame 9", 1, "there is no frame 9"),
+    # an output that is an input, by whatever name or link
+    ("compute g.csv -o g.csv", 2, "g.csv: would replace the input g.csv"),
+    ("compute link.csv -o ./g.csv", 2, "g.csv: would replace the input link.csv"),
+    ("compute g.csv -o u.csv --manifest g.csv", 2, "would replace the input"),
+    ("compute cube --strain row.csv -o row.csv", 2, "would replace the input"),
+    ("map g.csv --slices 1 -o g.csv", 2, "would replace the input"),
+    ("calibrate g.csv -o g.csv", 2, "would replace the input"),
+    ("compare row.csv -o row.csv", 2, "would replace the input"),
+    ("merge row.csv -o row.csv", 2, "would replace the input"),
+    ("convert g.csv link.csv", 2, "would replace the input"),
+    ("convert g.csv link.csv --frames 0:0", 2, "--frames chooses none"),
     # what is of space, of discs
     ("compute {DISCS} --axis 0,1,1", 2, "--axis: the axis (0, 0.7071, 0.7071) leads out of"),
     ("map {DISCS}", 2, "a map needs spheres, but all grains are discs"),
@@ -97,68 +106,18 @@ def test_one_message_and_nothing_else(tmp_path, monkeypatch, ask, line, code, me
         f"{name}/dump_0.txt": dump_text(cubic_rows()[:count], box=((0, 4),) * 3)
         for name, count in (("cube", 64), ("other", 64), ("one", 1), ("none", 0))
     }
-    for name, text in {**FILES, **dumps}.items():
+    before = {**FILES, **dumps}
+    for name, text in before.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         write(tmp_path / name, text)
+    os.symlink("g.csv", "link.csv")
     answer = ask(*shlex.split(line.format(DISCS=DISCS)), code=code)
     assert message in answer.told
     assert "error: " in answer.err.lower()
     assert answer.out == ""
-    left = [path for path in tmp_path.rglob("*") if path.is_file()]
-    assert {str(path.relative_to(tmp_path)): path.read_text() for path in left} == {
-        **FILES,
-        **dumps,
-    }
-
-
-# no command writes over a file that it reads, by whatever name or link
-
-QUIET = (*FAST, "--quiet")
-
-
-@pytest.fixture
-def files(tmp_path, monkeypatch, ask):
-    """A packing as CSV with a link to it, and its table."""
-    monkeypatch.chdir(tmp_path)
-    write(tmp_path / "dump.1", dump_text(cubic_rows(), box=((0, 4),) * 3))
-    ask("convert", "dump.1", "g.csv", "--quiet")
-    (tmp_path / "link.csv").symlink_to("g.csv")
-    ask("compute", "g.csv", *QUIET, "-o", "t.csv")
-    return {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-
-
-OVER_INPUTS = [
-    ("compute", "g.csv", *QUIET, "-o", "g.csv"),
-    ("compute", "link.csv", *QUIET, "-o", "./g.csv"),
-    ("compute", "g.csv", *QUIET, "-o", "u.csv", "--manifest", "g.csv"),
-    ("map", "g.csv", "--slices", "1", *QUIET, "-o", "g.csv"),
-    ("calibrate", "g.csv", "-o", "g.csv"),
-    ("compare", "t.csv", "-o", "t.csv"),
-    ("merge", "t.csv", "-o", "t.csv"),
-    ("convert", "g.csv", "g.csv"),
-    ("convert", "g.csv", "link.csv", "--frames", "0:0"),
-    ("compute", "dump.1", "--strain", "t.csv", *QUIET, "-o", "t.csv"),
-]
-
-
-@pytest.mark.parametrize("command", OVER_INPUTS)
-def test_an_output_that_is_an_input_is_refused(files, tmp_path, ask, command):
-    answer = ask(*command, code=2)
-    assert "input" in answer.told or "chooses none" in answer.told
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == files
-
-
-def test_a_device_takes_a_table_and_an_old_table_is_replaced(files, tmp_path, ask):
-    before = sys.stdout
-    ask("compute", "g.csv", *QUIET, "-o", "/dev/null")
-    ask("compute", "g.csv", *QUIET, "-o", "/dev/null", "--plot", "x.doc", code=2)
-    assert sys.stdout is before
-    assert not sys.stdout.closed
-    # an old table beside the dumps is no input
-    (tmp_path / "dumps").mkdir()
-    shutil.copy("dump.1", "dumps")
-    for _ in range(2):
-        ask("compute", "dumps", *QUIET, "-o", "dumps/t.csv")
+    assert os.readlink("link.csv") == "g.csv"
+    left = [path for path in tmp_path.rglob("*") if path.is_file() and not path.is_symlink()]
+    assert {str(path.relative_to(tmp_path)): path.read_text() for path in left} == before
 
 
 # frames that are broken, or of which little is left
@@ -170,6 +129,12 @@ def grains(folder: Path, rows=None, name="dump_0.txt", **options) -> Path:
     return write(folder / name, dump_text(rows, box=((0, 4),) * 3, **options))
 
 
+def test_a_device_takes_a_table_and_an_old_table_beside_the_dumps_is_no_input(tmp_path, ask):
+    grains(tmp_path)
+    for output in ("/dev/null", tmp_path / "t.csv", tmp_path / "t.csv"):
+        ask("compute", tmp_path, *FAST, "-o", output)
+
+
 def changed(column: int, value: object) -> list[list[object]]:
     """The cube's rows with another value for the grain 7."""
     rows = [list(row) for row in cubic_rows()]
@@ -177,16 +142,13 @@ def changed(column: int, value: object) -> list[list[object]]:
     return rows
 
 
-def test_a_broken_frame_can_be_skipped_also_the_first(tmp_path, ask):
-    """Of three frames the second one has a radius of zero, then the first one, too."""
-    for frame, rows in enumerate((cubic_rows(), changed(5, 0), cubic_rows())):
+def test_broken_frames_can_be_skipped_also_the_first(tmp_path, ask):
+    """Of three frames two have a radius of zero."""
+    for frame, rows in enumerate((changed(5, 0), changed(5, 0), cubic_rows())):
         grains(tmp_path, rows, name=f"dump_{frame}.txt", step=frame)
     answer = ask("compute", *FAST, tmp_path, "--on-error", "skip", code=1)
-    assert [row["frame"] for row in answer.rows] == list("0022")
-    assert f"frame 1 skipped: {tmp_path}/dump_1.txt: grain 7" in answer.err
-    grains(tmp_path, changed(5, 0), step=0)
-    answer = ask("compute", *FAST, tmp_path, "--on-error", "skip", code=1)
     assert {row["frame"] for row in answer.rows} == {"2"}
+    assert f"frame 1 skipped: {tmp_path}/dump_1.txt: grain 7" in answer.err
 
 
 def test_one_grain_far_away_is_too_far_for_the_whole_alone(tmp_path, ask):
@@ -198,7 +160,7 @@ def test_one_grain_far_away_is_too_far_for_the_whole_alone(tmp_path, ask):
 def test_an_rv_at_the_surface_is_a_warning(tmp_path, ask):
     file, told = grains(tmp_path, cubic_rows(8)), "comes closer to the sample's surface than the"
     for rv, is_told in (("0.9", True), ("0.7", False)):
-        assert (told in ask("compute", *FAST, file, "--rv", rv).err) == is_told
+        assert (told in ask("compute", *FAST, file, "--rv", rv, "--variants", "c").err) == is_told
 
 
 def test_grains_that_are_removed_leave_no_void_fabric_and_no_solid(tmp_path, ask):
@@ -211,9 +173,6 @@ def test_grains_that_are_removed_leave_no_void_fabric_and_no_solid(tmp_path, ask
     assert "nan" not in answer.out.lower()
     assert "variant b: no grain but rattlers is left" in answer.err
     assert "variant d: no grain but rattlers reaches into the RV" in answer.err
-    alone = ask("compute", *FAST, grains(tmp_path, cubic_rows()[:1]), "--variants", "abc", code=1)
-    assert {row["alpha_vs"] for row in alone.rows} == {""}
-    assert "nan" not in alone.out.lower()
 
 
 FORBIDDEN = [
@@ -237,7 +196,6 @@ def test_what_nobody_may_read_or_write(tmp_path, ask, monkeypatch, where, words)
 
 
 CLOSED = [
-    ("inspect FILE >&-", "standard output is closed"),
     ("formats >&-", "standard output is closed"),
     ("compute - --format liggghts <&-", "standard input: expected a dump"),
 ]
@@ -245,10 +203,9 @@ CLOSED = [
 
 @pytest.mark.skipif(shutil.which("sh") is None, reason="needs a POSIX shell to close a stream")
 @pytest.mark.parametrize(("words", "message"), CLOSED)
-def test_a_standard_stream_that_is_closed(tmp_path, words, message):
-    command = f"{shlex.join(PROGRAM)} {words.replace('FILE', str(grains(tmp_path)))}"
-    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False)
+def test_a_standard_stream_that_is_closed(words, message):
+    command = ["sh", "-c", f"{shlex.join(PROGRAM)} {words}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert message in done.stderr
-    assert "Traceback" not in done.stderr
-    assert "Exception" not in done.stderr
+    assert not re.search("Traceback|Exception", done.stderr)
