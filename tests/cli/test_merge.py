@@ -3,11 +3,9 @@
 import json
 import shutil
 from collections.abc import Callable
-from functools import reduce
-from operator import getitem
 from pathlib import Path
-from typing import Any
 
+import polars as pl
 import pytest
 
 import scanfab
@@ -19,7 +17,8 @@ FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--w
 
 
 def compute(source: Path, output: Path, *words: str) -> str:
-    assert run(["compute", str(source), *FAST, "-o", str(output), *words]) in (0, 1)
+    code = run(["compute", str(source), *FAST, "-o", str(output), *words])
+    assert code == 0 or "skip" in words
     return str(output)
 
 
@@ -91,7 +90,9 @@ def test_several_series_become_one_table(series, tmp_path):
 
 
 def test_without_any_void_fabric_the_exit_code_is_1(series, tmp_path):
-    part = compute(series, tmp_path / "part.csv", "--frames", "0", "--cutoff", "100")
+    part = str(tmp_path / "part.csv")
+    words = ("--frames", "0", "--cutoff", "100", "-o", part)
+    assert run(["compute", str(series), *FAST, *words]) == 1
     assert run(["merge", part, "--frames", "0"]) == 1
 
 
@@ -133,13 +134,10 @@ def test_other_settings_and_missing_parts_are_named(parts, series, tmp_path, ref
 def test_a_frame_twice_is_to_have_the_same_values(parts, whole, series, tmp_path, refused):
     again = Path(compute(series, tmp_path / "again.csv", "--frames", "1:3"))
     assert merge(*parts, str(again), output=tmp_path / "once.csv") == whole.read_bytes()
-    lines = again.read_text().splitlines(keepends=True)
-    cells = lines[1].split(",")
-    cells[14] = str(int(cells[14]) + 1)
-    again.write_text(lines[0] + ",".join(cells) + "".join(lines[2:]))
+    with_value("lines", "7")(again)
     said = refused(*parts, str(again))
     assert f"{again}: frame 1 of " in said
-    assert f"has other values than in {parts[1]}: lines is {cells[14]} here" in said
+    assert f"has other values than in {parts[1]}: lines is 7 here" in said
 
 
 def cut(kept: int) -> Callable[[Path], object]:
@@ -147,29 +145,20 @@ def cut(kept: int) -> Callable[[Path], object]:
     return lambda part: part.write_text("".join(part.read_text().splitlines(True)[:kept]))
 
 
-def told(value: Any, *place: Any) -> Callable[[Path], object]:
-    """Puts another value into the manifest of a part."""
+def told(old: str, new: str) -> Callable[[Path], object]:
+    """Puts other words into the manifest of a part."""
 
     def spoil(part: Path) -> None:
-        path = Path(f"{part}.manifest.json")
-        manifest = json.loads(path.read_text())
-        *outer, last = place
-        reduce(getitem, outer, manifest)[last] = value
-        path.write_text(json.dumps(manifest))
+        manifest = Path(f"{part}.manifest.json")
+        manifest.write_text(manifest.read_text().replace(old, new))
 
     return spoil
 
 
-def with_nan(part: Path) -> None:
-    head, row, *rest = part.read_text().splitlines()
-    cells = row.split(",")
-    cells[head.split(",").index("mean_length")] = "nan"
-    part.write_text("\n".join([head, ",".join(cells), *rest, ""]))
-
-
-def with_foreign_column(part: Path) -> None:
-    first, *lines = part.read_text().splitlines()
-    part.write_text("\n".join([f"{first},mine", *(f"{line},1" for line in lines), ""]))
+def with_value(column: str, value: str) -> Callable[[Path], object]:
+    """Puts a value into all rows of a part."""
+    cell = pl.lit(value).alias(column)
+    return lambda part: pl.read_csv(part, infer_schema=False).with_columns(cell).write_csv(part)
 
 
 SPOILT = [
@@ -178,12 +167,10 @@ SPOILT = [
     (1, lambda part: Path(f"{part}.manifest.json").unlink(), "there is no part_1.csv.manifest"),
     (1, lambda part: part.rename(f"{part}.part"), "is not finished"),
     (1, Path.unlink, "cannot be read: No such file"),
-    (1, with_nan, "found nan in the column mean_length"),
-    (0, with_foreign_column, "nothing here makes its columns mine"),
-    (0, told(5, "inputs", 0), "expected a manifest of scanfab compute"),
-    (1, lambda part: Path(f"{part}.manifest.json").write_text("9" * 5000), "expected a manifest"),
-    (0, told("gone.csv", "settings", "strain"), "the manifest cannot be used: strain"),
-    (2, told("0" * 64, "inputs", 1, "sha256"), "dump_100.txt has changed between the jobs"),
+    (1, with_value("mean_length", "nan"), "found nan in the column mean_length"),
+    (0, with_value("mine", "1"), "nothing here makes its columns mine"),
+    (0, told('"strain": "auto"', '"strain": "gone.csv"'), "the manifest cannot be used: strain"),
+    (2, told('"sha256": "', '"sha256": "0'), "dump_0.txt has changed between the jobs"),
 ]
 
 
@@ -206,10 +193,7 @@ def test_a_part_that_lost_its_end_is_named(series, tmp_path, suffix, refused):
     assert run(["compute", str(series), *FAST, *words]) == 1
 
 
-def test_the_library_merges(parts, whole, tmp_path, capsys):
-    assert scanfab.merge_tables(parts, tmp_path / "merged.csv") == scanfab.load(whole)
-    assert (tmp_path / "merged.csv").read_bytes() == whole.read_bytes()
-    assert run(["merge", *parts]) == 0
-    assert capsys.readouterr().out == whole.read_text()
+def test_without_a_name_the_table_is_printed_and_without_parts_there_is_none(parts, whole, ask):
+    assert ask("merge", *parts).out == whole.read_text()
     with pytest.raises(scanfab.SettingsError, match="found none"):
         scanfab.merge_tables([])
