@@ -2,6 +2,7 @@
 
 import csv
 import io
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -30,10 +31,11 @@ class Answer(NamedTuple):
 
 
 @pytest.fixture
-def ask(capsys) -> Callable[..., Answer]:
+def ask(capsys, monkeypatch) -> Callable[..., Answer]:
     """Run a command that ends with this exit code, and never with a traceback."""
 
-    def call(*words: object, code: int = 0) -> Answer:
+    def call(*words: object, code: int = 0, stdin: bytes = b"") -> Answer:
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(stdin)))
         capsys.readouterr()
         assert run([str(word) for word in words]) == code
         answer = Answer(*capsys.readouterr())

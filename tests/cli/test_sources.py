@@ -2,7 +2,6 @@
 
 import gzip
 import json
-from types import SimpleNamespace
 
 import pytest
 
@@ -16,31 +15,21 @@ CASES = {
 }
 
 
-@pytest.fixture
-def by_stdin(tmp_path, monkeypatch, ask):
-    def told(data, *words, code=0):
-        file = tmp_path / "stdin"
-        file.write_bytes(data)
-        with open(file, "rb") as stream:
-            monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=stream))
-            return ask(*words, "-", "--format", "table", code=code)
-
-    return told
-
-
 @pytest.mark.parametrize("packed", [False, True])
 @pytest.mark.parametrize(("text", "message"), CASES.items())
-def test_errors_and_warnings_name_standard_input(by_stdin, text, message, packed):
+def test_errors_and_warnings_name_standard_input(ask, text, message, packed):
     data = gzip.compress(text.encode()) if packed else text.encode()
-    answer = by_stdin(data, "inspect", "--verbose", code=int("error" in message))
+    words = ("inspect", "--verbose", "-", "--format", "table")
+    answer = ask(*words, stdin=data, code=int("error" in message))
     assert message in answer.err + answer.out
     assert "scanfab-" not in answer.err + answer.out
 
 
-def test_so_do_warnings_in_results_and_manifests(by_stdin, tmp_path):
-    answer = by_stdin(b"x,y,z,radius\n1,2,3,4", "inspect", "--json")
+def test_so_do_warnings_in_results_and_manifests(ask, tmp_path):
+    words, data = ("-", "--format", "table"), b"x,y,z,radius\n1,2,3,4"
+    answer = ask("inspect", *words, "--json", stdin=data)
     assert json.loads(answer.out)["warnings"][0].startswith("standard input: the last line")
-    by_stdin(b"x,y,z,radius\n1,2,3,4", "compute", "-o", tmp_path / "out.csv", code=1)
+    ask("compute", *words, "-o", tmp_path / "out.csv", stdin=data, code=1)
     told = json.loads((tmp_path / "out.csv.manifest.json").read_text())["warnings"]
     assert any("standard input: the last line" in one for one in told)
 
@@ -52,21 +41,14 @@ KEYS = (
 )
 
 
-@pytest.fixture
-def frames(ask):
-    def frames(*words):
-        return [json.loads(line) for line in ask("inspect", "--json", *words).out.splitlines()]
-
-    return frames
-
-
-def test_json_is_an_object_a_line_with_what_the_reader_sees(tmp_path, frames):
+def test_json_is_an_object_a_line_with_what_the_reader_sees(tmp_path, ask):
     """Of a box that is periodic along x and y; the first frame has a contact file."""
     for frame in (0, 1):
         text = dump_text(cubic_rows(), step=10 * frame, box=((0, 4),) * 3, flags=" pp pp ff")
         write(tmp_path / f"dump_{frame}.txt", text)
     write(tmp_path / "pairs_0.txt", pairs_text())
-    first, second = frames(tmp_path, "--boundary", "id>=63")
+    told = ask("inspect", "--json", tmp_path, "--boundary", "id>=63").out
+    first, second = map(json.loads, told.splitlines())
     assert list(first) == list(second) == KEYS.split()
     assert [(one["frame"], one["step"]) for one in (first, second)] == [(0, 0), (1, 10)]
     expected = {
@@ -78,16 +60,6 @@ def test_json_is_an_object_a_line_with_what_the_reader_sees(tmp_path, frames):
     assert set(first["columns"]) == {"id", "type", "x", "y", "z", "radius"}
     assert 0 < first["radius_min"] < first["radius_max"]
     assert "no contact file for step 10" in second["warnings"][0]
-
-
-def test_it_takes_the_options_of_compute(tmp_path, frames):
-    file = write(tmp_path / "dump.txt", dump_text(names="id type x y z mass"))
-    words = ("--cell", "2", "2", "2", "--radius", "0.2", "--cell", "1", "1", "1", "--periodic", "z")
-    (frame,) = frames(file, *words, "--rv-shape", "cylinder")
-    assert frame["radius_max"] == 0.2
-    assert frame["cell"] == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    assert frame["periodic"] == [False, False, True]
-    assert frame["rv_shape"].startswith("cylinder of radius ")
 
 
 def test_notes_name_the_series_if_there_are_several(ask, tmp_path):
