@@ -45,32 +45,25 @@ def test_a_file_is_looked_for_beside_the_settings_file_first(
     monkeypatch.chdir(tmp_path_factory.mktemp("elsewhere"))
     write(series / "strain.csv", "frame,strain\n0,0.25\n")
     write(series / "box.csv", "frame,lx,ly,lz\n0,4,4,4\n")
-    text = 'strain = "strain.csv"\ncell = "box.csv"\ncontacts = "geometric"\nvariants = "a"'
-    write(series / "scanfab.toml", f"[compute]\n{FAST}{text}\n")
     write(Path("elsewhere.csv"), "frame,strain\n0,0.5\n")
-    (row,) = ask("compute", series).rows
-    # without a cell a whole has no solid fraction
-    assert row["strain"] == "0.25"
-    assert row["solid_fraction"] != ""
-    write(
-        series / "scanfab.toml", f"[compute]\n{FAST}{text.replace('strain.csv', 'elsewhere.csv')}\n"
-    )
-    assert ask("compute", series).rows[0]["strain"] == "0.5"
+    text = 'cell = "box.csv"\ncontacts = "geometric"\nvariants = "a"\nstrain ='
+    for name, strain in (("strain.csv", "0.25"), ("elsewhere.csv", "0.5")):
+        write(series / "scanfab.toml", f'[compute]\n{FAST}{text} "{name}"\n')
+        (row,) = ask("compute", series).rows
+        assert row["strain"] == strain
+        # without a cell a whole has no solid fraction
+        assert row["solid_fraction"] != ""
 
 
 MEANINGLESS = [
     ("[view]\ncolour = 1", "'view' is not known: put options into the section [compute]"),
-    ("rv = 0.6\n[compute]", "'rv' is not known"),
     ('[compute]\nvariant = "a"', "'variant' cannot be set in a settings file: did you mean"),
     ("[compute]\nresume = true", "'resume' cannot be set"),
-    ("[compute", "Expected"),
     (f"[compute]\nrv = {'[' * 20_000}{']' * 20_000}", ""),
     ("[compute]\ncutoff = 1rmin # one", "text needs quotes"),
     ("[compute]\nrv-center = [[1, 2], 2, 3]", "rv-center: expected three finite numbers"),
     ("[compute]\nrv = false", "rv: expected a fraction above 0"),
-    ("[compute]\nframes = 2020-01-01", "frames: expected a slice such as"),
     ('[compute]\nseed = "many"', "seed: expected 0 or more, found 'many'"),
-    ('[compute]\nrv-axis = "x"', "rv-axis Usage"),
     ('[compute]\nrv-axis = "x"', "--rv-axis: has no meaning if --rv-shape is sphere"),
 ]
 
@@ -81,12 +74,6 @@ def test_what_has_no_meaning_is_refused_with_the_name_of_the_file(series, ask, t
     told = ask("compute", series, code=2).told
     assert f"{series}/scanfab.toml" in told
     assert message in told
-
-
-@pytest.mark.parametrize("command", ["inspect", "calibrate", "view", "map"])
-def test_every_command_refuses_a_broken_file(series, ask, command):
-    write(series / "scanfab.toml", '[compute]\nvariant = "a"\n')
-    assert "'variant' cannot be set" in ask(command, series, code=2).told
 
 
 def test_every_command_says_which_options_it_takes(series, ask):
