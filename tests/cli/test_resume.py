@@ -344,6 +344,7 @@ def test_a_dump_of_many_snapshots_may_grow(begun, compute, series, is_whole):
     assert is_whole("t.csv", **dump)
 
 
+@pytest.mark.parametrize("begun", ["table"], indirect=True)
 def test_a_surface_that_has_changed_is_refused(begun, is_refused):
     words = ("--rv-shape", surface("box.ply", 2 + corners_of_a_box(1.2)))
     left = begun(*words)
@@ -351,10 +352,13 @@ def test_a_surface_that_has_changed_is_refused(begun, is_refused):
     assert is_refused(left, "box.ply has changed since", *words)
 
 
-NUMBERS = [("--strain", "step,strain", "0.1"), ("--cell", "step,lx,ly,lz", "4,4,4")]
+NUMBERS = [
+    ("part", "--strain", "step,strain", "0.1"),
+    ("table", "--cell", "step,lx,ly,lz", "4,4,4"),
+]
 
 
-@pytest.mark.parametrize(("option", "header", "row"), NUMBERS)
+@pytest.mark.parametrize(("begun", "option", "header", "row"), NUMBERS, indirect=["begun"])
 def test_numbers_of_the_frames_may_only_get_more_lines(
     begun, compute, last_frame, is_refused, is_whole, option, header, row
 ):
