@@ -34,12 +34,9 @@ def test_it_is_drawn_and_written_for_paraview(table):
     assert table.with_name("map.png").stat().st_size > 10_000
     collection = table.with_name("vtk") / "map-a.pvd"
     assert collection.read_text().count("map-a_00000") == 5
-    mesh = pyvista.read(collection.with_name("map-a_000001.vtu"))
-    rows = scanfab.load(table)[2:4]
-    fabric = [row.alpha_vs_axial for row in rows]
-    assert mesh.cell_data["alpha_vs_axial"].tolist() == pytest.approx(fabric)
     # blocks are where their rows say they are
-    assert mesh.cell_centers().points[:, 0].tolist() == pytest.approx([row.x for row in rows])
+    centers = pyvista.read(collection.with_name("map-a_000001.vtu")).cell_centers().points
+    assert centers[:, 0].tolist() == pytest.approx([row.x for row in scanfab.load(table)[2:4]])
 
 
 def test_a_frame_that_is_named_overrides_the_settings_file(series, tmp_path, monkeypatch, ask):
@@ -66,14 +63,12 @@ def test_several_rvs_are_told_apart(series, ask, tmp_path):
     table, both = tmp_path / "table.csv", ("--variants", "ac", "--rv", "0.7,0.5")
     ask("compute", series, *FAST, *both, "-o", table, "--vtk", tmp_path)
     rows = ask("compare", table, "--summary").rows
-    assert list(rows[0])[-1] == "rv"
     assert [(row["variant"], row["rv"]) for row in rows] == [("a", ""), ("c", "0.5"), ("c", "0.7")]
     found = scanfab.load(table).compare()
     # each as from a table of its own
     for rv in (0.5, 0.7):
         (alone,) = scanfab.load(table).select(rv=rv).compare().summary
         assert alone in list(found.summary)
-    assert "variant c RV 0.5: slope" in repr(found)
     pairs = {row.variants for row in found.differences}
     assert pairs == {"a-c RV 0.5", "a-c RV 0.7", "c RV 0.5-c RV 0.7"}
     names = {path.name.rpartition("_")[0] for path in tmp_path.glob("*.vtp")}
