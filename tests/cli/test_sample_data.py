@@ -2,10 +2,8 @@
 
 import compileall
 import os
-import re
 import subprocess
 import sys
-import tomllib
 import zipfile
 from importlib import import_module
 from pathlib import Path
@@ -29,14 +27,11 @@ def files_in(folder: Path) -> dict[str, bytes]:
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
     """The wheel of this checkout."""
-    build = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["build-system"]
-    for name in build["requires"]:
-        module = re.split(r"\W", name.replace("-", "_"))[0]
-        pytest.importorskip(module, reason=f"{name} is not installed, which builds the wheel")
+    for name in ("hatchling", "hatch_vcs"):
+        pytest.importorskip(name, reason=f"{name} is not installed, which builds the wheel")
     folder = tmp_path_factory.mktemp("wheel")
     words = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
-    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    subprocess.run(words, cwd=ROOT, check=True)
     return zipfile.ZipFile(*folder.glob("*.whl"))
 
 
@@ -54,12 +49,10 @@ def test_an_installed_wheel_copies_its_samples(wheel: zipfile.ZipFile, tmp_path:
     wheel.extractall(tmp_path / "site")
     compileall.compile_dir(tmp_path / "site" / "scanfab" / "_samples", quiet=1)  # as pip does
     run = "import scanfab; from scanfab.cli.main import main; print(scanfab.__file__); main()"
-    done = subprocess.run(
-        [sys.executable, "-c", run, "sample-data", "sample_data"], cwd=tmp_path, text=True,
-        env={**os.environ, "PYTHONPATH": str(tmp_path / "site")}, capture_output=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith(str(tmp_path / "site"))
+    words = [sys.executable, "-c", run, "sample-data", "sample_data"]
+    env = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}
+    out = subprocess.check_output(words, cwd=tmp_path, text=True, env=env)
+    assert out.startswith(str(tmp_path / "site"))
     shipped = {str(path.relative_to(SAMPLE_DATA)) for path in figures.shipped_samples()}
     copied, own = files_in(tmp_path / "sample_data"), files_in(SAMPLE_DATA)
     assert copied == {name: data for name, data in own.items() if name in shipped}
@@ -73,16 +66,13 @@ def test_a_checkout_copies_all_its_samples(ask, tmp_path: Path) -> None:
         assert f"try scanfab compute {tmp_path / name}/yade_triaxial --boundary" in answer.told
     assert files_in(tmp_path / "new") == files_in(tmp_path / "empty") == files_in(SAMPLE_DATA)
     assert ask("sample-data", tmp_path / "quiet", "--quiet").err == ""
-    assert len(scanfab.read_series(tmp_path / "quiet" / "liggghts_periodic")) == 5
 
 
 def test_a_place_that_holds_something_is_refused_and_kept(ask, tmp_path) -> None:
     (tmp_path / "mine.txt").write_text("mine")
     for place in (tmp_path, tmp_path / "mine.txt"):
         told = ask("sample-data", place, code=2).told
-        words = "holds something already: name a new or an empty folder"
-        assert told.endswith(f"Error: {place}: {words}")
-    assert "Missing argument 'DIR'" in ask("sample-data", code=2).told
+        assert told.endswith(f"{place}: holds something already: name a new or an empty folder")
     assert (tmp_path / "mine.txt").read_text() == "mine"
     assert len(list(tmp_path.iterdir())) == 1
 
