@@ -35,9 +35,7 @@ def test_tables_on_a_terminal_are_not_cut(ask, monkeypatch, width):
     for title in ("rmin", "α_vs axial", "± scan", "± sample", "steady"):
         assert title in heads[0]
     assert {"0.123", "0.00123", "0.0123", "yes"} <= set(table[1].split())
-    present = [title in heads[0] for title in ("seconds", "rule", "segments", "bias")]
-    assert present == sorted(present, reverse=True)
-    assert all(present) == (width == 160)
+    assert all(one in heads[0] for one in ("rule", "segments", "bias")) == (width == 160)
     head = ask("calibrate", TRIAXIAL, *QUICK, "--fields", "ladder,value").out.splitlines()[0]
     assert head.split() == ["ladder", "value"]
 

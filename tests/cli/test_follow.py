@@ -16,9 +16,9 @@ from scanfab.base.errors import ReadError, SettingsError
 from scanfab.cli.main import run
 from tests.helpers.dumps import cubic_rows, dump_text, pairs_text
 from tests.helpers.growing import in_halves, meanwhile, sample_frames, until
-from tests.helpers.interruptions import PROGRAM
+from tests.helpers.interruptions import FAST, PROGRAM
 
-FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--workers", "1")
+QUICK = (*FAST, "--workers", "1")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
 
 
@@ -44,11 +44,11 @@ def copied(folder: Path, files: list[Path], pause: float = 0.02) -> list:
 
 
 def follow(*words: str, seconds: float) -> int:
-    return run(["compute", "dumps", *FAST, "--follow-for", str(seconds), "-o", "t.csv", *words])
+    return run(["compute", "dumps", *QUICK, "--follow-for", str(seconds), "-o", "t.csv", *words])
 
 
 def finished_run(*words: str) -> bytes:
-    assert run(["compute", "dumps", *FAST, "-o", "finished.csv", *words]) in (0, 1)
+    assert run(["compute", "dumps", *QUICK, "-o", "finished.csv", *words]) in (0, 1)
     return Path("finished.csv").read_bytes()
 
 
@@ -119,7 +119,7 @@ def test_the_first_signal_ends_it_in_order(folder, files, capfd):
         cut = partial(half.write_bytes, files[count].read_bytes()[:300])
         there = partial(until, partial(has_rows, lines))
         thread = meanwhile([there, cut, partial(os.kill, os.getpid(), sent)])
-        assert run(["compute", "dumps", *FAST, "--follow", "-o", "t.csv", "--resume"]) == 0
+        assert run(["compute", "dumps", *QUICK, "--follow", "-o", "t.csv", "--resume"]) == 0
         thread.join()
         assert "finishing frames under way" in capfd.readouterr().err
         assert not Path("t.csv.part").exists()
@@ -129,7 +129,7 @@ def test_the_first_signal_ends_it_in_order(folder, files, capfd):
 
 def test_a_second_signal_interrupts(folder):
     (folder / "dump_0.txt").write_text(dump_text(cubic_rows(), box=((0, 4),) * 3))
-    words = [*PROGRAM, "compute", "dumps", *FAST, "--follow", "-o", "t.csv"]
+    words = [*PROGRAM, "compute", "dumps", *QUICK, "--follow", "-o", "t.csv"]
     with subprocess.Popen(words) as process:
         for sent in (signal.SIGSTOP, signal.SIGTERM, signal.SIGINT, signal.SIGCONT):
             process.send_signal(sent)
@@ -179,7 +179,7 @@ def test_strains_that_are_added_are_taken_and_a_cut_snapshot_is_told(folder, fil
     assert is_followed(steps, 2, "--strain", "strains.csv", "--contacts", "geometric")
     (folder / "all.txt").write_bytes(files[0].read_bytes() + files[1].read_bytes()[:200])
     capsys.readouterr()
-    assert run(["compute", "dumps/all.txt", *FAST, "--follow-for", "0.3"]) == 0
+    assert run(["compute", "dumps/all.txt", *QUICK, "--follow-for", "0.3"]) == 0
     assert "the last snapshot, number 2, is incomplete and is left out" in capsys.readouterr().err
 
 
@@ -218,7 +218,7 @@ def test_the_plot_is_drawn_again(folder, files, monkeypatch):
     drawn, save = [], "scanfab.viz.figures.figure.save_figures"
     monkeypatch.setattr(save, lambda path, figures: drawn.append(path))
     steps = [*copied(folder, files[:2]), partial(until, lambda: drawn), *copied(folder, files[2:])]
-    assert is_followed(steps, 5, "--plot", "p.png")
+    assert is_followed(steps, 5, "--plot", "p.png", "--figure", "evolution")
     assert len(drawn) >= 3
 
 
