@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,10 @@ from scanfab.cli import group, main
 from tests.helpers.interruptions import FAST, PROGRAM
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
+
+
+def test_version_is_the_package_s(ask) -> None:
+    assert ask("--version").out == f"scanfab {version('scanfab')}\n"
 
 
 HEAVY = "numpy numba scipy pyvista meshio rich matplotlib jinja2 polars vtkmodules PIL"
