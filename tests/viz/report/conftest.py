@@ -1,8 +1,12 @@
 """What tests of the report share: tables in files, and reports without figures."""
 
+from contextlib import chdir
+
 import pytest
 
+import scanfab
 from scanfab.viz.report.page import Picture
+from tests.conftest import ROOT
 
 
 @pytest.fixture
@@ -17,3 +21,10 @@ def undrawn(monkeypatch):
     monkeypatch.setattr(
         "scanfab.viz.report.report.picture_of", lambda figure, _: Picture("", figure.caption, 1)
     )
+
+
+@pytest.fixture(scope="session")
+def sample_report(computed):
+    """Of the sample's table, opened from the repository."""
+    with chdir(ROOT):
+        return scanfab.report(computed.table)

@@ -1,13 +1,9 @@
 """The report in a real browser: it works alone, and the view turns."""
 
-from contextlib import chdir
-
 import pytest
 
 pytest.importorskip("selenium")
 
-import scanfab
-from tests.conftest import ROOT
 from tests.viz.report.browser import Browser, missing
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
@@ -43,10 +39,9 @@ def browser():
 
 
 @pytest.fixture(scope="module")
-def report(computed, tmp_path_factory):
+def report(sample_report, tmp_path_factory):
     page = tmp_path_factory.mktemp("report") / "report.html"
-    with chdir(ROOT):
-        scanfab.report(computed.table).save(page)
+    sample_report.save(page)
     return page
 
 

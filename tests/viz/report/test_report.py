@@ -4,7 +4,6 @@ import json
 import math
 import re
 import shutil
-from contextlib import chdir
 from datetime import date
 from html import unescape
 from pathlib import Path
@@ -33,11 +32,10 @@ def copied(computed, tmp_path, monkeypatch):
     return table
 
 
-@pytest.fixture(scope="module")
-def page(computed):
+@pytest.fixture
+def page(sample_report):
     """The sample's report."""
-    with chdir(ROOT):
-        return page_of([computed.table])
+    return sample_report.page
 
 
 def change(table: Path, **changes):
