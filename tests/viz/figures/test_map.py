@@ -62,11 +62,9 @@ def test_a_grid_without_one_of_its_blocks_is_refused(packing):
 
 def test_frames_without_grains_are_not_drawn(packing):
     nothing = Packing(np.zeros((0, 3)), 1.0, contacts=np.zeros((0, 2), int), cell=packing.cell)
-    for blocks in ({"grid": (2, 2, 2)}, {"slices": 2}, {"shells": 2}):
-        figure = Map(mapped([nothing, packing, nothing], **blocks))
-        assert [row["frame"] for row in figure.frames[0]] == [1] * len(figure.frames[0])
-        assert len(figure.frames) == 1
-        page_of(figure)
+    figure = Map(mapped([nothing, packing, nothing], grid=(2, 2, 2)))
+    assert [[row["frame"] for row in rows] for rows in figure.frames] == [[1] * 8]
+    page_of(figure)
 
 
 def test_a_quantity_that_the_last_frame_lacks_leaves_its_planes_empty(packing):
