@@ -84,28 +84,19 @@ def test_the_surface_gives_back_the_tensor(computed):
         assert share.sum() == pytest.approx(row["mean_length"], rel=2e-3)
 
 
-@pytest.mark.filterwarnings(
-    "ignore:frames? .* above the tolerance:scanfab.base.errors.ScanfabWarning"
-)
 def test_the_surface_has_the_moment_of_the_table(tmp_path):
     packing = scanfab.find_contacts(scanfab.Packing(*shaken_cubic(np.random.default_rng(0), 6)))
-    exact = {"directions": None, "spacing": None, "cutoff": "1rmin", "tolerance": 2e-3}
-    (row,) = written(tmp_path, packing, moment=2, **exact)
+    even = {"directions": "lebedev:23", "cutoff": "1rmin"}
+    (row,) = written(tmp_path, packing, moment=2, **even)
     mesh = pyvista.read(tmp_path / "distribution-c_000000.vtp")
-    share = mesh["weight"] * mesh["mean_length"]
-    assert share.sum() == pytest.approx(row.mean_length, rel=1e-2)
+    assert np.sum(mesh["weight"] * mesh["mean_length"]) == pytest.approx(row.mean_length, rel=1e-2)
 
 
 def test_the_surface_is_closed_and_looks_outward(computed):
     mesh = pyvista.read(computed.vtk / "distribution-c_000006.vtp")
     assert mesh.is_manifold
     assert mesh.n_open_edges == 0
-    volume = np.einsum(
-        "ti,ti->t",
-        mesh.points[mesh.regular_faces[:, 0]],
-        np.cross(mesh.points[mesh.regular_faces[:, 1]], mesh.points[mesh.regular_faces[:, 2]]),
-    )
-    assert np.all(volume > 0)
+    assert np.all(np.sum(mesh.face_normals * mesh.cell_centers().points, axis=1) > 0)
 
 
 def test_ellipsoids_have_the_principal_values_as_half_axes(computed):
@@ -123,9 +114,7 @@ def test_ellipsoids_have_the_principal_values_as_half_axes(computed):
 
 
 def test_grains_and_contacts_are_those_of_the_table(computed):
-    for row in computed.rows:
-        if row["variant"] != "c":
-            continue
+    for row in (row for row in computed.rows if row["variant"] == "c"):
         grains = pyvista.read(computed.vtk / f"grains_{row['frame']:06d}.vtp")
         inside = (grains["in_window"] == 1) & (grains["boundary"] == 0)
         assert inside.sum() == row["grains"]
@@ -135,17 +124,6 @@ def test_grains_and_contacts_are_those_of_the_table(computed):
         assert inside.sum() == row["contacts"]
         normal = contacts.cell_data["normal"][inside]
         assert normal.T @ normal / inside.sum() == pytest.approx(tensor(row, "gc"))
-
-
-def test_spheres_of_clumps_have_the_number_of_their_body(tmp_path):
-    spheres = shaken_cubic(np.random.default_rng(0), 4)
-    number = np.where(np.arange(64) < 60, np.arange(64) // 2, -1)
-    packing = scanfab.Packing(spheres.position, spheres.radius, bodies=number)
-    (row,) = written(tmp_path, packing, contact_tolerance=0.02)
-    grains = pyvista.read(tmp_path / "grains_000000.vtp")
-    assert grains["body"].tolist() == number.tolist()
-    inside = number[grains["in_window"] == 1]
-    assert len(set(inside[inside >= 0])) + np.sum(inside < 0) == row.grains
 
 
 def test_pieces_of_lines_are_kept_from_the_cut_off_on(computed):
@@ -163,11 +141,9 @@ def test_files_of_a_cut_off_that_nothing_reaches_have_no_distribution(tmp_path):
     packing = scanfab.Packing(spheres.position, spheres.radius, step=7, contacts=[])
     with pytest.warns(scanfab.ScanfabWarning, match="no void segment"):
         written(tmp_path, packing, cutoff=100.0)
-    names = {path.name for path in tmp_path.iterdir()}
-    assert "grains_000000.vtp" in names
-    assert "distribution-c_000000.vtp" not in names
-    mesh = pyvista.read(tmp_path / "lines-c_000000.vtp")
-    assert np.isnan(mesh.field_data["alpha_vs"][0])
+    assert not (tmp_path / "distribution-c_000000.vtp").exists()
+    lines = pyvista.read(tmp_path / "lines-c_000000.vtp")
+    assert np.isnan(lines.field_data["alpha_vs"][0])
     assert pyvista.read(tmp_path / "contacts_000000.vtp").n_cells == 0
     assert times_of(tmp_path) == [7.0]
 
