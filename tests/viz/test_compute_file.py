@@ -70,7 +70,7 @@ def test_paths_open_series_and_the_command_leave_the_same_files(
     """The manifest names the options by which a series was opened, so that it can be resumed."""
     given = {"folder": [short_series], "files": sorted(short_series.iterdir())}.get(sources)
     reading = {"contacts": "geometric", "cell": [4, 4, 4]}
-    words = ("--contacts", "geometric", "--cell", "4", "4", "4")
+    words = ("--contacts", "geometric", "--cell", "4", "4", "4", "--frames", ":1")
     if given:
         series = scanfab.read_series(given, **reading)
     else:
@@ -79,12 +79,12 @@ def test_paths_open_series_and_the_command_leave_the_same_files(
     ours, opened, other = (tmp_path / f"{name}{suffix}" for name in ("ours", "opened", "other"))
     assert commanded(other, *words, sources=given) == 0
     capsys.readouterr()
-    from_python(ours, given, manifest=tmp_path / "copy.json", **reading)
-    from_python(opened, series)
+    from_python(ours, given, manifest=tmp_path / "copy.json", frames=":1", **reading)
+    from_python(opened, series, frames=":1")
     assert capsys.readouterr() == ("", "")
     assert_same(ours, opened, other)
     assert (tmp_path / "copy.json").read_bytes() == manifest_of(ours)
-    from_python(ours, series, resume=True)
+    from_python(ours, series, frames=":2", resume=True)
 
 
 def test_python_goes_on_with_what_the_command_has_left(short_series, tmp_path, monkeypatch):

@@ -162,7 +162,7 @@ def test_files_are_what_their_names_say_and_repeat(tmp_path):
     for suffix, begin in BYTES.items():
         one, two = tmp_path / f"one{suffix}", tmp_path / f"two{suffix}"
         for path in (one, two):
-            save_rows(path, curve(), "normalised")
+            save_rows(path, curve(), "columns:alpha_vs_axial")
         assert one.read_bytes().startswith(begin)
         assert one.read_bytes() == two.read_bytes()
         # of the same second; no file tells when it was made

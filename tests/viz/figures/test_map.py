@@ -22,7 +22,7 @@ def packing():
 
 def mapped(packings, **blocks):
     """Rows that may be changed."""
-    table = scanfab.fabric_map(packings, directions=9, spacing=0.4, **blocks)
+    table = scanfab.fabric_map(packings, directions=9, spacing=0.7, **blocks)
     return [dict(row) for row in table]
 
 
@@ -71,6 +71,7 @@ def test_a_quantity_that_the_last_frame_lacks_leaves_its_planes_empty(packing):
     rows = mapped([packing, packing], grid=(2, 2, 2))
     for row in rows:
         row["coordination"] = None if row["frame"] else row["coordination"]
+        row |= dict.fromkeys(("alpha_c_axial", "mean_length", "solid_fraction"))
     found = meshes(page_of(Map(rows, quantity=None)))
     assert any(np.ma.getmaskarray(one.get_array()).all() for one in found)
 
