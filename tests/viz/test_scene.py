@@ -1,5 +1,7 @@
 """Scenes and their views: what is known of grains and contacts, sections, camera, report."""
 
+from unittest.mock import MagicMock
+
 import numpy as np
 import pytest
 
@@ -17,6 +19,7 @@ from scanfab.viz.scene import (
     scene_of,
     section_lines,
 )
+from scanfab.viz.window3d import BOTTOM, SIZE, TOP, aim
 from tests.helpers.lattices import simple_cubic
 from tests.helpers.packed import sample_of
 from tests.helpers.truth import SAMPLE_DATA
@@ -102,6 +105,19 @@ def test_grains_of_clumps_have_their_numbers_and_places_and_are_seen_whole():
     assert np.ptp(first[:, 0]) == pytest.approx(1.2)
     assert grains.in_window[grains.body == 8].all()
     assert not grains.in_window[grains.body == 3].any()
+
+
+@pytest.mark.parametrize("shape", [(9, 1, 1), (1, 1, 9)])
+def test_all_balls_are_in_the_picture_between_words_and_scale(shape):
+    points = np.random.default_rng(0).uniform(-1, 1, (300, 3)) * shape + [5, 6, 7]
+    plotter = MagicMock()
+    aim(plotter, points, np.full(300, 0.1), np.array([0.0, 0.0, 1.0]), np.array([0.3, -1.0, 0.4]))
+    (place, middle, upright), half = plotter.camera_position, plotter.camera.parallel_scale
+    toward = (place - middle) / np.linalg.norm(place - middle)
+    high, wide = (points - middle) @ upright, (points - middle) @ np.cross(upright, toward)
+    assert (high + 0.1).max() <= (1 - 2 * TOP) * half + 1e-9
+    assert (high - 0.1).min() >= (2 * BOTTOM - 1) * half - 1e-9
+    assert np.abs(wide).max() + 0.1 <= half * SIZE[0] / SIZE[1]
 
 
 def test_scales_are_round():

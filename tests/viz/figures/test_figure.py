@@ -2,7 +2,6 @@
 
 import inspect
 import re
-import warnings
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from scanfab.base.errors import SettingsError
 from scanfab.cli.group import cli
 from scanfab.cli.main import run
 from scanfab.pipeline.settings import Settings
-from scanfab.table.compare import compare_tables
 from scanfab.table.plots import figures_of, installed_figures
 from scanfab.table.table import Table, load
 from scanfab.viz.figures.figure import Figure as PackagesFigure
@@ -23,7 +21,7 @@ from scanfab.viz.scanned_frames import ScannedFrames
 from tests.conftest import SAMPLE
 from tests.helpers.figures import BYTES, save_rows
 from tests.helpers.plugins import offer
-from tests.helpers.tables import curve, sheared
+from tests.helpers.tables import curve
 
 pytestmark = pytest.mark.filterwarnings("ignore:skipped:scanfab.base.errors.ScanfabNote")
 OWN = (
@@ -127,15 +125,6 @@ def test_a_notebook_shows_what_a_figure_takes_and_gets_axes_in_the_style_of_the_
     pyplot.close(ax.figure)
     with pytest.raises(SettingsError, match="ax: expected Axes, a Figure or a SubFigure"):
         plot(ax=3)
-
-
-def test_a_comparison_is_made_and_told_once(tmp_path):
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
-        comparison = compare_tables(sheared())
-        save_rows(tmp_path / "x.png", sheared(), "evolution", comparison=comparison)
-    for text in ("the shear strain is used, because", "the loading axis is not"):
-        assert sum(text in str(one.message) for one in told) == 1
 
 
 def test_all_panels_are_lettered_and_say_which_alpha(drawn):

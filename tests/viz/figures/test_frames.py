@@ -15,7 +15,7 @@ from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
 from scanfab.table.row import column_of, total_errors
 from scanfab.viz.figures import projection
-from scanfab.viz.figures.figure import drawn_page, find_figure, make_figures
+from scanfab.viz.figures.figure import drawn_page, make_figures
 from scanfab.viz.figures.rose import contact_ring
 from scanfab.viz.scanned_frames import ScannedFrames
 from tests.conftest import ROOT, SAMPLE
@@ -140,6 +140,7 @@ def test_one_panel_is_drawn_on_the_axes_that_it_gets(scanned):
     # beside it the scale
     assert page.axes[1].get_ylabel() == "deviation from the mean in %"
     for error, message, words in (
+        (SettingsError, r"angles: expected one to four .*found \(95,\)", {"angles": (95,)}),
         (SettingsError, "frame: expected 0 and 6, found 3", {"frame": 3}),
         (SettingsError, "of: expected voids or contacts, found 'void'", {"of": "void"}),
         (TypeError, "the figure rose has no option 'angel': did you mean", {"angel": (90,)}),
@@ -148,12 +149,6 @@ def test_one_panel_is_drawn_on_the_axes_that_it_gets(scanned):
             plot.rose(ax=ax, **words)
     with pytest.raises(SettingsError, match="ax: expected polar Axes, found rectilinear: make"):
         plot.rose(ax=Figure().subplots())
-
-
-def test_angles_that_cannot_be_are_an_error():
-    for text in ("rose:", "rose:0", "rose:91", "rose:x", "rose:1,2,3,4,5"):
-        with pytest.raises(SettingsError, match=f"figure: expected one to four .*'{text[5:]}'"):
-            find_figure(text, "frames")
 
 
 def test_the_rose_is_longer_near_the_axis_and_its_legend_tells_its_circles(scanned):
