@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from scanfab.base.column import NoColumnError
-from scanfab.base.errors import Note, SettingsError, SkippedFrameWarning, joined, tell
+from scanfab.base.errors import Note, SettingsError, joined
 from scanfab.base.option import number, one_of, option, optional, options_of, takes_options, whole
 from scanfab.io import ReadOptions
 
@@ -73,13 +72,6 @@ def test_usable_values_stay_as_they_are():
     assert DAYS("seed", 2**60 + 1) == 2**60 + 1
 
 
-def test_a_column_that_does_not_exist_is_told_without_quotes_with_those_that_do():
-    error = NoColumnError(3, ["frame", "alpha_vs"])
-    assert isinstance(error, KeyError)
-    assert isinstance(error, AttributeError)
-    assert str(error) == "there is no column 3: the columns are frame, alpha_vs"
-
-
 def test_a_sentence_is_said_once_of_all_its_variants():
     notes = [Note("a", "dense", ("b",)), Note("a", "loose", ("c",)), Note("a", "dense", ("d",))]
     assert joined(notes) == (Note("a", "dense", ("b", "d")), Note("a", "loose", ("c",)))
@@ -87,8 +79,3 @@ def test_a_sentence_is_said_once_of_all_its_variants():
 
 def test_without_a_place_it_says_the_sentence_alone():
     assert Note("a", "dense", ("c",)).told("") == "dense"
-
-
-def test_a_frame_that_was_left_out_is_a_warning_of_its_kind():
-    with pytest.warns(SkippedFrameWarning, match="frame 1 skipped: dump: no grains"):
-        tell([Note("skipped", "dump: no grains", kind=SkippedFrameWarning)], "frame 1")

@@ -1,10 +1,7 @@
 """What other packages offer: found, broken, or twice."""
 
-from types import SimpleNamespace
-
 import pytest
 
-from scanfab.base import plugins
 from scanfab.base.errors import ScanfabError, ScanfabWarning
 from scanfab.base.plugins import load_plugins
 from scanfab.io.reader import installed_readers
@@ -16,28 +13,16 @@ from scanfab.table.plots import installed_figures
 from tests.helpers.plugins import offer
 
 
-def point(name, load, package="one"):
-    return SimpleNamespace(name=name, value=name, load=load, dist=SimpleNamespace(name=package))
-
-
-@pytest.fixture
-def offered(monkeypatch):
-    points = []
-    monkeypatch.setattr(plugins, "entry_points", lambda group: points)
-    return points
-
-
-def test_they_come_by_name_with_their_package_and_a_broken_one_is_a_warning(offered):
-    offered += [point("b", lambda: 2), point("bad", lambda: 1 / 0), point("a", lambda: 1)]
-    with pytest.warns(ScanfabWarning, match="the thing 'bad' of one .*ZeroDivisionError: div"):
+def test_they_come_by_name_with_their_package_and_a_broken_one_is_a_warning(monkeypatch):
+    for name, load in (("b", lambda: 2), ("bad", lambda: 1 / 0), ("a", lambda: 1)):
+        offer(monkeypatch, "some.group", name, load)
+    with pytest.warns(ScanfabWarning, match="the thing 'bad' of made-up .*ZeroDivisionError: div"):
         found = load_plugins("some.group", "thing", str)
     said = [(name, offer.plugin, offer.package) for name, offer in found.items()]
-    assert said == [("a", "1", "one"), ("b", "2", "one")]
-
-
-def test_one_name_twice_is_an_error_that_names_both_packages(offered):
-    offered += [point("a", lambda: 1), point("a", lambda: 2, "two")]
-    with pytest.raises(ScanfabError, match="two packages offer a thing called 'a': one and two"):
+    assert said == [("a", "1", "made-up"), ("b", "2", "made-up")]
+    # one name twice is an error that names both packages
+    offer(monkeypatch, "some.group", "a", lambda: 2)
+    with pytest.raises(ScanfabError, match="offer a thing called 'a': made-up and made-up"):
         load_plugins("some.group", "thing", str)
 
 
