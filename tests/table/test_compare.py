@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from scanfab.base.errors import ScanfabNote, ScanfabWarning, SettingsError
+from scanfab.fabric.errors import variance_without_noise
 from scanfab.table.compare import compare_tables
 from tests.helpers.tables import CONTACT, STRAIN, VOID, curve, sheared
 
@@ -65,13 +66,15 @@ def with_octants(rows):
     return [row | {name: of(row, k) for name, of, k in named} for row in rows]
 
 
+def slope_without(octant, noise=0.0):
+    """By least squares of the values without this octant."""
+    void, contact = (np.array([of(row, octant) for row in curve()]) for of in WITHOUT.values())
+    return np.polyfit(contact, void + noise, 1)[0]
+
+
 def test_octants_left_out_in_all_frames_give_the_slope_its_standard_error():
     """√(7/8 Σ (slope_k - mean)²), the slopes by least squares of the values without octant k."""
-    slopes = []
-    for k in OCTANTS:
-        void, contact = ([of(row, k) for row in curve()] for of in WITHOUT.values())
-        slopes.append(np.polyfit(contact, void, 1)[0])
-    expected = math.sqrt(7 * np.var(slopes))
+    expected = math.sqrt(7 * np.var([slope_without(k) for k in OCTANTS]))
     assert expected > 1e-3
     row = summary_of(with_octants(curve()))
     assert row.slope_se == pytest.approx(expected, rel=1e-9)
@@ -202,34 +205,22 @@ def test_differences_are_between_variants_of_a_frame():
     assert [row.difference_se for row in compare_tables(rows).differences[:2]] == [None, None]
 
 
-def noisy_replicates(rows, random):
-    """The rows with two replicates of each value without an octant, each with noise of its own."""
-    found = []
-    for row in rows:
-        changes = {}
-        for block in range(1, 9):
-            one, two = 0.1 * row["alpha_vs_axial"] * random.normal(size=2)
-            name = f"alpha_vs_axial_without_{block}"
-            changes[name] = row[name] + 0.5 * (one + two)
-            changes[f"alpha_vs_axial_half_{block}"] = 0.5 * (one - two)
-        found.append({**row, **changes})
-    return found
+HALVES = np.random.default_rng(3).normal(size=(9, 5))
+
+
+def with_noise(size):
+    """Rows with half the difference of two replicates of each value without an octant."""
+    return [
+        row | {f"alpha_vs_axial_half_{k}": size * HALVES[k, row["frame"]] for k in OCTANTS}
+        for row in with_octants(curve())
+    ]
 
 
 def test_the_noise_of_the_scan_is_taken_off_the_error_of_the_slope():
-    """Of the slope's variance the mean is right with the replicates, and too large without them."""
-    random = np.random.default_rng(3)
-    rows = with_octants(curve())
-    exact = summary_of(rows).slope_se ** 2
-    with_replicates, without = [], []
-    for _ in range(300):
-        noisy = noisy_replicates(rows, random)
-        # empty where noise is all that is left: a negative estimate, left out, would be missed
-        with_replicates.append(summary_of(noisy).slope_se)
-        means = [{k: v for k, v in row.items() if "half" not in k} for row in noisy]
-        without.append(summary_of(means).slope_se ** 2)
-    assert None not in with_replicates
-    variances = np.square(with_replicates)
-    error = variances.std() / np.sqrt(len(variances))
-    assert variances.mean() == pytest.approx(exact, abs=4 * error)
-    assert np.mean(without) > exact + 8 * error
+    """Each octant has two slopes, by the two replicates, whose difference is noise."""
+    noise = 3e-4 * HALVES
+    slopes = [[slope_without(k, noise[k]), slope_without(k, -noise[k])] for k in OCTANTS]
+    expected = math.sqrt(variance_without_noise(np.array(slopes)))
+    assert summary_of(with_noise(3e-4)).slope_se == pytest.approx(expected, rel=1e-9)
+    with pytest.warns(ScanfabNote, match="slope_se is empty .* hides the scatter of the octants"):
+        assert summary_of(with_noise(0.1)).slope_se is None
