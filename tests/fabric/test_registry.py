@@ -15,17 +15,12 @@ from tests.helpers.plugins import offer
 
 
 class Cubic:
-    """Σ n⁴ over contact normals, 1 for a simple cubic packing, and the longest mean length."""
+    """Σ n⁴ over contact normals, 1 for a simple cubic packing."""
 
-    columns = (
-        Column("c_fourth", float, "", "mean of x⁴ + y⁴ + z⁴ over the contact normals"),
-        Column("vs_longest", float, "length", "longest mean length of any axis"),
-    )
+    columns = (Column("c_fourth", float, "", "mean of x⁴ + y⁴ + z⁴ over the contact normals"),)
 
     def values(self, measured):
-        mean = measured.length.sum(axis=0) / measured.segments.sum(axis=0)
-        fourth = float(np.mean(np.sum(measured.normals**4, axis=1)))
-        return {"c_fourth": fourth, "vs_longest": float(mean.max())}
+        return {"c_fourth": float(np.mean(np.sum(measured.normals**4, axis=1)))}
 
 
 @pytest.fixture
@@ -40,10 +35,9 @@ def test_its_columns_are_computed_and_stand_behind_the_own_ones(offered):
     packing = scanfab.Packing(simple_cubic(5).position, 0.5)
     table = scanfab.compute(packing, variants="a", tolerance=0.05, contact_tolerance=1e-4)
     own, parts = list(COLUMNS[:-24]), list(COLUMNS[-24:])
-    assert list(table[0]) == [*own, "c_fourth", "vs_longest", *parts]
+    assert list(table[0]) == [*own, "c_fourth", *parts]
     assert all(re.search(r"_(without|half)_[1-8]$", name) for name in parts)
     assert table[0].c_fourth == pytest.approx(1.0)
-    assert table[0].vs_longest > table[0].mean_length > 0
 
 
 class Foreign:
@@ -66,7 +60,6 @@ def computed():
 
 BROKEN = [
     (Foreign(name="alpha_vs"), "there is already a column 'alpha_vs'"),
-    (Foreign(name="strain"), "there is already a column 'strain'"),
     (Foreign(kind=list), "columns that hold int, float or str"),
 ]
 

@@ -6,10 +6,10 @@ import pytest
 from scanfab import FabricTensor, contact_fabric, void_fabric
 from scanfab.base.space import Space
 from scanfab.fabric.distribution import direction_points, fit_even, mean_length_function
-from scanfab.fabric.tensor import axial, axial_error
+from scanfab.fabric.tensor import axial_error
 from scanfab.scan.directions import direction_rule, plane_rule
 from tests.helpers import naive
-from tests.helpers.lattices import rotation, unit_vectors
+from tests.helpers.lattices import unit_vectors
 
 RULE = direction_rule("lebedev:5")
 D = len(RULE)
@@ -44,14 +44,6 @@ def test_principal_values_axes_and_alpha_make_the_tensor():
         "xx": matrix[0, 0], "yy": matrix[1, 1], "zz": matrix[2, 2],
         "xy": matrix[0, 1], "xz": matrix[0, 2], "yz": matrix[1, 2],
     }  # fmt: skip
-
-
-def test_axial_equals_the_written_out_formula_for_any_axis():
-    matrices = np.array([random_tensor(np.random.default_rng(seed)) for seed in range(20)])
-    for axis in rotation(np.random.default_rng(3)):
-        expected = [naive.axial(matrix, axis) for matrix in matrices]
-        assert axial(matrices.reshape(2, 10, 3, 3), axis).ravel() == pytest.approx(expected)
-        assert FabricTensor(matrices[0]).axial(axis) == pytest.approx(expected[0])
 
 
 def random_sums(replicates):
