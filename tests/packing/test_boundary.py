@@ -59,6 +59,8 @@ def test_the_radius_is_that_of_the_grains_whatever_the_file_calls_it():
 
 # the class that encloses
 
+SPHERE = unit_vectors(np.random.default_rng(2), 150)
+
 
 def cloud(shell, **columns):
     random = np.random.default_rng(1)
@@ -66,18 +68,14 @@ def cloud(shell, **columns):
     return Packing(np.vstack([inner, shell]), 0.01, columns=columns)
 
 
-def sphere_shell(count=150):
-    return unit_vectors(np.random.default_rng(2), count)
-
-
-def box_shell(count=150):
-    random = np.random.default_rng(2)
+def box_shell():
+    random, count = np.random.default_rng(2), 150
     points = random.uniform(-1, 1, (count, 3))
     points[np.arange(count), random.integers(0, 3, count)] = random.choice([-1, 1], count)
     return points
 
 
-@pytest.mark.parametrize("shell", [sphere_shell(), box_shell()])
+@pytest.mark.parametrize("shell", [SPHERE, box_shell()])
 @pytest.mark.parametrize("name", ["type", "mask", "Type", "matId", "materialId"])
 def test_a_class_that_encloses_the_rest_is_named(shell, name):
     values = np.r_[np.ones(200), np.full(len(shell), 3)]
@@ -97,12 +95,11 @@ def test_a_class_that_encloses_the_rest_is_named(shell, name):
 )
 def test_other_columns_enclose_nothing(name, values):
     """Mixed classes, one class, very many, words, and a column that is no class."""
-    assert unnamed_boundary(cloud(sphere_shell(), **{name: values})) == []
+    assert unnamed_boundary(cloud(SPHERE, **{name: values})) == []
 
 
 def test_a_few_particles_are_not_judged():
-    shell = sphere_shell(10)
-    position = np.vstack([0.1 * shell, shell])
+    position = np.vstack([0.1 * SPHERE[:10], SPHERE[:10]])
     packing = Packing(position, 0.01, columns={"type": np.repeat([1, 3], 10)})
     assert unnamed_boundary(packing) == []
 
@@ -121,10 +118,8 @@ def test_a_column_that_does_not_do_is_named(packing):
     ("expressions", "ids"),
     [
         ([], []),
-        (["type=2"], [30, 40]),
         (["  type == 2  "], [30, 40]),
         (["type!=1,3"], [30, 40]),
-        (["type=1,3"], [10, 20, 50, 60]),
         (["id>40"], [50, 60]),
         (["id>=40"], [40, 50, 60]),
         (["id<20"], [10]),

@@ -85,7 +85,7 @@ def test_wrong_units_and_tolerances_are_told():
             find_contacts(Packing([[0, 0, 0]], 1.0), tolerance)
 
 
-@pytest.mark.parametrize("far", [1e3, 1e9, 1e60])
+@pytest.mark.parametrize("far", [1e3, 1e60])
 @pytest.mark.parametrize("cell", [None, Cell([1.0, 1.1, 5.0], (True, True, False))])
 def test_grains_that_flew_away_leave_the_bins_small(far, cell):
     """In bins that span all, 20000² / 2 pairs would be looked at; the far ones touch each other."""
@@ -98,17 +98,6 @@ def test_grains_that_flew_away_leave_the_bins_small(far, cell):
     assert is_near[pairs].all(axis=1).sum() == len(among)
     found = {tuple(pair) for pair in pairs[~is_near[pairs].any(axis=1)].tolist()}
     assert {(k, k + 1) for k in range(0, 20_000, 5000)} <= found
-
-
-def test_size_ratio_of_a_thousand_takes_little_memory_and_time():
-    """All dust in the bins of one boulder would be 20000² / 2 pairs to look at."""
-    position = np.random.default_rng(2).random((20_000, 3))
-    radius = np.full(20_000, 2e-4)
-    radius[:3] = 0.2
-    pairs, _ = overlapping_pairs(position, radius)
-    gaps = np.linalg.norm(position[:3, None] - position, axis=2) - (radius[:3, None] + radius)
-    with_boulders = {(min(i, j), max(i, j)) for i, j in np.argwhere(gaps < 0).tolist() if i != j}
-    assert with_boulders == {tuple(pair) for pair in pairs.tolist() if pair[0] < 3}
 
 
 @pytest.mark.parametrize("sizes", ["equal", "unlike"])
@@ -135,31 +124,18 @@ def test_cubic_lattices_have_their_coordination_and_the_isotropic_fabric(lattice
     tensor = contact_fabric(packing.contacts.normal)
     assert np.abs(tensor.matrix - np.eye(3) / 3).max() < 1e-9
     assert tensor.alpha < 1e-9
-    if count == 5:
-        (row,) = scanfab.compute(
-            packing, variants="c", directions="lebedev:5", spacing=0.2, cutoff=0.1
-        )
-        assert (row.coordination, row.rattlers) == (each, 0)
-        assert row.alpha_c == pytest.approx(0, abs=1e-9)
-
-
-# two grains of a cell that is thinner than they are along x and y
-THIN = Cell([0.6, 1.5, 9.0], (True, True, False))
-THROUGH_IMAGES = find_contacts(Packing([[0.1, 0.1, 4], [0.4, 1.3, 4]], 1.0, cell=THIN))
+    assert set(sample_of(packing).contact_numbers) == {each}
 
 
 def test_contacts_listed_twice_or_from_both_sides_count_once():
-    """Through a face, and with own images."""
-    lattice = find_contacts(Packing(*simple_cubic(2), cell=Cell([2, 2, 2])), TOLERANCE)
-    for packing in (lattice, THROUGH_IMAGES):
-        listed = packing.contacts
-        both = ContactList(
-            np.concatenate([listed.pairs, listed.pairs[:, ::-1], listed.pairs]),
-            np.concatenate([listed.image, -listed.image, listed.image]),
-        )
-        again = packing.with_contacts(both).contacts
-        assert np.array_equal(again.pairs, listed.pairs)
-        assert np.array_equal(again.image, listed.image)
+    """Of two grains in a cell that is thinner than they are along x and y."""
+    cell = Cell([0.6, 1.5, 9.0], (True, True, False))
+    packing = find_contacts(Packing([[0.1, 0.1, 4], [0.4, 1.3, 4]], 1.0, cell=cell))
+    pairs, image = packing.contacts.pairs, packing.contacts.image
+    both = np.concatenate([pairs, pairs[:, ::-1], pairs]), np.concatenate([image, -image, image])
+    again = packing.with_contacts(ContactList(*both)).contacts
+    assert np.array_equal(again.pairs, pairs)
+    assert np.array_equal(again.image, image)
 
 
 def test_a_contact_needs_an_overlap_or_a_gap_below_the_relative_tolerance():

@@ -4,14 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
-from scanfab import Cell, Packing, PackingError, SettingsError, box, sphere
+from scanfab import Cell, Packing, SettingsError, box, sphere
 from scanfab.packing.window import SurfaceBox, Window, inner_ellipsoid
 from tests.helpers.lattices import ball_points, rotation
 
 CELL = Cell([10.0, 8.0, 6.0], origin=(-1.0, 2.0, 3.0))
 ONE = Packing([[0, 3, 4]], 1.0, cell=CELL)
+SLAB = Packing([[0, 3, 4]], 1.0, cell=Cell([10.0, 80.0, 6.0], (True, False, True)))
 ALL = np.ones(4, bool)
+BALL = Window(np.array([-0.5, 2.5, 3.5]), sphere(1.0))
+PLACES = np.array([[8.9, 2.5, 3.5], [-0.5, 9.8, 3.5], [-0.5, 2.5, 8.9], [4.5, 6.5, 6.5]])
 
 
 def four_grains(**options):
@@ -22,25 +26,14 @@ def four_grains(**options):
 
 def test_many_points_are_looked_at_some_at_a_time():
     """The 300,000th as the first."""
-    window = Window(np.array([-0.5, 2.5, 3.5]), sphere(1.0))
-    points = np.array([[8.9, 2.5, 3.5], [4.5, 6.5, 6.5], [-0.5, 9.8, 3.5]])
-    rows = np.arange(300_000) % 3
-    assert np.array_equal(window.contains(points[rows], ONE), rows != 1)
-    assert np.array_equal(window.may_meet(points[rows], 0.1 * rows, ONE), rows != 1)
-
-
-def test_a_centre_is_a_point():
-    with pytest.raises(PackingError, match=r"center: expected shape \(3\)"):
-        Window([0.0, 0.0], sphere(1.0))
+    rows = np.arange(300_000) % 4
+    assert np.array_equal(BALL.contains(PLACES[rows], ONE), rows != 3)
+    assert np.array_equal(BALL.may_meet(PLACES[rows], 0.1 * rows, ONE), rows != 3)
 
 
 def test_distance_is_to_the_nearest_image():
-    window = Window(np.array([-0.5, 2.5, 3.5]), sphere(1.0))
-    points = np.array([[8.9, 2.5, 3.5], [-0.5, 9.8, 3.5], [-0.5, 2.5, 8.9], [4.5, 6.5, 6.5]])
-    expected = [0.6, 0.7, 0.6, np.sqrt(25 + 16 + 9)]
-    distance = np.linalg.norm(window.branches(points, ONE), axis=1)
-    assert distance == pytest.approx(expected)
-    assert window.contains(points, ONE).tolist() == [True, True, True, False]
+    distance = np.linalg.norm(BALL.branches(PLACES, ONE), axis=1)
+    assert distance == pytest.approx([0.6, 0.7, 0.6, np.sqrt(25 + 16 + 9)])
 
 
 def test_window_must_not_meet_its_own_image():
@@ -98,12 +91,7 @@ def test_room_around_a_window_is_that_of_its_own_box():
         (four_grains(), [1, 1, 0, 1], [4.75, 0.0, 4.0], 2.0),  # without one that is boundary
         (ONE, [1], [4.0, 6.0, 6.0], 6.0),
         # along y it is the grain: from 2 to 4
-        (
-            Packing([[0, 3, 4]], 1.0, cell=Cell([10.0, 80.0, 6.0], (True, False, True))),
-            [1],
-            [5.0, 3.0, 3.0],
-            2.0,
-        ),
+        (SLAB, [1], [5.0, 3.0, 3.0], 2.0),
     ],
 )
 def test_center_and_extent_are_those_of_the_surfaces_or_of_the_periodic_cell(
@@ -126,8 +114,6 @@ def test_that_of_a_stretched_and_turned_ball_is_stretched_and_turned_likewise():
 
 
 def test_it_touches_the_hull_moved_inwards_by_the_largest_radius():
-    from scipy.spatial import ConvexHull
-
     random = np.random.default_rng(1)
     points = ball_points(random, 300, 5.0) * [1.0, 1.2, 0.8]
     found = inner_ellipsoid(points, 0.6)
