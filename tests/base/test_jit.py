@@ -20,11 +20,6 @@ only_linux = pytest.mark.skipif(sys.platform != "linux", reason="needs XDG_CACHE
 only_posix = pytest.mark.skipif(os.name != "posix", reason="needs permissions")
 
 
-@pytest.fixture
-def dump(tmp_path):
-    return write(tmp_path / "grains.dump", dump_text(cubic_rows(), box=((0, 4),) * 3))
-
-
 def words_of(dump, cache_home):
     """What a process that needs a kernel says on standard error; it must end well."""
     variables = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
@@ -44,7 +39,8 @@ def kept_in(folder):
 
 
 @only_linux
-def test_only_the_first_run_compiles(dump, tmp_path):
+def test_only_the_first_run_compiles(tmp_path):
+    dump = write(tmp_path / "grains.dump", dump_text(cubic_rows(), box=((0, 4),) * 3))
     first = words_of(dump, tmp_path / "cache")
     assert first.count(SAID) == 1
     assert "; later runs start at once" in first

@@ -21,6 +21,7 @@ def in_cell(**arguments):
 
 
 BOX = Cell([5.7, 9, 9], (False, False, False))
+WIDE = {"position": 2 * ROW, "contacts": [[0, 1]], "cell": Cell([11.4, 9, 9])}
 
 
 @pytest.mark.parametrize(
@@ -57,6 +58,7 @@ BOX = Cell([5.7, 9, 9], (False, False, False))
             "passes a face that is not periodic",
         ),
         ({"contacts": [[0, 3]]}, r"contact 0 names the rows \[0, 3\]"),
+        (WIDE, "does the cell .* belong to this sample"),
         (
             {"contacts": [[0, 2]], "cell": BOX},
             r"10 and 30.*\(`cell` and `periodic`\).*another step",

@@ -93,6 +93,7 @@ def test_a_column_that_does_not_exist_is_an_error_that_names_the_nearest(table, 
         ask(table)
     with pytest.raises(ScanfabError, match="no column 'qqq': the columns are source, frame"):
         table["qqq"]
+    assert not hasattr(table[0], "qqq")
 
 
 def test_rows_are_selected_by_their_values(table):
