@@ -35,12 +35,6 @@ figures, outputs, pages, reference = map(
     import_module, ("figures", "outputs", "pages", "reference")
 )
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
-SECTIONS = (
-    "Parameters", "Attributes", "Returns", "Yields", "Raises", "Warns", "Notes", "References",
-    "Examples",
-)  # fmt: skip
-
-
 MODULES = [
     name
     for _, name, _ in pkgutil.walk_packages(scanfab.__path__, "scanfab.")
@@ -134,8 +128,6 @@ def faults_of(thing: Any, with_example: bool = True) -> Iterator[str]:
     summary = text.split("\n\n")[0].strip()
     if not summary.endswith((".", ":")):
         yield f"has no summary that is a sentence, but {summary!r}"
-    if list(found) != [title for title in SECTIONS if title in found]:
-        yield f"has sections that numpydoc does not know, or in another order: {list(found)}"
     for error in named_in(found.get("Raises", "")):
         if not hasattr(scanfab, error) and not hasattr(builtins, error):
             yield f"raises {error}, which is no public error"
@@ -162,8 +154,7 @@ def faults_of(thing: Any, with_example: bool = True) -> Iterator[str]:
 
 def members_of(kind: type) -> Iterator[tuple[str, Any]]:
     """The public methods and properties that a class of this package brings itself."""
-    for name in dir(kind):
-        member = inspect.getattr_static(kind, name)
+    for name, member in inspect.getmembers_static(kind):
         owner = next(one for one in kind.__mro__ if name in vars(one))
         # a field may have a function for its usual value
         if name.startswith("_") or name in vars(owner).get("__annotations__", {}):
@@ -310,21 +301,17 @@ def test_messages_on_their_page_stand_there_once_and_are_those_of_the_program() 
 
 def test_the_result_in_the_readme_is_that_of_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
-    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
-    told = re.search(
-        r"α_vs of the RV is ([\d.]+) ± ([\d.]+): ([\d.]+) from having drawn these lines, "
-        r"and ([\d.]+) from having these (\d+) grains",
-        text,
-    )
-    assert told is not None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", scanfab.ScanfabNote)
         series = scanfab.read_series("sample_data/yade_triaxial")
     row = scanfab.compute(series, boundary="mask=3", frames="-1:")[2]
     scan, sample = row.alpha_vs_axial_se, row.alpha_vs_axial_sample_se
     assert row.variant == "c"
-    numbers = [row.alpha_vs_axial, math.hypot(scan, sample), scan, sample]
-    assert [f"{one:.5f}" for one in numbers] + [str(row.grains)] == list(told.groups())
+    told = (
+        f"α_vs of the RV is {row.alpha_vs_axial:.5f} ± {math.hypot(scan, sample):.5f}: {scan:.5f} "
+        f"from having drawn these lines, and {sample:.5f} from having these {row.grains} grains"
+    )
+    assert told in " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
 
 
 def words_and_numbers(text: str) -> tuple[list[str], list[float]]:
