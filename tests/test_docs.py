@@ -24,6 +24,7 @@ import scanfab
 from scanfab.cli.group import COMMANDS, cli
 from scanfab.cli.main import run
 from scanfab.io.reader import installed_readers
+from scanfab.pipeline import calibration
 from scanfab.scan.directions import RULES
 from scanfab.table.columns import table_columns
 from scanfab.viz.figures import style
@@ -217,6 +218,7 @@ def test_the_commands_of_the_pages_draw_their_figures(
         return run([*words, *more])
 
     monkeypatch.setattr(figures, "run", rough)
+    monkeypatch.setattr(calibration, "SPACINGS", calibration.SPACINGS[:3])
     # what is drawn becomes no image: other tests look at images
     monkeypatch.setattr(style, "figure_bytes", lambda *_: b"")
     figures.draw()

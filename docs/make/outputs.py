@@ -18,6 +18,8 @@ from scanfab.cli.main import run
 
 # a call of scanfab by itself, whether its errors go the same way, and what reads what it prints
 CALL = re.compile(r"scanfab ((?:'[^']*'|[^'|;&<>$*])*)(2>&1 )?(?:\| (.*))?")
+# a loop of bash over words
+LOOP = re.compile(r"for (\w+) in ([\w ]+); do +(.*); done")
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -37,9 +39,14 @@ def output_of(command: str) -> str:
     What a command prints.
 
     A call of scanfab runs in this process, which has loaded the kernels and libraries, and bash
-    pipes what it prints through further programs. Other lines are for bash as they stand.
+    pipes what it prints through further programs. So do the calls in a loop. Other lines are for
+    bash as they stand.
     """
-    call = CALL.fullmatch(command.replace("\\\n", ""))
+    line = command.replace("\\\n", "")
+    if loop := LOOP.fullmatch(line):
+        name, words, body = loop.groups()
+        return "".join(output_of(body.replace(f"${name}", word)) for word in words.split())
+    call = CALL.fullmatch(line)
     if call is None:
         output = in_bash(command)
     else:

@@ -180,7 +180,7 @@ def fabric_map(
     >>> packing = find_contacts(Packing(place, 0.7, cell=Cell([12.0] * 3)))
     >>> with warnings.catch_warnings(record=True) as told:
     ...     warnings.simplefilter("always")
-    ...     table = fabric_map(packing, slices=2, directions="lebedev:11", spacing=0.5)
+    ...     table = fabric_map(packing, slices=2, tolerance=0.01)
     >>> str(told[-1].message)
     'frame 0, variant a: too few blocks to tell whether the sample is homogeneous'
     >>> table["z"].tolist(), int(table["grains"].sum())
