@@ -110,13 +110,8 @@ def vtk_xml(path: Path, piece: str, content: str, kind: str = "PolyData", more: 
 
 def yade_spheres(path: Path, position, radius, **scalars) -> Path:
     """What YADE's VTKExporter writes for spheres, with all digits."""
-    return write(
-        path,
-        "# vtk DataFile Version 3.0.\ncomment\nASCII\n\nDATASET POLYDATA\n"
-        + _points(position)
-        + f"\nPOINT_DATA {len(position)}\n"
-        + _scalars({"radius": radius, **scalars}),
-    )
+    data = _scalars({"radius": radius, **scalars})
+    return _polydata(path, position, f"\nPOINT_DATA {len(position)}\n{data}")
 
 
 def yade_lines(path: Path, ends, vectors=None, **scalars) -> Path:
@@ -128,14 +123,8 @@ def yade_lines(path: Path, ends, vectors=None, **scalars) -> Path:
     named = "".join(
         f"\nVECTORS {name} double\n" + _rows(values) for name, values in (vectors or {}).items()
     )
-    return write(
-        path,
-        "# vtk DataFile Version 3.0.\ncomment\nASCII\n\nDATASET POLYDATA\n"
-        + _points(ends.reshape(-1, 3))
-        + f"LINES {count} {3 * count}\n{lines}{data}"
-        + _scalars(scalars)
-        + named,
-    )
+    rest = f"LINES {count} {3 * count}\n{lines}{data}{_scalars(scalars)}{named}"
+    return _polydata(path, ends.reshape(-1, 3), rest)
 
 
 def small_save(contacts: Sequence[tuple[int, int, Sequence[int], int]] | None = None) -> str:
@@ -200,8 +189,9 @@ def _interaction(one: int, two: int, shift: Sequence[int], real: int) -> str:
     )
 
 
-def _points(position) -> str:
-    return f"POINTS {len(position)} double\n" + _rows(position)
+def _polydata(path: Path, position, rest: str) -> Path:
+    head = "# vtk DataFile Version 3.0.\ncomment\nASCII\n\nDATASET POLYDATA\n"
+    return write(path, f"{head}POINTS {len(position)} double\n{_rows(position)}{rest}")
 
 
 def _rows(values) -> str:
