@@ -43,12 +43,13 @@ def scan_triads(solids, triads, offsets, spacing, cutoff, variants="abcd"):
     return sums_of(triads[None], tallies[None], variants, solids.edge)
 
 
-def scan_along(solids, axes, spacing, cutoff=0.0, replicates=16, seed=0):
+def scan_along(solids, axes, spacing, cutoff=0.0, replicates=16, seed=0, variants="c"):
     """Scan along the same axes in every replicate: only the lines are shifted."""
     random = np.random.default_rng(seed)
     triads = line_triads(np.asarray(axes, dtype=float))
+    words = spacing, cutoff, variants
     shifts = random.random((replicates, len(triads), 2))
-    return concatenated([scan_triads(solids, triads, one, spacing, cutoff) for one in shifts])
+    return concatenated([scan_triads(solids, triads, one, *words) for one in shifts])
 
 
 def ratio(length, segments):
@@ -68,10 +69,3 @@ def fabric(solids, rule="design:9", variant="c", **options):
     rule = direction_rule(rule)
     sums = scan_lines(solids, rule, variants=variant, **options)
     return void_fabric(sums.axes, rule.weights, *sums.kept(variant))
-
-
-def isotropic(result, within=1e-3):
-    """Whether a void fabric is I/3 within 4 standard errors, and absolutely."""
-    error = result.replicates.std(axis=0, ddof=1) / np.sqrt(len(result.replicates))
-    off = np.abs(result.tensor.matrix - np.eye(3) / 3)
-    return bool(np.all(off < 4 * error + 1e-15) and np.all(off < within))

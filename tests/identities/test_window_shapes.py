@@ -9,7 +9,7 @@ from scanfab.fabric.void import void_fabric
 from scanfab.scan.scan import scan_lines
 from tests.helpers.lattices import Spheres, ball_points, poisson_spheres, rotation, separate_spheres
 from tests.helpers.scanning import mean_lengths, scan_along, solids_of
-from tests.helpers.windows import box_by_corners, hull_of
+from tests.helpers.windows import hull_of
 
 NOTHING = Spheres(np.zeros((0, 3)), np.zeros(0))
 RANDOM = np.random.default_rng(11)
@@ -65,50 +65,6 @@ def test_spheres_without_overlap_wholly_inside(name):
     expected = void / (large.overlap(AXES, 0.0)[1] + np.pi * np.sum(spheres.radius**2))
     assert np.all(np.abs(found.value - expected) < 4 * found.error)
     assert np.all(found.error < 1e-3 * expected)
-
-
-@pytest.mark.parametrize(
-    ("shape", "alpha"),
-    [
-        (box([1.0, 1.0, 2.0]), 0.06433),
-        (box([1.0, 1.0, 0.8]), -0.02189),
-        (ellipsoid([1.0, 1.0, 2.0]), 0.08650),
-        (ellipsoid([1.0, 1.0, 0.8]), -0.02997),
-        (cylinder(1.0, 2.0), 0.00122),
-        (cylinder(1.0, 1.5), -0.02711),
-        (box([1.0, 1.0, 1.0]), 0.0),
-        (sphere(1.0), 0.0),
-    ],
-)
-def test_anisotropy_of_an_empty_window(shape, alpha):
-    """In the limit of many directions."""
-    axes = direction_rule("fibonacci:20000").axes
-    shared, slope = shape.overlap(axes, 0.0)
-    length = shared / slope
-    along = length @ axes[:, 2] ** 2 / length.sum()
-    assert 1.5 * along - 0.5 == pytest.approx(alpha, abs=2e-5)
-
-
-@pytest.mark.parametrize(
-    ("one", "other"),
-    [
-        (sphere(1.3), ellipsoid([1.3, 1.3, 1.3], TURN)),
-        (box([1.6, 2.0, 2.4], TURN), box_by_corners(np.array([0.8, 1.0, 1.2]), TURN)),
-        (sphere(1.0).deformed(np.diag([0.8, 1.0, 1.3])), ellipsoid([0.8, 1.0, 1.3])),
-    ],
-    ids=["sphere as ellipsoid", "box as polyhedron", "deformed sphere"],
-)
-def test_the_same_window_by_other_data_gives_the_same(one, other):
-    random = np.random.default_rng(3)
-    spheres = poisson_spheres(random, 0.3, 2.0, radii=(0.1, 0.3))
-    removed = random.random(len(spheres.radius)) < 0.2
-    rule = direction_rule("lebedev:7")
-    words = {"spacing": 0.05, "cutoff": 0.2, "replicates": range(2)}
-    found = [scan_lines(solids_of(spheres, w, removed), rule, **words) for w in (one, other)]
-    for variant in "abcd":
-        (length, segments), (length2, segments2) = (sums.kept(variant) for sums in found)
-        assert np.array_equal(segments, segments2)
-        assert length == pytest.approx(length2, rel=1e-9)
 
 
 @pytest.mark.parametrize(
