@@ -4,7 +4,7 @@ import meshio
 import numpy as np
 
 from scanfab.base.convex import Body, Convex, Quadric
-from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron
+from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron, sphere
 from scanfab.scan.directions import direction_rule
 from tests.helpers.lattices import rotation
 
@@ -58,14 +58,12 @@ def leaning(window, random):
 
 
 def random_window(random):
-    """None at times (0), the radius of a sphere, or a region of any kind."""
+    """None at times (0), a sphere, or a region of any kind."""
     half, turn = random.uniform(0.3, 2.0, 3), rotation(random)
     return [
         lambda: 0.0,
-        lambda: 1.0,
-        lambda: random.uniform(0.3, 3.0),
-        lambda: random.uniform(0.3, 3.0),
-        lambda: random.uniform(0.3, 3.0),
+        lambda: sphere(1.0),
+        lambda: sphere(random.uniform(0.3, 3.0)),
         lambda: box(2 * half),
         lambda: box(2 * half, turn),
         lambda: cylinder(half[0], 2 * half[1], turn[0]),
@@ -75,4 +73,4 @@ def random_window(random):
         lambda: hull_of(random.normal(size=(12, 3)))[0],
         lambda: leaning(cylinder(half[0], 2 * half[1], turn[0]), random),
         lambda: leaning(box(2 * half, turn), random),
-    ][random.integers(14)]()
+    ][random.integers(12)]()

@@ -7,7 +7,8 @@ from scanfab import direction_rule
 from scanfab.base.shapes import sphere
 from scanfab.scan.lines import cut_lines, grid_points, line_triads, sample_segments
 from tests.helpers import naive
-from tests.helpers.lattices import shaken_cubic
+from tests.helpers.lattices import rotation, shaken_cubic
+from tests.helpers.windows import random_window
 
 
 @pytest.fixture
@@ -19,23 +20,20 @@ def spheres():
     return packing.position - packing.position.mean(axis=0), radius
 
 
-@pytest.mark.parametrize("window", [0.0, 1.5])
-def test_void_segments_are_those_of_the_naive_twin(spheres, window):
-    position, radius = spheres
-    triad = line_triads(np.array([[0.3, -0.5, np.sqrt(0.66)]]))[0]
-    points = grid_points(2.0, 60)
-    found = cut_lines(position, radius, triad, points, sphere(window) if window else None)
-    for number, point in enumerate(points):
-        chords = naive.chords(position, radius, point @ triad[:2], triad[2])
-        solids = naive.union(chords)
+@pytest.mark.parametrize("seed", range(60))
+def test_void_segments_are_those_of_the_naive_twin_in_any_window(spheres, seed):
+    random = np.random.default_rng(seed)
+    window, triad, points = random_window(random), rotation(random), grid_points(2.0, 60)
+    found = cut_lines(*spheres, triad, points, window or None)
+    for number, foot in enumerate(points @ triad[:2]):
+        solids = naive.union(naive.chords(*spheres, foot, triad[2]))
+        low, high = naive.within(window, foot, triad[2])
         if window:
-            half2 = window**2 - point @ point
-            half = np.sqrt(max(half2, 0.0))
-            expected = naive.gaps_within(solids, -half, half) if half2 > 0 else []
+            expected = naive.gaps_within(solids, low, high) if low < high else []
         else:
             expected = naive.gaps_between(solids)
         lengths = found.length[(found.line == number) & found.void]
-        assert lengths == pytest.approx(naive.lengths(expected), abs=1e-12)
+        np.testing.assert_allclose(lengths, naive.lengths(expected), atol=1e-7)
 
 
 def test_pieces_of_a_line_join_alternate_and_lie_on_it(spheres):

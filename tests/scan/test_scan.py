@@ -6,9 +6,7 @@ import pytest
 import scanfab
 from scanfab import Cell, Packing, Sample, SettingsError, direction_rule, scan_lines
 from scanfab.base.arrays import concatenated
-from scanfab.scan.lines import line_triads, turned_triads
 from scanfab.scan.solids import MAX_LINES
-from tests.helpers import naive
 from tests.helpers.lattices import poisson_spheres
 from tests.helpers.scanning import fabric, solids_of
 
@@ -26,24 +24,6 @@ def raw(sums):
         getattr(sums, name).tobytes()
         for name in ("axes", "length", "segments", "lines", "void", "line_length")
     )
-
-
-def test_scan_equals_the_slow_twin_for_all_variants(solids):
-    """Its lines are those of the replicate's triads and shifts."""
-    sums = scan_lines(solids, RULE, spacing=0.6, cutoff=0.3, replicates=[3], seed=5)
-    triads, offsets = turned_triads(RULE, line_triads(RULE.axes), 5, 3)
-    for number, (triad, offset) in enumerate(zip(triads, offsets, strict=True)):
-        keep = ~solids.removed
-        tallies = [
-            *naive.tallies(solids.position, solids.radius, triad, offset, 0.6, 3.0, [0.3]),
-            *naive.tallies(
-                solids.position[keep], solids.radius[keep], triad, offset, 0.6, 3.0, [0.3]
-            ),
-        ]
-        for name in ("segments", "lines", "length"):
-            ways = ("whole", "window")
-            expected = [tally[f"{way}_{name}"] for way in ways for tally in tallies]
-            assert getattr(sums, name)[0, :, number] == pytest.approx(expected, rel=1e-9)
 
 
 def test_same_bytes_for_any_number_of_workers(solids):
@@ -83,17 +63,6 @@ def test_literal_grid_is_only_shifted(solids):
     sums = scan_lines(solids, rule, spacing=0.5, cutoff=0.3)
     assert np.all(sums.axes == rule.axes)
     assert len(np.unique(sums.length[:, 2, 0])) == 16
-
-
-def test_variants_that_nobody_asks_for_are_zero(solids):
-    every = scan_lines(solids, RULE, spacing=0.4, cutoff=0.3)
-    for variant, which in zip("abcd", range(4), strict=True):
-        sums = scan_lines(solids, RULE, spacing=0.4, cutoff=0.3, variants=variant)
-        others = np.arange(4) != which
-        assert not sums.segments[:, others].any()
-        assert not sums.lines[:, others].any()
-        assert np.array_equal(sums.segments[:, which], every.segments[:, which])
-        assert sums.length[:, which] == pytest.approx(every.length[:, which], rel=1e-12)
 
 
 def test_spacing_that_asks_for_too_many_lines_is_an_error(solids):

@@ -1,22 +1,19 @@
 """A scan along an axis equals its slow twin on random packings of every awkward kind."""
 
 import itertools
-from contextlib import contextmanager
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 from scanfab import Solids, sphere
-from scanfab.base.convex import Convex
-from scanfab.base.jit import kernel
 from scanfab.scan import tallies
 from scanfab.scan.kernels import lists, strips
-from scanfab.scan.kernels.grid import fill_order
 from scanfab.scan.lines import line_triads
 from scanfab.scan.solids import shortest_gap
 from tests.helpers import naive
-from tests.helpers.lattices import ball_points, poisson_spheres, rotation
-from tests.helpers.scanning import scan_triads
+from tests.helpers.lattices import Spheres, ball_points, poisson_spheres, rotation
+from tests.helpers.scanning import scan_triads, solids_of
 from tests.helpers.windows import random_window
 
 RUNS_OF_A_KIND = 60
@@ -26,15 +23,9 @@ WAYS = (False, True)
 SUMS = "segments", "lines", "length", "void", "line_length"
 
 
-@contextmanager
 def by_lists(way):
     """Scan over lists of chords, or row by row, wherever either may be."""
-    few_lines = tallies.FEW_LINES
-    tallies.FEW_LINES = np.inf if way else 0.0
-    try:
-        yield
-    finally:
-        tallies.FEW_LINES = few_lines
+    return patch.object(tallies, "FEW_LINES", np.inf if way else 0.0)
 
 
 def scattered(random):
@@ -86,20 +77,12 @@ KINDS = [scattered, overlapping, size_ratio_fifty, nested, concentric]
 KINDS += [chains_of_three, covering_the_window, nothing, lattice_points]
 
 
-def region(window):
-    """A window as a scan takes it, from a region, the radius of a sphere, or 0 for none."""
-    if isinstance(window, Convex):
-        return window
-    return sphere(window) if window else None
-
-
 def assert_fast_equals_naive(spheres, removed, triad, offset, spacing, cutoffs, window):
     """Numbers identical, lengths to rounding, of all four variants, row by row and over lists."""
-    position, radius = np.array(spheres[0], dtype=float), np.array(spheres[1], dtype=float)
-    solids = Solids(position, radius, removed, region(window))
+    solids = solids_of(Spheres(*spheres), window, removed)
     line = triad, offset, spacing, window, np.maximum(cutoffs, shortest_gap(solids))
-    every = naive.tallies(position, radius, *line)
-    left = naive.tallies(position[~removed], radius[~removed], *line)
+    every = naive.tallies(*spheres, *line)
+    left = naive.tallies(*(part[~removed] for part in spheres), *line)
     for cutoff, *slow in zip(cutoffs, every, left, strict=True):
         # alone, an open whole is scanned by the kernel of a window
         for way, variants in itertools.product(WAYS, ("abcd", "ab")):
@@ -107,12 +90,11 @@ def assert_fast_equals_naive(spheres, removed, triad, offset, spacing, cutoffs, 
                 sums = scan_triads(solids, triad[None], offset[None], spacing, cutoff, variants)
             for variant, tally in zip(variants, (*slow, *slow), strict=False):
                 kind = "whole" if variant in "ab" else "window"
-                found = {name: getattr(sums, name)[0, "abcd".index(variant), 0] for name in SUMS}
-                assert found["segments"] == tally[f"{kind}_segments"]
-                for name in ("lines", "length", "void", "line_length"):
-                    # of an open whole there is no more
+                for name in SUMS:
+                    found = getattr(sums, name)[0, "abcd".index(variant), 0]
+                    # an open whole has neither void nor length of its lines
                     expected = tally.get(f"{kind}_{name}", 0)
-                    assert found[name] == pytest.approx(expected, rel=1e-9, abs=1e-9), name
+                    assert found == pytest.approx(expected, rel=1e-9, abs=1e-9), name
 
 
 def check_random_packing(kind, random):
@@ -128,16 +110,8 @@ def check_random_packing(kind, random):
     removed = random.random(len(radius)) < random.choice([0.0, 0.3, 1.0])
     grid = triad, random.random(2), spacing
     cutoffs = [0.0, random.uniform(0.01, 0.5), random.uniform(0.5, 2.0)]
-    cutoffs += [2.0 * (region(window).reach if window else 0.0) + 1e-3]
+    cutoffs += [2.0 * getattr(window, "reach", 0.0) + 1e-3]
     assert_fast_equals_naive(spheres, removed, *grid, cutoffs, window)
-
-
-# kept on disk with the package's kernels, so that another body needs another name
-@kernel
-def sorted_order(values):
-    order = np.empty(values.size + 2, np.int64)
-    fill_order(values, order, np.empty(values.size + 3, np.int64))
-    return order[: values.size]
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
@@ -200,21 +174,3 @@ def test_lists_that_are_full_are_swept_and_filled_again():
     assert chords_per_line > 1.5 * lists.ROOM
     grid = np.eye(3), random.random(2), 0.2
     assert_fast_equals_naive(spheres, random.random(count) < 0.3, *grid, [0.0, 0.1], 5.0)
-
-
-@pytest.mark.parametrize(
-    "values",
-    [
-        [],
-        [1.0],
-        [2.0, 2.0, 2.0],
-        np.random.default_rng(0).normal(size=1000),
-        np.repeat([3.0, 1.0, 2.0], 500) + np.tile([0, 1e-16, 2e-16], 500),
-        np.append(np.random.default_rng(1).random(2000) * 1e-9, 1e6),
-    ],
-)
-def test_order_of_depths(values):
-    values = np.array(values, dtype=float)
-    order = sorted_order(values)
-    assert sorted(order) == list(range(len(values)))
-    assert np.all(np.diff(values[order]) >= 0)
