@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from scanfab import Solids, sphere
+from scanfab.base.jit import kernel
 from scanfab.scan import tallies
 from scanfab.scan.kernels import lists, strips
+from scanfab.scan.kernels.grid import fill_order
 from scanfab.scan.lines import line_triads
 from scanfab.scan.solids import shortest_gap
 from tests.helpers import naive
@@ -114,6 +116,14 @@ def check_random_packing(kind, random):
     assert_fast_equals_naive(spheres, removed, *grid, cutoffs, window)
 
 
+# kept on disk with the package's kernels, so that another body needs another name
+@kernel
+def sorted_order(values):
+    order = np.empty(values.size + 2, np.int64)
+    fill_order(values, order, np.empty(values.size + 3, np.int64))
+    return order[: values.size]
+
+
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
 def test_sweep_equals_the_slow_twin(kind):
     for seed in range(RUNS_OF_A_KIND):
@@ -174,3 +184,21 @@ def test_lists_that_are_full_are_swept_and_filled_again():
     assert chords_per_line > 1.5 * lists.ROOM
     grid = np.eye(3), random.random(2), 0.2
     assert_fast_equals_naive(spheres, random.random(count) < 0.3, *grid, [0.0, 0.1], 5.0)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        [],
+        [1.0],
+        [2.0, 2.0, 2.0],
+        np.random.default_rng(0).normal(size=1000),
+        np.repeat([3.0, 1.0, 2.0], 500) + np.tile([0, 1e-16, 2e-16], 500),
+        np.append(np.random.default_rng(1).random(2000) * 1e-9, 1e6),
+    ],
+)
+def test_order_of_depths(values):
+    values = np.array(values, dtype=float)
+    order = sorted_order(values)
+    assert sorted(order) == list(range(len(values)))
+    assert np.all(np.diff(values[order]) >= 0)
