@@ -57,6 +57,15 @@ def poisson(random, density, reach):
     return np.column_stack([place, random.uniform(0.4, 0.8, count)])
 
 
+@pytest.mark.parametrize("cutoff", [0.0, 0.7, 1.6])
+def test_empty_circle(cutoff):
+    """ℓ = (R²(π/2 - asin(c/2R)) + (c/2)√(R² - c²/4)) / √(R² - c²/4)."""
+    solids = solids_in([], sphere(1.0, XY))
+    found = mean_lengths(solids, along(*ANGLES), "c", spacing=0.005, cutoff=cutoff)
+    h = sqrt(1 - cutoff**2 / 4)
+    assert found.agrees((pi / 2 - asin(cutoff / 2) + cutoff / 2 * h) / h)
+
+
 def test_discs_without_overlap_in_a_circle():
     """ℓ = (πR² - Σπr²)/(2R + Σ2r) in every direction, whatever the arrangement."""
     r = np.random.default_rng(3).uniform(0.3, 1.0, 25)

@@ -68,6 +68,28 @@ def test_spheres_without_overlap_wholly_inside(name):
 
 
 @pytest.mark.parametrize(
+    ("shape", "alpha"),
+    [
+        (box([1.0, 1.0, 2.0]), 0.06433),
+        (box([1.0, 1.0, 0.8]), -0.02189),
+        (ellipsoid([1.0, 1.0, 2.0]), 0.08650),
+        (ellipsoid([1.0, 1.0, 0.8]), -0.02997),
+        (cylinder(1.0, 2.0), 0.00122),
+        (cylinder(1.0, 1.5), -0.02711),
+        (box([1.0, 1.0, 1.0]), 0.0),
+        (sphere(1.0), 0.0),
+    ],
+)
+def test_anisotropy_of_an_empty_window(shape, alpha):
+    """In the limit of many directions."""
+    axes = direction_rule("fibonacci:20000").axes
+    shared, slope = shape.overlap(axes, 0.0)
+    length = shared / slope
+    along = length @ axes[:, 2] ** 2 / length.sum()
+    assert 1.5 * along - 0.5 == pytest.approx(alpha, abs=2e-5)
+
+
+@pytest.mark.parametrize(
     "shape", [box([7.0, 7.0, 14.0]), cylinder(4.0, 12.0), ellipsoid([4.0, 4.0, 8.0])]
 )
 def test_freely_overlapping_spheres_have_the_anisotropy_of_the_window_alone(shape):

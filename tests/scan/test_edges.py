@@ -1,4 +1,4 @@
-"""What counts at the window's surface: each rule equals its slow twin."""
+"""What counts at the window's surface: each rule equals its slow twin, and has no bias."""
 
 from itertools import product
 
@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 import scanfab.scan.solids
-from scanfab import Cell, Solids, sphere
+from scanfab import Cell, Solids, direction_rule, sphere
 from scanfab.scan.edges import EDGES, START
 from scanfab.scan.kernels.grid import CellGrains
+from scanfab.scan.lines import line_triads
 from scanfab.scan.solids import margin_of, shortest_gap
 from tests.helpers import naive
 from tests.helpers.lattices import rotation
-from tests.helpers.scanning import scan_triads
+from tests.helpers.scanning import ratio, scan_triads
 from tests.helpers.windows import random_window
 from tests.scan.kernels.test_axes import KINDS
 
@@ -114,3 +115,32 @@ def test_rules_equal_the_slow_twin_in_tilted_cells(periodic, edge, narrow_margin
 
             words = triad, offset, 0.4, sphere(1.2), 0.2, edge
             assert_equals(sums, variant, slow_sums(on_line, *words))
+
+
+def of_poisson(edge, cutoff, packings=120):
+    """Mean length in windows of six largest radii, of freely overlapping spheres."""
+    length, number = [], []
+    edge_length, density, rule = 26.0, 0.2, direction_rule("lebedev:5")
+    triads, cell = line_triads(rule.axes), Cell([edge_length] * 3)
+    for seed in range(packings):
+        random = np.random.default_rng([seed, 9])
+        count = random.poisson(density * edge_length**3)
+        position, radius = edge_length * random.random((count, 3)), random.uniform(0.5, 1.5, count)
+        solids = periodic_solids(cell, position, radius, radius < 0, sphere(9.0), edge)
+        sums = scan_triads(solids, triads, random.random((len(rule), 2)), 1.2, cutoff, "c")
+        length.append(sums.length[0, 2].sum())
+        number.append(sums.segments[0, 2].sum())
+    return ratio(np.array(length), np.array(number, dtype=float))
+
+
+@pytest.mark.parametrize("edge", ["start", "ends"])
+def test_poisson_spheres_have_their_mean_length_in_small_windows(edge):
+    """ℓ = c + 1/β; clipped to the window it would be c + A1/(A0 + βA1)."""
+    cutoff, window, beta = 0.5, 9.0, 0.2 * np.pi * 13 / 12
+    a0 = 1 - cutoff**2 / (4 * window**2)
+    a1 = 4 * window / 3 - cutoff + cutoff**3 / (12 * window**2)
+    found = of_poisson(edge, cutoff)
+    assert found.error < 6e-3 * (cutoff + 1 / beta)
+    assert found.agrees(cutoff + 1 / beta, within=2e-2)
+    # what clip misses is seen
+    assert not found.agrees(cutoff + a1 / (a0 + beta * a1), within=1.0)

@@ -76,6 +76,30 @@ def test_every_contact_form_gives_the_same_contacts(grains, name):
     assert np.mean(push > 0) > 0.9
 
 
+@pytest.mark.parametrize("name", ["pairs.txt", "pairs_30000.vtk.gz"])
+def test_contacts_across_periodic_faces_are_true(name):
+    packing = scanfab.read(PERIODIC / "dump.txt", contacts=PERIODIC / name)
+    contacts = csv_rows(PERIODIC / "truth_contacts.csv")
+    assert_true_contacts(packing, contacts, normals=1e-4)
+    crossing = np.any(packing.contacts.image != 0, axis=1)
+    assert crossing.sum() == contacts["crossing"].sum() == 114
+
+
+@pytest.mark.parametrize("folder", [FLOOR, PERIODIC])
+def test_geometry_finds_the_contacts_of_the_program(folder):
+    packing = scanfab.find_contacts(scanfab.read(folder / "precise.txt"))
+    assert truth.id_pairs(packing) == truth.true_pairs(csv_rows(folder / "truth_contacts.csv"))
+
+
+def test_wall_contacts_count_for_their_grains():
+    names = ("tutorial.txt", "pairs_all.txt.gz", "walls_all.txt")
+    packing = scanfab.read_series([FLOOR / name for name in names])[0].read()
+    assert_true_contacts(packing, csv_rows(FLOOR / "truth_contacts.csv"), normals=1e-4)
+    assert packing.wall_contacts.sum() == 25
+    ids = np.loadtxt(FLOOR / "walls_all.txt", skiprows=9)[:, 14].astype(int)
+    assert set(packing.id[packing.wall_contacts > 0].tolist()) == set(ids.tolist())
+
+
 @pytest.mark.parametrize("columns", [None, "pos id force", "id1=c_a[1],id2=c_a[2]"])
 @pytest.mark.parametrize("grains", ["tutorial.txt", "shuffled.txt", "precise.txt"])
 def test_wall_contacts_alone_leave_the_contacts_to_geometry(grains, columns):
