@@ -4,7 +4,7 @@ The tables of the paper's experiment, from the dumps of its runs.
 Usage, from the root of the repository, with the runs of sample_data/paper/README.md in RUNS, each
 in a folder of its name::
 
-    python -m tests.campaigns.paper RUNS [--into FOLDER] [--only RUN ...] [--measures NAME ...]
+    python -m tests.campaigns.paper RUNS [--into FOLDER] [--only RUN] ... [--measures NAME] ...
                                          [--workers N]
 
 Writes sample_data/paper/RUN_MEASURE.csv, and RUN_engine.csv beside it.
@@ -13,34 +13,30 @@ Half an hour to an hour for each run of 13,723 grains on two cores. A table that
 computed again; an unfinished one goes on. docs/make/paper.py makes the page of them.
 """
 
-import argparse
 import shutil
 import subprocess
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
+import click
 
 from tests.helpers.interruptions import PROGRAM
-from tests.helpers.truth import SAMPLE_DATA
+from tests.helpers.truth import COMPONENTS, SAMPLE_DATA, csv_rows
 
 TABLES = SAMPLE_DATA / "paper"
-BLOCKS = range(1, 9)
-AXES = ("xx", "yy", "zz", "xy", "xz", "yz")
-
+A_FOLDER = click.Path(path_type=Path, resolve_path=True)
 # what scanfab compare needs, with the sample's octants for the interval of a slope
 CURVES = ["source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_vs_axial_se"]
 CURVES += ["alpha_c_axial"]
 OCTANTS = ["alpha_vs_axial_sample_se", "alpha_c_axial_sample_se"]
-OCTANTS += [f"alpha_vs_axial_{kind}_{block}" for kind in ("without", "half") for block in BLOCKS]
-OCTANTS += [f"alpha_c_axial_without_{block}" for block in BLOCKS]
+OCTANTS += [
+    f"alpha_vs_axial_{kind}_{block}" for kind in ("without", "half") for block in range(1, 9)
+]
+OCTANTS += [f"alpha_c_axial_without_{block}" for block in range(1, 9)]
 TENSORS = ["grains", "rattlers", "contacts", "coordination", "segments", "mean_length"]
-TENSORS += [f"{name}_{axes}" for name in ("gvs", "gc") for axes in AXES]
+TENSORS += [f"{name}_{axes}" for name in ("gvs", "gc") for axes in COMPONENTS]
 TENSORS += ["alpha_vs", "alpha_c", "alpha_c_axial_se"]
 HARMONICS = [f"{name}{end}" for name in ("vs_a2", "vs_a4", "c_a2", "c_a4") for end in ("", "_se")]
-DIGITS = 7
-
-
 USUAL = ("paper", "default", "start", "ends", "counts")
 
 
@@ -52,61 +48,49 @@ class Run(NamedTuple):
     frames: str = "0:41"
     measures: tuple[str, ...] = USUAL
 
-    @property
-    def is_shell(self) -> bool:
-        return "--boundary" in self.options
-
-    @property
-    def is_plane(self) -> bool:
-        return self.folder.startswith("biaxial")
-
 
 class Measure(NamedTuple):
     """Options of compute, and the columns that are kept."""
 
-    options: tuple[str, ...]
+    options: str
     columns: tuple[str, ...] = (*CURVES, *OCTANTS)
 
 
+ALL = (*CURVES, *TENSORS, *OCTANTS)
 # the lines of the paper: 16 replicates of 43 axes, in total at a distance of r_min/10
-PAPER = ("--spacing", "0.1rmin", "--directions", "lebedev:15", "--cutoff", "1rmin", "--rv", "0.7")
+PAPER = "--spacing 0.1rmin --directions lebedev:15 --cutoff 1rmin --rv 0.7"
 # what the stored tables were computed to
-EXACT = ("--tolerance", "1e-4")
+EXACT = "--tolerance 1e-4"
 # a hundredth of the signal: what the sweeps need to be told apart
-SWEEP = ("--spacing", "0.4rmin", "--directions", "lebedev:15")
+SWEEP = "--spacing 0.4rmin --directions lebedev:15"
+CUTOFFS = "--cutoffs 0,0.1rmin,0.3rmin,0.5rmin,0.75rmin,1rmin,1.5rmin,2rmin,3rmin"
 MEASURES = {
-    "paper": Measure(PAPER, (*CURVES, *TENSORS, *OCTANTS)),
-    "default": Measure(EXACT, (*CURVES, *TENSORS, *OCTANTS)),
-    "start": Measure(
-        ("--edge", "start", "--variants", "cd", *EXACT), (*CURVES, "left_out", *OCTANTS)
-    ),
-    "ends": Measure(("--edge", "ends", *EXACT)),
+    "paper": Measure(PAPER, ALL),
+    "default": Measure(EXACT, ALL),
+    "start": Measure(f"--edge start --variants cd {EXACT}", (*CURVES, "left_out", *OCTANTS)),
+    "ends": Measure(f"--edge ends {EXACT}"),
     "cutoffs": Measure(
-        ("--cutoffs", "0,0.1rmin,0.3rmin,0.5rmin,0.75rmin,1rmin,1.5rmin,2rmin,3rmin", *SWEEP),
-        (*CURVES, "cutoff", "alpha_vs_axial_contacts", *OCTANTS),
+        f"{CUTOFFS} {SWEEP}", (*CURVES, "cutoff", "alpha_vs_axial_contacts", *OCTANTS)
     ),
-    "rvs": Measure(("--rv", "0.4,0.5,0.6", "--variants", "cd", *SWEEP), (*CURVES, "rv", *OCTANTS)),
+    "rvs": Measure(f"--rv 0.4,0.5,0.6 --variants cd {SWEEP}", (*CURVES, "rv", *OCTANTS)),
     # the printed RV of 4.5 mm in a sample of 30.3 mm
-    "small-rv": Measure(("--rv", "0.1485", "--variants", "cd", *SWEEP)),
-    "recursive": Measure(("--rattlers", "recursive", "--variants", "bd", *SWEEP)),
-    "four": Measure(("--min-contacts", "4", "--variants", "bd", *SWEEP)),
-    "coarse": Measure(("--spacing", "4rmin", "--directions", "lebedev:15")),
-    "few": Measure(("--spacing", "0.4rmin", "--directions", "9")),
+    "small-rv": Measure(f"--rv 0.1485 --variants cd {SWEEP}"),
+    "recursive": Measure(f"--rattlers recursive --variants bd {SWEEP}"),
+    "four": Measure(f"--min-contacts 4 --variants bd {SWEEP}"),
+    "coarse": Measure("--spacing 4rmin --directions lebedev:15"),
+    "few": Measure("--spacing 0.4rmin --directions 9"),
     "literal": Measure(
-        ("--directions", "equal-angle:10", "--spacing", "0.5rmin"), (*CURVES, "gvs_xz", *OCTANTS)
+        "--directions equal-angle:10 --spacing 0.5rmin", (*CURVES, "gvs_xz", *OCTANTS)
     ),
     "half-sphere": Measure(
-        ("--directions", "equal-angle-full:10", "--spacing", "0.5rmin"),
-        (*CURVES, "gvs_xz", *OCTANTS),
+        "--directions equal-angle-full:10 --spacing 0.5rmin", (*CURVES, "gvs_xz", *OCTANTS)
     ),
     "harmonics": Measure(
-        ("--with", "harmonics", "--variants", "ac", *EXACT),
-        ("frame", "strain", "variant", *HARMONICS),
+        f"--with harmonics --variants ac {EXACT}", ("frame", "strain", "variant", *HARMONICS)
     ),
     # a rough scan: here only what is counted matters
     "counts": Measure(
-        ("--directions", "9", "--spacing", "3rmin", "--variants", "ac"),
-        ("frame", "strain", "variant", *TENSORS),
+        "--directions 9 --spacing 3rmin --variants ac", ("frame", "strain", "variant", *TENSORS)
     ),
 }
 SHELL = ("--boundary", "mask=3")
@@ -126,46 +110,45 @@ RUNS = {
 
 def words(runs: Path, run: Run, name: str) -> list[str]:
     """The command that computes a table, but for the file."""
-    measure, more = MEASURES[name], []
-    # in a plane directions are so many equal steps
-    options = ["25" if run.is_plane and one == "lebedev:15" else one for one in measure.options]
-    if name == "counts" and run.is_shell:
-        radius = np.genfromtxt(runs / run.folder / "engine.csv", delimiter=",", names=True)
-        more = ["--rv-radius", repr(float(radius["rv_radius"][0])), "--rv-center", "0", "0", "0"]
-    elif not run.is_shell and "--variants" not in measure.options:
-        more = ["--variants", "a" if name == "counts" else "abcd"]
-    kept = ["--fields", ",".join(measure.columns), "--digits", str(DIGITS)]
-    return ["compute", run.folder, *run.options, "--frames", run.frames, *options, *more, *kept]
+    options, columns = MEASURES[name]
+    more: list[str] = []
+    if run.folder.startswith("biaxial"):
+        # in a plane directions are so many equal steps
+        options = options.replace("lebedev:15", "25")
+    if name == "counts" and run.options == SHELL:
+        radius = csv_rows(runs / run.folder / "engine.csv")["rv_radius"][0]
+        more = ["--rv-radius", repr(float(radius)), "--rv-center", "0", "0", "0"]
+    elif run.options != SHELL and "--variants" not in options:
+        more = ["--variants", "abcd"]
+    more += ["--fields", ",".join(columns), "--digits", "7"]
+    return ["compute", run.folder, *run.options, "--frames", run.frames, *options.split(), *more]
 
 
-def compute(runs: Path, table: Path, run: Run, name: str, workers: int) -> None:
-    """One table, in the folder of the runs, so that it says no more of it than the run's name."""
-    more = ["--workers", str(workers), "--resume", "--quiet", "-o", str(table)]
-    subprocess.run([*PROGRAM, *words(runs, run, name), *more], cwd=runs, check=True)
-    table.with_name(table.name + ".manifest.json").unlink(missing_ok=True)
-
-
-def main() -> None:
+@click.command(help="Make the tables of the paper's experiment.")
+@click.argument("runs", type=A_FOLDER)
+@click.option("--into", type=A_FOLDER, default=TABLES)
+@click.option("--only", multiple=True, default=[*RUNS])
+@click.option("--measures", multiple=True, default=[*MEASURES])
+@click.option("--workers", default=2)
+def main(
+    runs: Path, into: Path, only: tuple[str, ...], measures: tuple[str, ...], workers: int
+) -> None:
     """Compute what is missing."""
-    parser = argparse.ArgumentParser(description="Make the tables of the paper's experiment.")
-    parser.add_argument("runs", type=Path)
-    parser.add_argument("--into", type=Path, default=TABLES)
-    parser.add_argument("--only", nargs="+", default=[*RUNS])
-    parser.add_argument("--measures", nargs="+", default=[*MEASURES])
-    parser.add_argument("--workers", type=int, default=2)
-    given = parser.parse_args()
-    runs, into = given.runs.resolve(), given.into.resolve()
-    for run_name in given.only:
+    for run_name in only:
         run = RUNS[run_name]
-        if not (runs / run.folder / "engine.csv").exists():
+        engine = runs / run.folder / "engine.csv"
+        if not engine.exists():
             print(f"{run_name}: no {run.folder}/engine.csv in {runs}, left out", flush=True)
             continue
-        shutil.copyfile(runs / run.folder / "engine.csv", into / f"{run_name}_engine.csv")
-        for name in [one for one in run.measures if one in given.measures]:
+        shutil.copyfile(engine, into / f"{run_name}_engine.csv")
+        for name in [one for one in run.measures if one in measures]:
             table = into / f"{run_name}_{name}.csv"
             if not table.exists():
                 print(table.name, flush=True)
-                compute(runs, table, run, name, given.workers)
+                more = ["--workers", str(workers), "--resume", "--quiet", "-o", str(table)]
+                # in the folder of the runs: the table says no more of it than the run's name
+                subprocess.run([*PROGRAM, *words(runs, run, name), *more], cwd=runs, check=True)
+                table.with_name(f"{table.name}.manifest.json").unlink(missing_ok=True)
 
 
 if __name__ == "__main__":

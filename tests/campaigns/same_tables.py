@@ -1,25 +1,31 @@
 """
 Whether another version of the program makes the same tables.
 
-    python -m tests.campaigns.same_tables [--base COMMIT] [--keep FOLDER]
+    python -m tests.campaigns.same_tables [--base COMMIT]
 
-The base version is checked out and installed in an environment of its own; it is held against the
-version that is installed beside this interpreter. Scans of fixed lines agree to 1e-9, others within
+The base version is installed in a folder of its own, beside the packages of this interpreter, and
+held against the version that is installed there. Scans of fixed lines agree to 1e-9, others within
 three of their standard errors. Each difference is printed; exit code 1 if there is one.
 """
 
-import argparse
-import csv
-import math
+import os
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from subprocess import DEVNULL
+
+import click
+import numpy as np
+import polars
+from polars.selectors import numeric
+
+from tests.helpers.interruptions import PROGRAM
 
 ROOT = Path(__file__).resolve().parents[2]
+PIP = ["-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation"]
 DATA = "sample_data"
-MAIN = "from scanfab.cli.main import main; main()"
 BOX, TRIAXIAL = f"{DATA}/liggghts_box", f"{DATA}/yade_triaxial --boundary mask=3"
 PERIODIC, SHEAR = f"{DATA}/liggghts_periodic", f"{DATA}/lammps_shear"
 FLOOR, DISCS = f"{DATA}/liggghts_formats/floor", f"{DATA}/lammps_discs"
@@ -61,63 +67,45 @@ COMMANDS = {
 }
 
 
-def installed(commit: str, kept: Path) -> Path:
-    """The Python of an environment with a commit; made where it is not."""
-    checkout, python = kept / commit, kept / f"{commit}-env" / "bin" / "python"
-    if not python.exists():
-        subprocess.run(["git", "clone", "--quiet", ROOT, checkout], check=True)
-        subprocess.run(["git", "-C", checkout, "checkout", "--quiet", commit], check=True)
-        subprocess.run([sys.executable, "-m", "venv", python.parents[1]], check=True)
-        subprocess.run([python, "-m", "pip", "install", "--quiet", checkout], check=True)
-    return python
+def table(name: str, out: Path, site: str = "") -> polars.DataFrame:
+    """A command's table, by the version in a folder or the installed one; empty if it fails."""
+    out.mkdir(exist_ok=True)
+    path, words = out / f"{name}.csv", COMMANDS[name].format(out=out).split()
+    command, env = [sys.executable, "-P", *PROGRAM[1:], *words], {**os.environ, "PYTHONPATH": site}
+    subprocess.run([*command, "-o", path], cwd=ROOT, env=env, stderr=DEVNULL, check=False)
+    return polars.read_csv(path, infer_schema_length=None) if path.exists() else polars.DataFrame()
 
 
-def table(python: Path, name: str, out: Path) -> list[dict[str, str]]:
-    """The rows of a command's table; none if it fails."""
-    words = COMMANDS[name].format(out=out).split()
-    path = out / f"{name}.csv"
-    words = [python, "-P", "-c", MAIN, *words, "-o", path]
-    subprocess.run(words, cwd=ROOT, stderr=subprocess.DEVNULL, check=False)
-    return list(csv.DictReader(path.open())) if path.exists() else []
-
-
-def agree(row: dict[str, str], other: dict[str, str], column: str, fixed: bool) -> bool:
-    """Whether two cells are the same number, or the same word."""
-    try:
-        one, two = float(row[column]), float(other[column])
-    except ValueError:
-        return row[column] == other[column]
-    errors = (x.get(f"{column}_se") or x.get("alpha_vs_axial_se") or 0 for x in (row, other))
-    near = 0.0 if fixed else 3 * math.hypot(*map(float, errors))
-    return math.isclose(one, two, rel_tol=1e-9, abs_tol=max(near, 1e-12))
-
-
-def differences(
-    name: str, rows: list[dict[str, str]], others: list[dict[str, str]]
-) -> Iterator[str]:
+def differences(name: str, rows: polars.DataFrame, others: polars.DataFrame) -> Iterator[str]:
     """Where two tables differ, a line for each cell."""
-    if not rows or [len(rows), *rows[0]] != [len(others), *(others or [{}])[0]]:
+    if rows.is_empty() or (len(rows), rows.columns) != (len(others), others.columns):
         yield f"{name}: {len(rows)} and {len(others)} rows, or other columns"
         return
-    fixed = "--directions" in COMMANDS[name]
-    for number, (row, other) in enumerate(zip(rows, others, strict=True)):
-        for column in row.keys() - {"seconds"}:
-            if not agree(row, other, column, fixed):
-                yield f"{name} row {number} {column}: {row[column]} -> {other[column]}"
+    numbers = {*rows.select(numeric()).columns} & {*others.select(numeric()).columns}
+    for column in sorted({*rows.columns} - {"seconds"}):
+        one, two = rows[column], others[column]
+        same = one.cast(str).eq_missing(two.cast(str)).to_numpy()
+        if column in numbers:
+            near, errors = np.zeros(len(rows)), [f"{column}_se", "alpha_vs_axial_se"]
+            errors = [error for error in errors if error in numbers]
+            if errors and "--directions" not in COMMANDS[name]:
+                near = 3 * np.hypot(*(x[errors[0]].fill_null(0).to_numpy() for x in (rows, others)))
+            same |= np.isclose(one, two, rtol=1e-9, atol=np.maximum(near, 1e-12))
+        for row in np.flatnonzero(~same).tolist():
+            yield f"{name} row {row} {column}: {one[row]} -> {two[row]}"
 
 
-def main() -> None:
+@click.command(help=__doc__)
+@click.option("--base", default="HEAD~1")
+def main(base: str) -> None:
     """Make the base, ask both versions, print the differences."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--base", default="HEAD~1")
-    parser.add_argument("--keep", type=Path, default=ROOT / "build" / "same_tables")
-    given = parser.parse_args()
-    found = []
-    with tempfile.TemporaryDirectory() as one, tempfile.TemporaryDirectory() as two:
-        base = installed(given.base, given.keep.resolve())
+    found: list[str] = []
+    with tempfile.TemporaryDirectory() as folder:
+        site, source = f"{folder}/site", f"git+file://{ROOT}@{base}"
+        subprocess.run([sys.executable, *PIP, "--target", site, source], check=True)
+        before, after = Path(folder) / "before", Path(folder) / "after"
         for name in COMMANDS:
-            before = table(base, name, Path(one))
-            found += differences(name, before, table(Path(sys.executable), name, Path(two)))
+            found += differences(name, table(name, before, site), table(name, after))
             print(f"{name}: {len(found)} differences so far", flush=True)
     print(*found, sep="\n")
     sys.exit(bool(found))

@@ -56,12 +56,9 @@ class MyCode:
         raise ReadError(f"{snapshot.path}: My Code writes no contacts")
 
     def write(self, packing: Packing, path: Path) -> Left:
-        rows = zip(packing.id, *packing.position.T, packing.radius, strict=True)
-        text = "".join(f"{id} {x!r} {y!r} {z!r} {r!r}\n" for id, x, y, z, r in _plain(rows))
+        columns = (packing.id, *packing.position.T, packing.radius)
+        rows = zip(*(column.tolist() for column in columns), strict=True)
+        text = "".join(f"{id} {x!r} {y!r} {z!r} {r!r}\n" for id, x, y, z, r in rows)
         path.write_text(f"MYCODE {len(packing)}\n{text}")
         # contacts, cell, step and columns are written beside the file, and found there again
         return Left(contacts=True, frame=True, columns=tuple(more_columns(packing)))
-
-
-def _plain(rows):
-    return ([one.item() for one in row] for row in rows)
