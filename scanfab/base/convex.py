@@ -33,23 +33,18 @@ class Body:
     Points above and below a body that lies in a plane count as inside.
     """
 
-    outline: FloatArray
-    """Points of its surface, shape (K, 3); their hull is the body, or nearly if it is curved."""
+    corners: FloatArray
+    """
+    Corners of the polyhedron, shape (K, 3).
+
+    A round body is the hull of its corners, swept by a ball or disc of radius 1 about the origin.
+    """
     planes: FloatArray
     """Its flat faces, shape (P, 4): each row n, d keeps the side n·x < d."""
-    volume: float
-    form: FloatArray = field(default_factory=lambda: np.zeros(3))
-    """The diagonal of M in x·M x < 1, which bounds its curved face; 0 if there is none."""
+    round: FloatArray = field(default_factory=lambda: np.zeros(3))
+    """1 for each axis of its ball or disc, and 0 for the others."""
     is_flat: bool = False
     """Whether it lies in a plane."""
-
-    def support(self, along: FloatArray) -> FloatArray:
-        """The point of the body that lies furthest along each vector, shape (N, 3)."""
-        return np.asarray(self.outline[np.argmax(along @ self.outline.T, axis=1)])
-
-    def reach(self, frame: FloatArray) -> float:
-        """Radius of a ball about the origin that holds the image frame @ x."""
-        return float(np.linalg.norm(self.outline @ frame.T, axis=1).max())
 
     def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
         """
@@ -61,15 +56,16 @@ class Body:
         from scipy.spatial import ConvexHull, HalfspaceIntersection
 
         shared, slope = np.zeros((2, len(shift)))
-        part = ConvexHull(self.outline)  # all of the body, if the copy lies at its own place
+        part = ConvexHull(self.corners)  # all of the body, if the copy lies at its own place
         normals, distance = self.planes[:, :3], self.planes[:, 3]
         depth = np.column_stack([normals, np.ones(len(normals))])
+        least = SLIVER * np.linalg.norm(self.corners, axis=1).max()
         for k, vector in enumerate(shift):
             if length != 0.0:
                 # the planes of the shared part, and the centre and radius of its largest ball
                 room = distance + np.minimum(normals @ (length * vector), 0.0)
                 *inside, radius = linprog([0, 0, 0, -1], depth, room, bounds=[(None, None)] * 4).x
-                if radius <= SLIVER * self.reach(np.eye(3)):
+                if radius <= least:
                     continue
                 bounds = np.column_stack([normals, -room])
                 part = ConvexHull(HalfspaceIntersection(bounds, np.array(inside)).intersections)
@@ -83,7 +79,7 @@ class Quadric(NamedTuple):
     """The points x with x·form x < level."""
 
     form: FloatArray
-    """Symmetric, no eigenvalue below 0, shape (3, 3); exactly the unit matrix for a sphere."""
+    """Symmetric, no eigenvalue below 0, shape (3, 3); 0 if planes alone bound the region."""
     level: float
     """Above 0, so that the origin lies inside."""
 
@@ -94,11 +90,6 @@ class Quadric(NamedTuple):
         return np.asarray(np.sqrt(np.maximum(square, 0.0)))
 
 
-# the quadric of a region that is bounded by planes alone: no point violates it
-EVERYWHERE = Quadric(np.zeros((3, 3)), 1.0)
-
-
-@dataclass(frozen=True, eq=False)
 class Convex:
     """
     A bounded convex region about the origin, without its surface.
@@ -108,22 +99,26 @@ class Convex:
 
     Parameters
     ----------
+    body : Body
+        The body that is mapped.
+    frame : ndarray, shape (3, 3)
+        The linear map: the region holds the points frame @ x for all x in the body.
+    size : str
+        Size in words for messages, for instance ``radius 2``.
+
+    Attributes
+    ----------
     planes : ndarray
         Flat bounds, shape (P, 4): each row n, d, with a unit vector n, keeps the side n·x < d.
     quadric : Quadric
-        Curved bound; ``EVERYWHERE`` if only planes bound the region.
+        Curved bound.
     low : ndarray
         Lower corner of the box along x, y and z that holds the region, shape (3,).
     high : ndarray, shape (3,)
         Upper corner of this box.
     reach : float
-        Radius of a ball about the origin that holds the region; for a sphere its own radius.
-    size : str
-        Size in words for messages, for instance ``radius 2``.
-    body : Body
-        The body that is mapped.
-    frame : ndarray, shape (3, 3)
-        The linear map: the region holds the points frame @ x for all x in the body.
+        Radius of a ball about the origin that holds the region; for a sphere its own radius. It is
+        slightly too large for a sheared cylinder, whose axis is not normal to its ends.
 
     Examples
     --------
@@ -135,14 +130,20 @@ class Convex:
     (2.0, [-2.0, -2.0, -2.0])
     """
 
-    planes: FloatArray
-    quadric: Quadric
-    low: FloatArray
-    high: FloatArray
-    reach: float
-    size: str
-    body: Body
-    frame: FloatArray
+    def __init__(self, body: Body, frame: FloatArray, size: str) -> None:
+        self.body, self.frame, self.size = body, frame, size
+        planes = np.column_stack([body.planes[:, :3] @ np.linalg.inv(frame), body.planes[:, 3]])
+        self.planes: FloatArray = planes / np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
+        corners, ball = body.corners @ frame.T, frame * body.round
+        # Lengths in units of the longest semi-axis make the form of a sphere exactly 1.
+        widest = float(np.linalg.norm(ball, 2))
+        unit = widest or 1.0
+        back = body.round[:, None] * np.linalg.inv(frame / unit)
+        self.quadric = Quadric(back.T @ back, unit * unit)
+        # not every body is symmetric, so the extents along -x, -y, -z are computed as well
+        self.low, self.high = (np.diag(self.support(along)) for along in (-np.eye(3), np.eye(3)))
+        aside = 2.0 * np.linalg.norm(corners @ ball, axis=1)
+        self.reach = float(np.sqrt((widest**2 + np.sum(corners**2, axis=1) + aside).max()))
 
     def __repr__(self) -> str:
         return f"Convex: {self} about the origin"
@@ -153,7 +154,9 @@ class Convex:
     @property
     def is_sphere(self) -> bool:
         """Whether the region is a sphere, or in a plane a circle."""
-        return not len(self.planes) and np.array_equal(self.quadric.form, np.eye(3))
+        # of all ellipsoids of the same reach the sphere is furthest from the corners of its box
+        furthest = (2.0 if self.is_flat else 3.0) * self.reach**2
+        return not len(self.planes) and bool(self.high @ self.high > (1.0 - ROUNDING) * furthest)
 
     @property
     def is_flat(self) -> bool:
@@ -163,7 +166,7 @@ class Convex:
     @property
     def volume(self) -> float:
         """Volume, in the dump's length unit cubed; in a plane the area."""
-        return float(self.body.volume * abs(np.linalg.det(self.frame)))
+        return float(self.overlap(np.zeros((1, 3)), 0.0)[0][0])
 
     @property
     def mean_shadow(self) -> float:
@@ -176,7 +179,8 @@ class Convex:
     @property
     def outline(self) -> FloatArray:
         """Points of the surface, shape (K, 3); their hull is the region, or nearly if curved."""
-        return self.body.outline @ self.frame.T
+        rim = [np.zeros((1, 3)), on_circle(), on_sphere()][np.count_nonzero(self.body.round[1:])]
+        return (self.body.corners[:, None] + rim).reshape(-1, 3) @ self.frame.T
 
     def contains(self, points: FloatArray) -> BoolArray:
         """
@@ -289,7 +293,11 @@ class Convex:
         -------
         ndarray, shape (N, 3)
         """
-        return np.asarray(self.body.support(along @ self.frame) @ self.frame.T)
+        along = along @ self.frame
+        corner = self.body.corners[np.argmax(along @ self.body.corners.T, axis=1)]
+        ball = along * self.body.round
+        length = np.linalg.norm(ball, axis=1, keepdims=True)
+        return np.asarray((corner + ball / np.where(length > 0.0, length, 1.0)) @ self.frame.T)
 
     def overlap(self, axes: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
         """
@@ -347,22 +355,4 @@ class Convex:
         """
         if np.array_equal(gradient, np.eye(3)):
             return self
-        return image_of(self.body, gradient @ self.frame, f"deformed, first {self.size}")
-
-
-def image_of(body: Body, frame: FloatArray, size: str) -> Convex:
-    """The region of the points frame @ x for all x in the body."""
-    inverse = np.linalg.inv(frame)
-    planes = np.column_stack([body.planes[:, :3] @ inverse, body.planes[:, 3]])
-    planes /= np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
-    quadric = EVERYWHERE
-    if body.form.any():
-        form = inverse.T @ np.diag(body.form) @ inverse
-        # scaled so that the isotropic part is 1 in any unit of length
-        level = 3.0 / np.trace(form)
-        quadric = Quadric(level * form, float(level))
-    # not every body is symmetric, so the extents along -x, -y, -z are computed as well
-    along = np.concatenate([np.eye(3), -np.eye(3)])
-    ends = np.einsum("ij,ij->i", body.support(along @ frame) @ frame.T, along)
-    reach = body.reach(frame)
-    return Convex(planes, quadric, -ends[3:], ends[:3], reach, size, body, frame)
+        return Convex(self.body, gradient @ self.frame, f"deformed, first {self.size}")

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.convex import Body, Convex, Quadric, image_of
+from scanfab.base.convex import Body, Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.option import number, numbers, unusable
-from scanfab.base.space import SPACE, Space, on_circle, on_sphere
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray, IntArray
 
 # Relative rounding of coordinates in STL files, which hold 4-byte numbers: points that are closer
@@ -19,8 +19,6 @@ from scanfab.base.typing import FloatArray, IntArray
 TOLERANCE = 1e-6
 # Every line is cut by every face, so the faces must not be too many.
 MOST_FACES = 1000
-# volume of the unit ball (3 axes) and area of the unit disc (2 axes); 1 for no round part
-VOLUME_OF_BALL = {0: 1.0, 2: math.pi, 3: 4.0 / 3.0 * math.pi}
 
 
 class Product(Body):
@@ -34,36 +32,13 @@ class Product(Body):
         size = round_axes + edges
         axes = np.eye(3)[round_axes:size]
         planes = np.column_stack([np.concatenate([axes, -axes]), np.ones(2 * edges)])
-        outline = {0: np.zeros((1, 3)), 2: on_circle(), 3: on_sphere()}[round_axes]
+        corners = np.zeros((1, 3))
         for axis in axes:
             # one copy is reversed, so that the corners of a square follow one another around it
-            outline = np.concatenate([outline + axis, outline[::-1] - axis])
-        volume = VOLUME_OF_BALL[round_axes] * 2.0**edges
-        form = np.repeat([1.0, 0.0], [round_axes, 3 - round_axes])
-        super().__init__(outline, planes, volume, form, is_flat=size == 2)
+            corners = np.concatenate([corners + axis, corners[::-1] - axis])
+        bent = np.repeat([1.0, 0.0], [round_axes, 3 - round_axes])
+        super().__init__(corners, planes, bent, is_flat=size == 2)
         self.round_axes, self.size = round_axes, size
-
-    def support(self, along: FloatArray) -> FloatArray:
-        """The point of the body that lies furthest along each vector, shape (N, 3)."""
-        place = np.where(along < 0.0, -1.0, 1.0) * (np.arange(3) < self.size)
-        across = np.linalg.norm(along[:, : self.round_axes], axis=1, keepdims=True)
-        place[:, : self.round_axes] = along[:, : self.round_axes] / np.where(
-            across > 0.0, across, 1.0
-        )
-        return place
-
-    def reach(self, frame: FloatArray) -> float:
-        """
-        Radius of a ball about the origin that holds the image frame @ x.
-
-        It is slightly too large for a sheared cylinder, whose axis is not normal to its ends.
-        """
-        if not self.round_axes:
-            return super().reach(frame)
-        ends, axis = frame[:, : self.round_axes], frame[:, self.round_axes : self.size].sum(axis=1)
-        widest = np.linalg.svd(ends, compute_uv=False)[0]
-        square = widest**2 + axis @ axis
-        return float(np.sqrt(square + 2.0 * np.linalg.norm(ends.T @ axis)))
 
     def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
         """
@@ -82,7 +57,7 @@ class Product(Body):
             shared.append(2.0 * np.arccos(0.5 * q) - 0.5 * q * chord)
             slope.append(across * chord)
         elif self.round_axes == 3:
-            shared.append(self.volume * (1.0 - 0.75 * q + q**3 / 16.0))
+            shared.append(4.0 / 3.0 * np.pi * (1.0 - 0.75 * q + q**3 / 16.0))
             slope.append(np.pi * across * (1.0 - 0.25 * q**2))
         others = [np.prod(shared[:i] + shared[i + 1 :], axis=0) for i in range(len(shared))]
         return np.prod(shared, axis=0), np.sum(np.multiply(slope, others), axis=0)
@@ -121,11 +96,8 @@ def sphere(radius: float, space: Space = SPACE) -> Convex:
     array([ True, False])
     """
     radius = number("a length above 0", lambda value: 0 < value < math.inf)("radius", radius)
-    high = radius * np.diag(space.identity)
     frame = _frame("radius", [radius] * space.dimension, space.basis[: space.dimension], space)
-    body = DISC if space.is_plane else BALL
-    quadric = Quadric(np.eye(3), radius * radius)
-    return Convex(np.zeros((0, 4)), quadric, -high, high, radius, f"radius {radius:g}", body, frame)
+    return Convex(DISC if space.is_plane else BALL, frame, f"radius {radius:g}")
 
 
 def box(
@@ -154,7 +126,7 @@ def box(
     array([1. , 1.5, 2. ])
     """
     frame, body = _frame("edges", edges, turn, space, 0.5), SQUARE if space.is_plane else BLOCK
-    return image_of(body, frame, "box " + " x ".join(f"{edge:g}" for edge in edges))
+    return Convex(body, frame, "box " + " x ".join(f"{edge:g}" for edge in edges))
 
 
 def ellipsoid(
@@ -186,7 +158,7 @@ def ellipsoid(
     name, body = ("ellipse", DISC) if space.is_plane else ("ellipsoid", BALL)
     frame = _frame("semi_axes", semi_axes, turn, space)
     size = f"{name} of semi-axes {', '.join(f'{axis:g}' for axis in semi_axes)}"
-    return image_of(body, frame, size)
+    return Convex(body, frame, size)
 
 
 def _frame(
@@ -227,13 +199,11 @@ def cylinder(radius: float, height: float, axis: npt.ArrayLike = (0.0, 0.0, 1.0)
     """
     if not np.linalg.norm(axis) > 0:
         raise unusable("axis", "a vector that is not 0", axis)
-    along = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
-    aside = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
-    aside /= np.linalg.norm(aside)
-    turn = np.array([aside, np.cross(along, aside), along])
+    # singular vectors of a single row: its direction and two others normal to it
+    turn = np.linalg.svd(np.array(axis, dtype=float).reshape(1, 3))[2][::-1]
     size = f"cylinder of radius {radius:g}, height {height:g}"
     frame = _frame("radius, height / 2", [radius, radius, 0.5 * height], turn, SPACE)
-    return image_of(COLUMN, frame, size)
+    return Convex(COLUMN, frame, size)
 
 
 def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatArray]:
@@ -308,5 +278,5 @@ def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatAr
     volume = np.abs(np.linalg.det(corners))
     centroid = volume @ corners.sum(axis=1) / (4.0 * volume.sum())
     planes[:, 3] -= planes[:, :3] @ centroid
-    body = Body(points[hull.vertices] - centroid, planes, float(hull.volume))
-    return image_of(body, np.eye(3), f"surface of {len(planes)} faces"), middle + centroid
+    body = Body(points[hull.vertices] - centroid, planes)
+    return Convex(body, np.eye(3), f"surface of {len(planes)} faces"), middle + centroid

@@ -3,9 +3,7 @@
 import meshio
 import numpy as np
 
-from scanfab.base.convex import Body, Convex, Quadric
 from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron, sphere
-from scanfab.scan.directions import direction_rule
 from tests.helpers.lattices import rotation
 
 # triangles of the box whose corners product((-1, 1), repeat=3) makes
@@ -19,13 +17,9 @@ OF_A_BOX = np.array(
 
 def cut_ball(radius, normal, distance):
     """A ball with a piece cut off by a plane."""
-    axes = direction_rule("lebedev:23").axes
-    points = radius * np.concatenate([axes, -axes])
-    over = np.maximum(points @ normal - distance, 0.0)
-    planes = np.append(normal, distance)[None]
-    body = Body(points - np.outer(over, normal), planes, np.nan)
-    quadric, half = Quadric(np.eye(3), radius**2), np.full(3, float(radius))
-    return Convex(planes, quadric, -half, half, float(radius), "cut ball", body, np.eye(3))
+    ball = sphere(radius)
+    ball.planes = np.append(normal, distance)[None]
+    return ball
 
 
 def corners_of_a_box(half, turn=None):

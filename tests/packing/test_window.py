@@ -1,7 +1,5 @@
 """The RV: what lies in it, its default place and size, and periodic faces."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
@@ -79,7 +77,8 @@ def test_a_rod_is_met_by_an_image_that_is_not_the_nearest():
 
 def test_room_around_a_window_is_that_of_its_own_box():
     """Flat regions fit into flat samples, where the ball that holds them would not."""
-    flat = replace(box([8.0, 8.0, 1.0]), low=np.array([-4.0, -4, -0.5]), high=np.array([4.0, 4, 3]))
+    flat = box([8.0, 8.0, 1.0])
+    flat.high = np.array([4.0, 4.0, 3.0])
     surfaces = SurfaceBox(np.array([-5.0, -6.0, -1.0]), np.array([5.5, 6.0, 3.2]), None)
     assert surfaces.room_around(Window(np.zeros(3), flat)) == pytest.approx(0.2)
 
