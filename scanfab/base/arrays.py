@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError
-from scanfab.base.typing import IntArray
+from scanfab.base.typing import AnyArray, BoolArray, FloatArray, IntArray
 
 # limits for lengths: the cube of any length between them is finite and above 0
 LEAST, MOST = 1e-100, 1e100
@@ -18,15 +18,13 @@ LEAST, MOST = 1e-100, 1e100
 ROWS = 1 << 18
 
 
-def doubles(values: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+def doubles(values: AnyArray) -> FloatArray:
     """Convert numbers to 8-byte floats; a signalling 4-byte NaN raises no warning."""
     with np.errstate(invalid="ignore"):
         return values.astype(np.float64, copy=False)
 
 
-def cast(
-    name: str, values: npt.ArrayLike, dtype: type | None, shape: tuple[Any, ...]
-) -> npt.NDArray[Any]:
+def cast(name: str, values: npt.ArrayLike, dtype: type | None, shape: tuple[Any, ...]) -> AnyArray:
     """
     Return a read-only array of the given type and shape.
 
@@ -55,25 +53,25 @@ def cast(
     return numbers
 
 
-def all_within(values: npt.NDArray[np.float64], least: float, most: float) -> bool:
+def all_within(values: FloatArray, least: float, most: float) -> bool:
     """Return whether all values lie between two limits, without making a temporary array."""
     return values.size == 0 or bool(values.min() >= least and values.max() <= most)
 
 
-def compressed(chosen: npt.NDArray[np.bool_], values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def compressed(chosen: BoolArray, values: AnyArray) -> AnyArray:
     """The chosen rows; not a copy if that is all of them."""
     # several times as fast as to index with a mask
     return values if chosen.all() else np.compress(chosen, values, axis=0)
 
 
-def in_parts(function: Callable[..., npt.NDArray[Any]], *arrays: npt.NDArray[Any]) -> Any:
+def in_parts(function: Callable[..., AnyArray], *arrays: AnyArray) -> AnyArray:
     """What a function makes of arrays, row by row; of many rows some at a time, to save memory."""
     starts = range(0, max(len(arrays[0]), 1), ROWS)
     parts = [function(*(one[start : start + ROWS] for one in arrays)) for start in starts]
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
-def grains_named(id: IntArray, wrong: npt.NDArray[np.bool_]) -> str:
+def grains_named(id: IntArray, wrong: BoolArray) -> str:
     """Name the wrong grains in a message: 'grain 7' or '3 grains, the first is 7'."""
     first = id[np.argmax(wrong)]
     number = np.count_nonzero(wrong)

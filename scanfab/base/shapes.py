@@ -23,7 +23,7 @@ MOST_FACES = 1000
 
 class Product(Body):
     """
-    The product of a ball or disc of radius 1 and of edges from -1 to 1 along the other axes.
+    The product of a ball or disc of radius 1 and of edges from -1/2 to 1/2 along the other axes.
 
     A cylinder is a disc times an edge; a cube is three edges. A ball has 3 round axes, a disc 2.
     """
@@ -31,11 +31,11 @@ class Product(Body):
     def __init__(self, round_axes: int, edges: int) -> None:
         size = round_axes + edges
         axes = np.eye(3)[round_axes:size]
-        planes = np.column_stack([np.concatenate([axes, -axes]), np.ones(2 * edges)])
+        planes = np.column_stack([np.concatenate([axes, -axes]), np.full(2 * edges, 0.5)])
         corners = np.zeros((1, 3))
         for axis in axes:
             # one copy is reversed, so that the corners of a square follow one another around it
-            corners = np.concatenate([corners + axis, corners[::-1] - axis])
+            corners = np.concatenate([corners + 0.5 * axis, corners[::-1] - 0.5 * axis])
         bent = np.repeat([1.0, 0.0], [round_axes, 3 - round_axes])
         super().__init__(corners, planes, bent, is_flat=size == 2)
         self.round_axes, self.size = round_axes, size
@@ -48,7 +48,7 @@ class Product(Body):
         of the body: an edge shares a shorter edge, a disc a lens, and a ball two caps.
         """
         step = np.abs(shift[:, self.round_axes : self.size]).T
-        edge = np.maximum(2.0 - length * step, 0.0)
+        edge = np.maximum(1.0 - length * step, 0.0)
         shared, slope = [*edge], [*np.where(edge > 0.0, step, 0.0)]
         across = np.linalg.norm(shift[:, : self.round_axes], axis=1)
         q = np.minimum(length * across, 2.0)
@@ -125,7 +125,7 @@ def box(
     >>> box([2.0, 3.0, 4.0]).high
     array([1. , 1.5, 2. ])
     """
-    frame, body = _frame("edges", edges, turn, space, 0.5), SQUARE if space.is_plane else BLOCK
+    frame, body = _frame("edges", edges, turn, space), SQUARE if space.is_plane else BLOCK
     return Convex(body, frame, "box " + " x ".join(f"{edge:g}" for edge in edges))
 
 
@@ -162,17 +162,13 @@ def ellipsoid(
 
 
 def _frame(
-    name: str,
-    lengths: Sequence[float] | FloatArray,
-    turn: npt.ArrayLike | None,
-    space: Space,
-    scale: float = 1.0,
+    name: str, lengths: Sequence[float] | FloatArray, turn: npt.ArrayLike | None, space: Space
 ) -> FloatArray:
-    """Columns of the scaled lengths along the rows of a turn; in a plane, then its normal."""
+    """Columns of the given lengths along the rows of a turn; in a plane, then its normal."""
     expected = f"{space.dimension} lengths above 0"
     parse = numbers(expected, lambda every: len(every) == space.dimension and min(every) > 0)
     axes = np.eye(3)[sorted(space.along)] if turn is None else turn
-    rows = np.multiply(scale * np.array(parse(name, lengths))[:, None], axes)
+    rows = np.multiply(np.array(parse(name, lengths))[:, None], axes)
     return np.column_stack([*rows, *([space.normal] if space.is_plane else [])])
 
 
@@ -202,7 +198,7 @@ def cylinder(radius: float, height: float, axis: npt.ArrayLike = (0.0, 0.0, 1.0)
     # singular vectors of a single row: its direction and two others normal to it
     turn = np.linalg.svd(np.array(axis, dtype=float).reshape(1, 3))[2][::-1]
     size = f"cylinder of radius {radius:g}, height {height:g}"
-    frame = _frame("radius, height / 2", [radius, radius, 0.5 * height], turn, SPACE)
+    frame = _frame("radius, height", [radius, radius, height], turn, SPACE)
     return Convex(COLUMN, frame, size)
 
 

@@ -17,7 +17,6 @@ from scanfab.base.shapes import ellipsoid
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import BoolArray, FloatArray
-from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
 # In messages, because some users write 70 for 70 %.
@@ -79,9 +78,7 @@ class Window:
         -------
         ndarray of bool, shape (N,)
         """
-        return np.asarray(
-            in_parts(lambda some: self.shape.contains(self.branches(some, packing)), points)
-        )
+        return in_parts(lambda some: self.shape.contains(self.branches(some, packing)), points)
 
     def may_meet(self, points: FloatArray, radius: FloatArray, packing: Packing) -> BoolArray:
         """
@@ -113,7 +110,7 @@ class Window:
                 meets[left] = self.shape.may_meet(branch[left] + shift, radius[left])
             return meets
 
-        return np.asarray(in_parts(meets_any_image, points, radius))
+        return in_parts(meets_any_image, points, radius)
 
     def __post_init__(self) -> None:
         """PackingError if the centre is no point."""
@@ -238,8 +235,12 @@ class SurfaceBox:
     low: FloatArray
     """Lower corner, shape (3,)."""
     high: FloatArray
-    cell: Cell | None
-    space: Space = SPACE
+    extents: FloatArray
+    """Edges of the box (heights of the cell, along its periodic vectors), shape (3,)."""
+    center: FloatArray
+    """The middle of the box (of the cell, along its periodic vectors)."""
+    periodic: BoolArray
+    space: Space
     """The plane in which the grains lie: the box has no extent across it."""
 
     @classmethod
@@ -251,28 +252,17 @@ class SurfaceBox:
         high = np.array([(along + radius).max() for along in position.T])
         if packing.space.across is not None:
             low[packing.space.across] = high[packing.space.across] = packing.place_across
-        return cls(low, high, packing.cell, packing.space)
-
-    @property
-    def extents(self) -> FloatArray:
-        """Edges of the box (heights of the cell, along its periodic vectors), shape (3,)."""
-        extents: FloatArray = self.high - self.low
-        if self.cell is None:
-            return extents
-        return np.where(self.cell.periodic, self.cell.heights, extents)
+        extents, center, periodic = high - low, 0.5 * (low + high), np.zeros(3, bool)
+        if packing.cell is not None:
+            periodic = np.array(packing.cell.periodic)
+            extents = np.where(periodic, packing.cell.heights, extents)
+            center = np.where(periodic, packing.cell.center, center)
+        return cls(low, high, extents, center, periodic, packing.space)
 
     @property
     def smallest_extent(self) -> float:
         """The shortest edge; of discs the shortest edge in their plane."""
         return float(self.extents[list(self.space.along)].min())
-
-    @property
-    def center(self) -> FloatArray:
-        """The middle of the box (of the cell, along its periodic vectors)."""
-        middle: FloatArray = 0.5 * (self.low + self.high)
-        if self.cell is None:
-            return middle
-        return np.where(self.cell.periodic, self.cell.center, middle)
 
     def room_around(self, window: Window) -> float:
         """
@@ -283,8 +273,7 @@ class SurfaceBox:
         """
         below, above = window.center - self.low, self.high - window.center
         nearest = np.minimum(below + window.shape.low, above - window.shape.high)
-        if self.cell is not None:
-            nearest = np.where(self.cell.periodic, np.inf, nearest)
+        nearest[self.periodic] = np.inf
         return float(nearest[list(self.space.along)].min())
 
 

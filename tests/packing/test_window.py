@@ -79,7 +79,7 @@ def test_room_around_a_window_is_that_of_its_own_box():
     """Flat regions fit into flat samples, where the ball that holds them would not."""
     flat = box([8.0, 8.0, 1.0])
     flat.high = np.array([4.0, 4.0, 3.0])
-    surfaces = SurfaceBox(np.array([-5.0, -6.0, -1.0]), np.array([5.5, 6.0, 3.2]), None)
+    surfaces = SurfaceBox.of(Packing([[-4, -5, 0], [4.5, 5, 2.2]], 1.0), ALL[:2])
     assert surfaces.room_around(Window(np.zeros(3), flat)) == pytest.approx(0.2)
 
 
