@@ -119,6 +119,8 @@ class Convex:
     reach : float
         Radius of a ball about the origin that holds the region; for a sphere its own radius. It is
         slightly too large for a sheared cylinder, whose axis is not normal to its ends.
+    is_flat : bool
+        Whether the region lies in a plane, whose normal is the third column of the frame.
 
     Examples
     --------
@@ -131,7 +133,7 @@ class Convex:
     """
 
     def __init__(self, body: Body, frame: FloatArray, size: str) -> None:
-        self.body, self.frame, self.size = body, frame, size
+        self.body, self.frame, self.size, self.is_flat = body, frame, size, body.is_flat
         planes = np.column_stack([body.planes[:, :3] @ np.linalg.inv(frame), body.planes[:, 3]])
         self.planes: FloatArray = planes / np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
         corners, ball = body.corners @ frame.T, frame * body.round
@@ -157,11 +159,6 @@ class Convex:
         # of all ellipsoids of the same reach the sphere is furthest from the corners of its box
         furthest = (2.0 if self.is_flat else 3.0) * self.reach**2
         return not len(self.planes) and bool(self.high @ self.high > (1.0 - ROUNDING) * furthest)
-
-    @property
-    def is_flat(self) -> bool:
-        """Whether the region lies in a plane, whose normal is the third column of the frame."""
-        return self.body.is_flat
 
     @property
     def volume(self) -> float:

@@ -14,6 +14,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import IO
 
@@ -66,14 +67,9 @@ def check_folder(path: Path) -> None:
 
 def refuse_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path]) -> None:
     """Raise SettingsError if a file to write is one that is read, by whatever path or link."""
-
-    def place(path: Path) -> tuple[int, int]:
-        found = path.stat()
-        return found.st_dev, found.st_ino
-
-    read = {place(path): path for path in inputs if os.path.exists(path)}
-    for path in filter(None, outputs):
-        if os.path.exists(path) and (source := read.get(place(path))) is not None:
+    written = [path for path in outputs if path is not None and os.path.exists(path)]
+    for path, source in product(written, inputs):
+        if os.path.exists(source) and os.path.samefile(path, source):
             advice = "name another file to write"
             raise SettingsError(f"{path}: would replace the input {source}: {advice}")
 

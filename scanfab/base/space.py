@@ -38,13 +38,13 @@ class Space:
         self.across = across
         self.is_plane = flat
         self.dimension = 2 if flat else 3
-        self.along: tuple[int, ...] = (0, 1, 2)
+        last = 2 if across is None else across
+        order = ((last + 1) % 3, (last + 2) % 3, last)
+        self.along: tuple[int, ...] = order[: self.dimension]
         """Indices of its coordinates, in a plane in cyclic order: x-y, y-z or z-x."""
-        if across is not None:
-            self.along = (across + 1) % 3, (across + 2) % 3
         self.name = "-".join("xyz"[k] for k in sorted(self.along))
         """Its coordinates as users name them, for instance ``x-y``."""
-        self.basis: FloatArray = np.eye(3)[[*self.along, *([] if across is None else [across])]]
+        self.basis: FloatArray = np.eye(3)[[*order]]
         """Unit vectors along its coordinates, shape (3, 3); in a plane the normal comes last."""
         self.normal: FloatArray = self.basis[2]
         """Unit normal of a plane, shape (3,)."""
