@@ -132,10 +132,17 @@ class Convex:
     (2.0, [-2.0, -2.0, -2.0])
     """
 
+    planes: FloatArray
+    quadric: Quadric
+    low: FloatArray
+    high: FloatArray
+    reach: float
+    is_flat: bool
+
     def __init__(self, body: Body, frame: FloatArray, size: str) -> None:
         self.body, self.frame, self.size, self.is_flat = body, frame, size, body.is_flat
         planes = np.column_stack([body.planes[:, :3] @ np.linalg.inv(frame), body.planes[:, 3]])
-        self.planes: FloatArray = planes / np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
+        self.planes = planes / np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
         corners, ball = body.corners @ frame.T, frame * body.round
         # Lengths in units of the longest semi-axis make the form of a sphere exactly 1.
         widest = float(np.linalg.norm(ball, 2))
