@@ -151,7 +151,7 @@ def _refuse_far(where: str, position: FloatArray, radius: FloatArray, cell: Cell
     """ReadError if a grain is so far away that rounding destroys its place or size."""
     away = np.abs(position - (0.0 if cell is None else cell.origin)).max(axis=1, initial=0.0)
     # numbers that cannot be lengths are refused by Packing
-    far = np.flatnonzero((away < MOST) & (away > FAR * radius.max(initial=0.0)))
+    far = np.flatnonzero((away < MOST) & (away / FAR > radius.max(initial=0.0)))
     if len(far) and radius.max() > 0:
         found = f"grain {far[0] + 1} lies {away[far[0]]:g} from the origin"
         raise ReadError(f"{where}: {found}, too far away: is a number damaged?")
