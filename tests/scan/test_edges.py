@@ -144,3 +144,21 @@ def test_poisson_spheres_have_their_mean_length_in_small_windows(edge):
     assert found.agrees(cutoff + 1 / beta, within=2e-2)
     # what clip misses is seen
     assert not found.agrees(cutoff + a1 / (a0 + beta * a1), within=1.0)
+
+
+def test_a_segment_that_reaches_through_many_cells_is_followed():
+    """One small grain in a long cell: nearly all segments leave the window, few the medium."""
+    cell = Cell([[3.0, 0, 0], [0, 3.0, 0], [0, 0, 3.0]])
+    position, radius = np.zeros((1, 3)), np.full(1, 0.5)
+    triad, offset = np.eye(3), np.array([0.13, 0.29])
+    window = sphere(1.3)
+    solids = periodic_solids(cell, position, radius, radius < 0, window, "start")
+    sums = scan_triads(solids, triad[None], offset[None], 0.1, 0.0, "c")
+    # along z lines that meet the grain have segments of 3 - chord, whose two ends are inside
+    length, number = (float(one.sum()) for one in sums.kept("c"))
+    points = (np.arange(-20, 20) + offset[:, None]) * 0.1
+    square = 0.25 - points[0][:, None] ** 2 - points[1] ** 2
+    expected = 3.0 - 2.0 * np.sqrt(square[square > 0])
+    assert number == len(expected)
+    assert length == pytest.approx(expected.sum(), rel=1e-9)
+    assert sums.left_out.sum() == 0.0
