@@ -173,6 +173,8 @@ def test_grains_that_are_removed_leave_no_void_fabric_and_no_solid(tmp_path, ask
     assert "nan" not in answer.out.lower()
     assert "variant b: no grain but rattlers is left" in answer.err
     assert "variant d: no grain but rattlers reaches into the RV" in answer.err
+    alone = ask("compute", *FAST, grains(tmp_path, cubic_rows()[:1]), "--variants", "abc", code=1)
+    assert {row["alpha_vs"] for row in alone.rows} == {""}
 
 
 FORBIDDEN = [
