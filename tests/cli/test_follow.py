@@ -87,7 +87,7 @@ def test_grains_wait_for_their_contacts(folder, beside):
 def test_a_folder_with_contact_files_only_waits(folder):
     (folder / "pairs_0.txt").write_text(pairs_text(step=0))
     write_it = partial(in_halves, dump_text(cubic_rows()).encode(), folder / "dump_0.txt", 0.1)
-    assert is_followed([partial(time.sleep, 0.2), write_it], 1)
+    assert is_followed([partial(time.sleep, 0.2), write_it], 1, "--reference", "0")
 
 
 def test_one_file_that_grows(folder, files):
