@@ -107,3 +107,13 @@ def test_the_stress_of_clumps_is_what_yade_controlled():
     sample = Sample(packing, np.zeros(len(packing), bool))
     stress = sample_state(sample, VARIANTS["a"], None).stress
     np.testing.assert_allclose(np.diag(stress), 3e4, rtol=0.01)
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
+def test_contacts_by_geometry_are_those_of_the_program_but_for_a_few():
+    engine = csv_rows(BOX / "engine.csv")
+    series = scanfab.read_series(BOX, contacts="geometric")
+    whole = scanfab.compute(series, variants="a", **SCAN)
+    assert set(whole["contacts_from"].tolist()) == {"geometric"}
+    for column in ("contacts", "rattlers"):
+        assert np.abs(whole[column] - engine[column]).max() <= 3

@@ -34,9 +34,12 @@ def test_it_is_drawn_and_written_for_paraview(table):
     assert table.with_name("map.png").stat().st_size > 10_000
     collection = table.with_name("vtk") / "map-a.pvd"
     assert collection.read_text().count("map-a_00000") == 5
+    mesh = pyvista.read(collection.with_name("map-a_000001.vtu"))
+    rows = scanfab.load(table)[2:4]
+    fabric = [row.alpha_vs_axial for row in rows]
+    assert mesh.cell_data["alpha_vs_axial"].tolist() == pytest.approx(fabric)
     # blocks are where their rows say they are
-    centers = pyvista.read(collection.with_name("map-a_000001.vtu")).cell_centers().points
-    assert centers[:, 0].tolist() == pytest.approx([row.x for row in scanfab.load(table)[2:4]])
+    assert mesh.cell_centers().points[:, 0].tolist() == pytest.approx([row.x for row in rows])
 
 
 def test_a_frame_that_is_named_overrides_the_settings_file(series, tmp_path, monkeypatch, ask):

@@ -71,3 +71,13 @@ def test_notes_name_the_series_if_there_are_several(ask, tmp_path):
     for name in ("loose", "dense"):
         assert f"note: {tmp_path / name}, frame 0, variant a: fewer than 10 grains" in told
     assert "note: frame 0, variant a: few" in ask("compute", tmp_path / "loose", *words).err
+
+
+def test_inspect_takes_the_options_of_compute(tmp_path, ask):
+    file = write(tmp_path / "dump.txt", dump_text(names="id type x y z mass"))
+    words = ("--cell", "2", "2", "2", "--radius", "0.2", "--cell", "1", "1", "1", "--periodic", "z")
+    frame = json.loads(ask("inspect", "--json", file, *words, "--rv-shape", "cylinder").out)
+    assert frame["radius_max"] == 0.2
+    assert frame["cell"] == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    assert frame["periodic"] == [False, False, True]
+    assert frame["rv_shape"].startswith("cylinder of radius ")

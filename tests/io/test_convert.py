@@ -321,3 +321,13 @@ def test_that_columns_of_contacts_have_no_place_is_told_once(tmp_path):
     with warnings.catch_warnings():
         warnings.filterwarnings("error", ".* of the contacts are written")
         scanfab.convert(tmp_path / "out", tmp_path / "again", to="csv")
+
+
+@pytest.mark.filterwarnings("ignore:.*no contact file for step 1 among")
+def test_contacts_of_one_frame_of_a_series_that_are_lost_are_an_error_of_that_frame(tmp_path):
+    scanfab.convert([EVERYTHING, PACKINGS["normal forces"]], tmp_path / "g-{step}.csv")
+    (tmp_path / "g-1.contacts.csv").unlink()
+    first, second = scanfab.read_series(tmp_path)
+    with pytest.raises(scanfab.ReadError, match=r"holds no contacts of g-1\.csv, but g-1\.frame"):
+        first.read()
+    assert second.read().step == EVERYTHING.step

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.base.errors import NoFrameError, ScanfabWarning, SettingsError
+from scanfab.base.errors import NoFrameError, ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.cli.main import run
 from scanfab.io import frame as frame_module
 from scanfab.io.formats.lammps import LiggghtsReader
@@ -274,3 +274,11 @@ def test_contacts_that_convert_wrote_beside_the_dumps_belong_to_its_own_files(tm
     scanfab.convert(tmp_path, tmp_path / "x_{step}.csv")
     for source in (tmp_path, tmp_path / "x_30000.csv"):
         np.testing.assert_array_equal(scanfab.read(source).contacts.pairs, before)
+
+
+def test_unknown_files_are_passed_over_with_one_note(folder):
+    for name in ("log.liggghts", "in.deck", "floor.stl", "README.md", "a.png", "b.pdf", "c.xyz"):
+        write(folder / name, "hello\n")
+    with pytest.warns(ScanfabNote, match=r"skipped .* and 2 more: they hold neither grains") as e:
+        assert len(scanfab.read_series(folder)) == 3
+    assert len(e) == 1

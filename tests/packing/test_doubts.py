@@ -38,9 +38,14 @@ def test_sound_samples_raise_no_doubt(path):
     assert doubts(scanfab.read(path, contacts="geometric")) == {}
 
 
-@pytest.mark.parametrize("name", ["clumps.xml.bz2", "clumps_spheres.0.vtu", "multisphere_2.txt"])
-def test_clumps_that_are_read_as_bodies_raise_no_doubt(name):
-    assert "spread_bodies" not in doubts(scanfab.read(CLUMPS / name))
+@pytest.mark.parametrize(
+    ("name", "grains", "spheres"),
+    [("clumps.xml.bz2", 60, 90), ("clumps_spheres.0.vtu", 60, 90), ("multisphere_2.txt", 40, 80)],
+)
+def test_clumps_that_are_read_as_bodies_raise_no_doubt(name, grains, spheres):
+    packing = scanfab.read(CLUMPS / name)
+    assert (packing.bodies.count(np.ones(len(packing), bool)), len(packing)) == (grains, spheres)
+    assert "spread_bodies" not in doubts(packing)
 
 
 def clumps_in_a_row(count, **options):

@@ -123,12 +123,15 @@ def test_skipped_frames_are_warned_of_and_stand_in_the_manifest(dumps, tmp_path)
 
 def test_a_second_computation_into_the_same_file_is_refused(short_series, tmp_path):
     output, told = tmp_path / "table.csv", "another run is writing.* another `output=FILE`$"
+    refused = []
 
     def second(*_):
-        with pytest.raises(scanfab.ScanfabError, match=told):
+        with pytest.raises(scanfab.ScanfabError, match=told) as caught:
             from_python(output, short_series)
+        refused.append(caught)
 
     assert len(from_python(output, short_series, progress=second)) == 8
+    assert refused
 
 
 def test_what_cannot_be_resumed_names_arguments(short_series, tmp_path):

@@ -221,3 +221,11 @@ def test_columns_can_be_named_by_their_numbers(tmp_path):
 def test_a_binary_restart_is_named_with_what_to_write(tmp_path):
     data = struct.pack("<ii", 0, 42) + b"Version LIGGGHTS-PUBLIC 3.8.0, compiled ...\0" + bytes(99)
     refuses(written(tmp_path, data), r"a binary restart.*dump custom")
+
+
+def test_the_same_lattice_by_another_vector_has_the_same_contacts():
+    last = scanfab.find_contacts(scanfab.read(LAST))
+    flipped = scanfab.find_contacts(scanfab.read(FORMS / "flipped.lammpstrj.gz"))
+    assert flipped.cell.vectors[1, 0] < 0.1 * flipped.cell.vectors[0, 0]
+    assert id_pairs(flipped) == id_pairs(last)
+    np.testing.assert_allclose(lammps_fabric(flipped), lammps_fabric(last), atol=1e-10)

@@ -320,3 +320,8 @@ def test_a_csv_file_of_cells_that_is_wrong_is_an_error_that_says_where(tmp_path,
     path = write(tmp_path / "cells.csv", text)
     options = {"cell": path, "frame": 1, "contacts": "geometric"}
     refuses(STRAINED / "rec_spheres.*", f"cells.csv.*{message}", **options)
+
+
+def test_one_file_has_its_own_cell():
+    packing = scanfab.read(STRAINED / "after-spheres-00000001.vtk.gz")
+    np.testing.assert_allclose(packing.cell.vectors, vectors()[1], rtol=0, atol=1e-7)

@@ -151,7 +151,9 @@ def test_keys_turn_and_zoom_and_r_and_the_button_reset(page):
         assert page.run(SEEN) != before
         page.press("r")
         assert page.run(SEEN) == before
-    page.press(key)
+    page.run("document.querySelector('canvas.view').focus()")
+    page.press("+")
+    assert page.run(SEEN) != before
     page.run("document.querySelector('.key button').click()")
     assert page.run(SEEN) == before
 

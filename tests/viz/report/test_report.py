@@ -15,7 +15,7 @@ from scanfab.cli.main import run
 from scanfab.table.formats import read_rows
 from scanfab.table.table import Table
 from scanfab.viz.report.report import report
-from tests.conftest import ROOT
+from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.tables import curve, sheared
 
@@ -283,3 +283,23 @@ def test_maps_beside_tables_have_no_labels_and_need_their_columns(table, tmp_pat
     lack = r"map\.jsonl: the map lacks the columns variant, alpha_vs_axial"
     with pytest.raises(SettingsError, match=lack):
         report([table(rows, "map.jsonl")])
+
+
+def test_it_needs_nothing_from_elsewhere(page):
+    addresses = re.findall(r"(?:src|href)\s*=\s*[\"']?([^\"'>\s]*)", page)
+    assert addresses
+    assert all(one.startswith(("data:", "#")) for one in addresses)
+    assert "@import" not in page
+    assert "http" not in re.sub(r'content="default-src[^"]*"|http-equiv', "", page)
+
+
+def test_tables_of_other_programs_and_of_compare_are_refused(table, tmp_path, capsys, plain):
+    """Those of compare were reported as made of one replicate."""
+    compared, page = tmp_path / "compared.csv", tmp_path / "r.html"
+    assert run(["compare", str(table(curve())), "-o", str(compared)]) == 0
+    with pytest.raises(SettingsError, match=r"compared.csv: this is a table of scanfab compare: "):
+        report([compared])
+    engine = ROOT / SAMPLE / "engine.csv"
+    assert run(["report", str(engine), "-o", str(page)]) == 1
+    assert f"{engine}: there is no column" in capsys.readouterr().err
+    assert not page.exists()
