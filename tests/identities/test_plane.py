@@ -154,7 +154,7 @@ def assert_naive(solids, around, window, variants, spacing, cutoff, edge="clip")
     for d, angle in enumerate(ANGLES):
         # along the twin's u, which may point the other way
         shift = offsets[d, 0] * round(triads[d][0] @ [-np.sin(angle), np.cos(angle), 0.0])
-        # b and d leave rattlers out
+        # b and d are scanned beside them, so that the kernels are those of other tests
         for variant in set("ac").intersection(variants):
             limit = window if variant == "c" else None
             words = (*around, angle, shift, spacing, cutoff, limit, edge)

@@ -199,3 +199,14 @@ def test_pairs_of_an_rv_have_their_middles_in_it(sample):
     inside = window.contains(sample.packing.position, sample.packing)
     assert found.shadow == pytest.approx(np.pi * np.sum(sample.packing.radius[inside] ** 2))
     assert found.volume == pytest.approx(4 / 3 * np.pi * 8)
+
+
+def test_size_ratio_of_a_thousand_takes_little_memory_and_time():
+    """All dust in the bins of one boulder would be 20000² / 2 pairs to look at."""
+    position = np.random.default_rng(2).random((20_000, 3))
+    radius = np.full(20_000, 2e-4)
+    radius[:3] = 0.2
+    pairs, _ = overlapping_pairs(position, radius)
+    gaps = np.linalg.norm(position[:3, None] - position, axis=2) - (radius[:3, None] + radius)
+    with_boulders = {(min(i, j), max(i, j)) for i, j in np.argwhere(gaps < 0).tolist() if i != j}
+    assert with_boulders == {tuple(pair) for pair in pairs.tolist() if pair[0] < 3}

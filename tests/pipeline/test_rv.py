@@ -63,6 +63,11 @@ def test_a_surface_lies_where_its_file_says_or_about_the_centre_that_is_asked_fo
     assert window.center == pytest.approx(center)
     assert window.shape.high == pytest.approx(half)
     assert window_of(flat, rv_shape=file, rv_center="5,4,2").center.tolist() == [5.0, 4.0, 2.0]
+    notched = corners_of_a_box(np.ones(3)) * np.where(np.arange(8) == 0, 0.3, 1.0)[:, None]
+    file = surface(tmp_path / "notch.ply", notched)
+    words = r"rv_shape: .*notch.ply: .* not convex: .*expected a closed convex surface"
+    with pytest.raises(SettingsError, match=words):
+        window_of(flat, rv_shape=file)
 
 
 TILTED = np.array([[6.0, 0.0, 0.0], [2.5, 6.0, 0.0], [-2.0, 1.5, 6.0]])
@@ -190,6 +195,8 @@ def test_the_column_of_the_window_alone_is_there_where_it_is_asked_for(flat):
     assert -0.01 < of_window < -0.003
     second = compute(flat.packing, rv_shape="box", moment=2, **words)
     assert np.isnan(second[name]).all()
+    unbiased = compute(flat.packing, rv_shape="box", edge="ends", **words)
+    assert unbiased[name][1] == 0.0
 
 
 # what counts at their surface, and several of them

@@ -47,8 +47,16 @@ def test_auto_directions_takes_more_axes_and_keeps_spacing_and_replicates(packin
     options = {"spacing": 0.2, "variants": "c"}
     coarse, fine = (compute(packing, tolerance=t, **options)[0] for t in (1.0, 4e-4))
     assert fine.directions > coarse.directions
+    assert fine.alpha_vs_axial_se <= 4e-4
     assert fine.replicates == coarse.replicates
     assert fine.spacing == coarse.spacing == pytest.approx(0.2)
+
+
+def test_a_periodic_whole_alone_takes_about_as_many_lines_as_the_open_one(packing, repeated):
+    """Without an RV no image of a grain is near the origin."""
+    here, there = (compute(one, variants="b", tolerance=4e-4)[0] for one in (packing, repeated))
+    assert there.alpha_vs_axial_se <= 4e-4
+    assert 0.2 < there.spacing / here.spacing < 5.0
 
 
 BUDGETS = [("packing", "a", 1e5, 0.5), ("packing", "a", 1e6, 0.5)]

@@ -5,7 +5,7 @@ import pytest
 from numpy.polynomial.legendre import legvander
 
 from scanfab import SettingsError, direction_rule
-from scanfab.scan.directions import LEBEDEV_DEGREES
+from scanfab.scan.directions import AUTO_RULE, LEBEDEV_DEGREES
 from tests.helpers.lattices import unit_vectors
 from tests.helpers.naive import axial
 
@@ -39,8 +39,13 @@ def test_rule_integrates_even_harmonics_to_its_degree(text):
     assert rule.name == text
     assert rule.turned
     assert rule.bias < 1e-12
+    assert rule.degree >= int(text.partition(":")[2])
     assert np.abs(rule.isotropic_tensor - np.eye(3) / 3).max() < 1e-13
     assert zonal_errors(rule, rule.degree)[2::2].max() < 1e-12
+
+
+def test_auto_rule_is_exact_to_the_eighth_degree():
+    assert direction_rule(AUTO_RULE).degree >= 8
 
 
 @pytest.mark.parametrize(
