@@ -58,6 +58,11 @@ def clumps_in_a_row(count, **options):
 def test_bodies_that_a_periodic_face_cuts_are_told_without_the_cell():
     whole = clumps_in_a_row(12, cell=Cell([48.0, 10.0, 10.0]))
     assert "spread_bodies" not in doubts(whole)
+    # along an open axis a body may be longer than the cell
+    pipe, places = Cell([48.0, 2.0, 9.0], (True, False, False)), np.zeros((24, 3))
+    places[:, 0], places[::2, 1] = np.repeat(np.arange(12) * 4.0, 2), 1.5
+    upright = Packing(places, 1.0, bodies=np.repeat(np.arange(12), 2), cell=pipe)
+    assert "spread_bodies" not in doubts(upright)
     text = doubts(clumps_in_a_row(12))["spread_bodies"]
     assert text.startswith("1 body of several spheres, such as number 11, reach")
     assert "name its cell (`cell`, `periodic`)" in text

@@ -110,6 +110,7 @@ REPEATED = [
     (("compute", "--fields", "frame,variant,alpha_vs_axial", "--digits", "4"), "--digits 4"),
     (("compute", "--variants", "ac", "--rv", "0.7,0.5"), "--rv 0.5,0.7"),
     (("map", "--grid", "2,1,1"), "--grid 2,1,1"),
+    (("map", "--slices", "1"), "--slices 1"),
 ]
 
 

@@ -112,6 +112,8 @@ def test_noise_does_not_fill_the_panel(drawn):
         rows = [{**row, column: middle + noise * row["frame"]} for row in curve()]
         low, high = drawn(rows, figure).axes[0].get_ylim()
         assert high - low >= 1.0
+    rows = [{**row, "alpha_vs_axial": 5.0 + 0.1 * row["frame"]} for row in curve()]
+    assert drawn(rows, "evolution").axes[0].get_ylim()[0] <= 0.0
 
 
 def test_names_of_sources_are_no_formulas(drawn):

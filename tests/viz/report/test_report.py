@@ -247,6 +247,7 @@ def test_few_columns_are_enough(table, plain):
     text = words_of(page_of([table([{name: row[name] for name in few} for row in curve()])]))
     assert "5 frames of table; variants c." in text
     assert "lacks the column alpha_vs_axial_se" in text
+    assert "1 frame of one; variants c;" in words_of(page_of([table(curve()[:1], "one.jsonl")]))
 
 
 def test_one_of_several_cut_offs_is_reported(tmp_path, capsys, plain):
