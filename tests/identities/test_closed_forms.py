@@ -113,7 +113,9 @@ def test_grains_cut_by_the_window_are_solid_inside_it():
 
 def test_cutoff_larger_than_the_window_gives_no_fabric_and_says_so():
     packing = Packing(*shaken_cubic(np.random.default_rng(0), 5))
-    with pytest.warns(ScanfabWarning, match=r"variant c: no void segment reaches the cut-off 10\b"):
+    times = f"{10 / packing.radius.min():.4g} times the smallest radius"
+    told = f"variant c: no void segment reaches the cut-off 10, {times}"
+    with pytest.warns(ScanfabWarning, match=told):
         row = compute(packing, variants="c", cutoff=10.0, spacing=0.3, directions="lebedev:5")[0]
     assert row.segments == 0
     assert row.lines > 0

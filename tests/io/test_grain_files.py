@@ -200,6 +200,13 @@ def test_files_are_in_the_natural_order_of_their_steps(tmp_path, names, expected
     assert [frame.step for frame in opened(tmp_path, names, ONE_GRAIN)] == expected
 
 
+def test_files_of_several_names_that_are_named_are_one_series_in_natural_order(tmp_path):
+    names = ["loose_10.csv", "dense.csv", "loose_9.csv"]
+    paths = [write(tmp_path / name, "x,y,z,radius\n0,0,0,1\n") for name in names]
+    found = [path.name for path in scanfab.read_series(paths).files()]
+    assert found == ["dense.csv", "loose_9.csv", "loose_10.csv"]
+
+
 def test_the_names_beside_a_single_file_tell_its_step(tmp_path):
     opened(tmp_path, ["run2_500_v3.csv", "run2_600_v3.csv"], ONE_GRAIN)
     assert scanfab.read(tmp_path / "run2_500_v3.csv").step == 500
