@@ -49,11 +49,9 @@ def prism_along(
     third = np.argmax(steepness, axis=1)
     first, second = (third + 1) % 3, (third + 2) % 3
     swaps = (periodic[second] & ~periodic[first]) | (in_plane & (first == 2))
-    # stacked and not transposed: one axis and several have arrays of one layout, so that Numba
-    # compiles a kernel once for both
-    rows = np.where(swaps, second, first), np.where(swaps, first, second), third
-    order = np.stack(rows, axis=1)
-    edges, repeats = vectors[order], periodic[order]
+    order = np.array([np.where(swaps, second, first), np.where(swaps, first, second), third]).T
+    # of one layout for one axis and for several, so that Numba compiles a kernel once for both
+    edges, repeats = vectors[order], periodic[order].copy()
     u = edges[:, 0] - np.einsum("di,di->d", edges[:, 0], n)[:, None] * n
     u /= np.sqrt(np.einsum("di,di->d", u, u))[:, None]
     v = edges[:, 1] - np.einsum("di,di->d", edges[:, 1], n)[:, None] * n
